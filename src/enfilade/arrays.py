@@ -1,0 +1,101 @@
+"""The Dr.Jit types of this package, and the way between them and NumPy.
+
+They are the differentiable types, since those are Mitsuba's own: a camera ray, its surface query and
+our arithmetic on it then fuse into one kernel. ``device.activate`` decides whether they live on the
+CPU or on a GPU, and must come before the first import of this module.
+
+On the CPU, NumPy and Dr.Jit share memory both ways, also where NumPy says read-only: scatter only
+into arrays made in the same function.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+from drjit.auto.ad import (
+    PCG32,
+    Array2f,
+    Array3f,
+    Bool,
+    Float,
+    Int,
+    Matrix3f,
+    UInt,
+    UInt64,
+)
+
+__all__ = [
+    "PCG32",
+    "Array2f",
+    "Array3f",
+    "Bool",
+    "Float",
+    "Int",
+    "Matrix3f",
+    "UInt",
+    "UInt64",
+    "image",
+    "lanes",
+    "opaque",
+    "pixel_grid",
+]
+
+
+def lanes(values: npt.NDArray[Any]) -> Any:
+    """Flat lanes of a NumPy image, lane ``y * width + x``.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, 2) or (H, W, 3)
+        float32, int32, uint32, uint8 (widened to uint32) or bool. Other sizes are not taken.
+
+    Returns
+    -------
+    Float, Int, UInt, Bool, Array2f or Array3f
+        A copy for vectors (structure of arrays); memory may be shared for scalars.
+    """
+    match values.dtype.kind, values.dtype.itemsize:
+        case "f", 4:
+            scalar: Any = Float
+        case "i", 4:
+            scalar = Int
+        case "u", 4:
+            scalar = UInt
+        case "u", 1:
+            return UInt(np.ascontiguousarray(values, np.uint32).ravel())
+        case "b", _:
+            scalar = Bool
+        case _:
+            raise TypeError(f"no Dr.Jit type for arrays of {values.dtype}")
+    if values.ndim == 2:
+        return scalar(np.ascontiguousarray(values).ravel())
+    vector = {2: Array2f, 3: Array3f}[values.shape[2]]
+    return vector(*(scalar(np.ascontiguousarray(c)) for c in values.reshape(-1, values.shape[2]).T))
+
+
+def image(values: Any, height: int, width: int) -> npt.NDArray[Any]:
+    """NumPy image (H, W) or (H, W, C) of flat lanes; evaluates them; always a copy."""
+    array = np.array(values)
+    if array.ndim == 1:
+        return array.reshape(height, width)
+    return np.ascontiguousarray(array.T).reshape(height, width, array.shape[0])
+
+
+def opaque(value: float | int, kind: Any = None) -> Any:
+    """A number as a one-element array, so that its value is not compiled into the kernel.
+
+    A number that changes from frame to frame and reaches Dr.Jit as a literal costs a new compilation
+    of some seconds for every frame.
+    """
+    kind = kind or (UInt if isinstance(value, int) else Float)
+    return dr.opaque(kind, value)
+
+
+def pixel_grid(height: int, width: int) -> tuple[Any, Any, Any]:
+    """Lane index, column and row of every pixel of an image."""
+    lane = dr.arange(UInt, height * width)
+    row = lane // opaque(width)
+    return lane, lane - row * opaque(width), row

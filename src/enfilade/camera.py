@@ -1,0 +1,140 @@
+"""Pinhole cameras: intrinsics, poses, and the matrices of McMillan's warp.
+
+Axes are OpenGL's: in the camera's own frame +x is right, +y is up, and it looks along -z. Pixel
+coordinates have x to the right and y down; pixel (0, 0) spans [0, 1] x [0, 1], its centre is (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.errors import CameraPathError
+
+Matrix = npt.NDArray[np.float64]
+RIGID_TOLERANCE = 1e-3  # largest entry of |R^T R - 1|; exporters write 5 to 8 digits
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera.
+
+    Attributes
+    ----------
+    world_from_camera : (4, 4) float64
+        Rigid: a rotation and the eye's position; no scale, no shear, no mirror image.
+    fov_deg : float
+        Vertical field of view, degrees, in (0, 180).
+    width, height : int
+        Pixels. Pixels are square.
+
+    Raises
+    ------
+    CameraPathError
+        The matrix is not rigid or holds a NaN, or a number is out of range.
+    """
+
+    world_from_camera: Matrix
+    fov_deg: float
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.world_from_camera, np.float64)
+        check_rigid(matrix)
+        if not 0.0 < self.fov_deg < 180.0:
+            raise CameraPathError(f"the field of view is {self.fov_deg} deg; it must lie in (0, 180)")
+        if self.width < 1 or self.height < 1:
+            raise CameraPathError(f"an image of {self.width}x{self.height} pixels can't be rendered")
+        object.__setattr__(self, "world_from_camera", matrix)
+
+    @cached_property
+    def focal_px(self) -> float:
+        """Focal length in pixels."""
+        return 0.5 * self.height / math.tan(math.radians(0.5 * self.fov_deg))
+
+    @property
+    def eye(self) -> Matrix:
+        """Position in the world, (3,)."""
+        return self.world_from_camera[:3, 3]
+
+    @cached_property
+    def direction_from_pixel(self) -> Matrix:
+        """McMillan's P (§4, Eq. 3-1 there): pixel (x, y, 1) -> world direction of unit depth, (3, 3).
+
+        Depth is measured along the optical axis: ``eye + depth * (P @ (x, y, 1))`` is the point.
+        """
+        f = self.focal_px
+        camera_from_pixel = np.array(
+            [
+                [1.0 / f, 0.0, -0.5 * self.width / f],
+                [0.0, -1.0 / f, 0.5 * self.height / f],
+                [0.0, 0.0, -1.0],
+            ]
+        )
+        product: Matrix = self.world_from_camera[:3, :3] @ camera_from_pixel
+        return product
+
+    @cached_property
+    def pixel_from_direction(self) -> Matrix:
+        """Inverse of :attr:`direction_from_pixel`; the third row of the product is the depth, (3, 3)."""
+        inverse: Matrix = np.linalg.inv(self.direction_from_pixel).astype(np.float64)
+        return inverse
+
+    def resized(self, width: int, height: int) -> Camera:
+        """The same camera with another number of pixels; the vertical field of view stays."""
+        return Camera(self.world_from_camera, self.fov_deg, width, height)
+
+    def is_same_view(self, other: Camera) -> bool:
+        """Whether both see the very same image."""
+        return (
+            (self.width, self.height, self.fov_deg) == (other.width, other.height, other.fov_deg)
+        ) and np.array_equal(self.world_from_camera, other.world_from_camera)
+
+
+def check_rigid(matrix: Matrix) -> None:
+    """Raise CameraPathError unless the matrix is a rotation and a translation.
+
+    Parameters
+    ----------
+    matrix : (4, 4) float64
+    """
+    if matrix.shape != (4, 4):
+        raise CameraPathError(f"a pose is a 4x4 matrix, not one of shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise CameraPathError("the pose holds a NaN or an infinity")
+    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
+        raise CameraPathError(f"the last row of a pose is 0 0 0 1, not {matrix[3]}")
+    rotation = matrix[:3, :3]
+    defect = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if defect > RIGID_TOLERANCE:
+        raise CameraPathError(
+            f"the pose is not rigid: its axes miss being orthonormal by {defect:.3g} "
+            f"(at most {RIGID_TOLERANCE:g}); remove scale and shear"
+        )
+    if np.linalg.det(rotation) < 0.0:
+        raise CameraPathError("the pose is a mirror image (determinant -1): flip one axis")
+
+
+def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
+    """Pose of a camera at `eye` that looks at `target`, (4, 4).
+
+    Raises
+    ------
+    CameraPathError
+        Eye and target coincide, or `up` points along the view.
+    """
+    position, aim, upward = (np.asarray(v, np.float64) for v in (eye, target, up))
+    back = position - aim
+    right = np.cross(upward, back)
+    if np.linalg.norm(back) == 0.0 or np.linalg.norm(right) == 0.0:
+        raise CameraPathError(f"a camera at {position} can't look at {aim} with {upward} up")
+    back /= np.linalg.norm(back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
+    return pose

@@ -1,0 +1,70 @@
+"""Which processor the kernels run on: the CPU through LLVM, or an NVIDIA GPU through CUDA.
+
+The choice is made once, before the first kernel: Dr.Jit binds its array types at import.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from enfilade.errors import DeviceError
+
+LLVM_MINIMUM = 16  # 14 and 15 abort inside the compiler on some of Mitsuba's kernels
+INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 16 on will do)"
+
+Choice = Literal["auto", "cpu", "gpu"]
+
+
+@dataclass(frozen=True)
+class Device:
+    """What will run the kernels.
+
+    Attributes
+    ----------
+    backend : {"llvm", "cuda"}
+        Dr.Jit's name of it.
+    variant : str
+        Mitsuba's name of the matching variant.
+    version : tuple of int
+        Version of LLVM, or of CUDA.
+    """
+
+    backend: Literal["llvm", "cuda"]
+    variant: str
+    version: tuple[int, ...]
+
+
+def activate(choice: Choice = "auto") -> Device:
+    """Make Dr.Jit's automatic array types those of the chosen device.
+
+    Parameters
+    ----------
+    choice
+        ``"cpu"``, ``"gpu"``, or ``"auto"``: the GPU where there is one.
+
+    Raises
+    ------
+    DeviceError
+        LLVM is missing or too old, or a GPU was asked for and there is none.
+    """
+    import drjit as dr
+
+    has_gpu = choice != "cpu" and bool(dr.has_backend(dr.JitBackend.CUDA))
+    if choice == "gpu" and not has_gpu:
+        raise DeviceError("no usable NVIDIA GPU on this machine; run with --device cpu or auto")
+    device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version())) if has_gpu else _llvm()
+    dr.set_backend(device.backend)
+    return device
+
+
+def _llvm() -> Device:
+    import drjit as dr
+
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        raise DeviceError(f"LLVM's library was not found on this machine; {INSTALL_LLVM}")
+    version = tuple(dr.detail.llvm_version())
+    if version[0] < LLVM_MINIMUM:
+        found = ".".join(map(str, version))
+        raise DeviceError(f"LLVM {found} is too old, {LLVM_MINIMUM} is needed; {INSTALL_LLVM}")
+    return Device("llvm", "llvm_ad_rgb", version)

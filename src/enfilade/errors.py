@@ -1,0 +1,47 @@
+"""What can go wrong, as one tree.
+
+::
+
+    EnfiladeError                 anything this package raises on purpose; the command exits with 1
+    ├── InputError                what the user gave can't be used; the command exits with 2
+    │   ├── SceneError            a scene file: missing, malformed, or refused by the renderer
+    │   ├── CameraPathError       a camera path: malformed, not rigid, empty
+    │   ├── SettingsError         a setting: unknown, or out of range
+    │   ├── ImageError            an image, a sequence or a video that can't be read or compared
+    │   └── RunFolderError        a run folder: holds another run, damaged, can't be written
+    └── DeviceError               no usable LLVM or CUDA on this machine
+
+A message says what is wrong, where, and what to do next.
+"""
+
+
+class EnfiladeError(Exception):
+    """Anything this package raises on purpose."""
+
+
+class InputError(EnfiladeError, ValueError):
+    """What the user gave can't be used."""
+
+
+class SceneError(InputError):
+    """A scene file that is missing, malformed, or refused by the renderer."""
+
+
+class CameraPathError(InputError):
+    """A camera path that is malformed, not rigid, or empty."""
+
+
+class SettingsError(InputError):
+    """A setting that is unknown or out of range."""
+
+
+class ImageError(InputError):
+    """An image, a sequence or a video that can't be read or compared."""
+
+
+class RunFolderError(InputError):
+    """A run folder that holds another run, is damaged, or can't be written."""
+
+
+class DeviceError(EnfiladeError):
+    """No usable LLVM or CUDA on this machine."""

@@ -1,0 +1,286 @@
+"""What crosses a stage border: small frozen types that say what is in them and check their shapes.
+
+Images are NumPy arrays of shape (H, W) or (H, W, C), row 0 at the top. Validity is a mask beside the
+values, never a NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.camera import Camera
+
+F32 = npt.NDArray[np.float32]
+U32 = npt.NDArray[np.uint32]
+U8 = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+
+
+class SurfaceClass(IntEnum):
+    """What a surface does to light, from its material; of two that apply, the later one."""
+
+    NONE = 0
+    DIFFUSE = 1
+    EMISSIVE = 2
+    GLOSSY = 3
+    MIRROR = 4
+    TRANSPARENT = 5
+
+
+SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+
+
+class Source(IntEnum):
+    """Why a pixel has its value."""
+
+    KEYFRAME = 0
+    REUSED = 1
+    SLOW = 2
+    SPECULAR = 3
+    HOLE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPath:
+    """The cameras of a walkthrough.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        One a frame; all of one image size.
+    numbers : tuple of int
+        The number by which the user knows each frame, rising.
+    fps : float
+        Frames per second.
+    cuts : frozenset of int
+        Indices of frames that begin a new shot: nothing is carried across.
+    """
+
+    cameras: tuple[Camera, ...]
+    numbers: tuple[int, ...]
+    fps: float
+    cuts: frozenset[int] = frozenset()
+
+    def __post_init__(self) -> None:
+        if len(self.cameras) != len(self.numbers):
+            raise ValueError(f"{len(self.cameras)} cameras with {len(self.numbers)} numbers")
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    @property
+    def width(self) -> int:
+        """Pixels."""
+        return self.cameras[0].width
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return self.cameras[0].height
+
+    def shots(self) -> list[range]:
+        """Runs of frames without a cut between them."""
+        starts = sorted({0, *self.cuts})
+        return [range(a, b) for a, b in zip(starts, [*starts[1:], len(self)], strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """What each pixel's centre sees (the G-buffer of one frame).
+
+    Attributes
+    ----------
+    camera : Camera
+    depth : (H, W) float32
+        Distance along the optical axis, scene units; 0 where nothing is hit.
+    normal : (H, W, 3) float32
+        Shading normal in the world, unit length, towards the camera; 0 where nothing is hit.
+    albedo : (H, W, 3) float32
+        Diffuse reflectance, 0..1.
+    item : (H, W) uint32
+        Number of the shape that is seen, from 1; 0 where nothing is hit (the item buffer, §4.3).
+    surface : (H, W) uint8
+        :class:`SurfaceClass`.
+    """
+
+    camera: Camera
+    depth: F32
+    normal: F32
+    albedo: F32
+    item: U32
+    surface: U8
+
+    def __post_init__(self) -> None:
+        size = (self.camera.height, self.camera.width)
+        _check(self.depth, size, np.float32, "depth")
+        _check(self.normal, (*size, 3), np.float32, "normal")
+        _check(self.albedo, (*size, 3), np.float32, "albedo")
+        _check(self.item, size, np.uint32, "item")
+        _check(self.surface, size, np.uint8, "surface")
+
+    @property
+    def is_hit(self) -> Mask:
+        """Pixels that see a surface."""
+        return self.item > 0
+
+    @property
+    def is_specular(self) -> Mask:
+        """Pixels that see a glossy, mirroring or transparent surface."""
+        return np.isin(self.surface, SPECULAR)
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """Image flow of one frame (§3.3, Fig. 5): where each pixel's surface point goes, pixels per frame.
+
+    Attributes
+    ----------
+    backward, forward : (H, W, 2) float32
+        Displacement to the previous and to the next frame, x right, y down; 0 where there is none.
+    has_backward, has_forward : bool
+        Whether there is such a frame in the same shot.
+    """
+
+    backward: F32
+    forward: F32
+    has_backward: bool
+    has_forward: bool
+
+    def __post_init__(self) -> None:
+        _check(self.backward, (*self.forward.shape[:2], 2), np.float32, "backward")
+        _check(self.forward, (*self.backward.shape[:2], 2), np.float32, "forward")
+
+    @property
+    def motion(self) -> F32:
+        """Signed motion, the mean of forward and negated backward flow, (H, W, 2) pixels per frame."""
+        count = max(self.has_backward + self.has_forward, 1)
+        mean: F32 = (self.forward - self.backward) / np.float32(count)
+        return mean
+
+    @property
+    def speed(self) -> F32:
+        """Mean of the magnitudes to the previous and the next frame (§3.3), (H, W) pixels per frame."""
+        count = max(self.has_backward + self.has_forward, 1)
+        back = np.hypot(self.backward[..., 0], self.backward[..., 1])
+        ahead = np.hypot(self.forward[..., 0], self.forward[..., 1])
+        mean: F32 = np.asarray((back + ahead) / count, np.float32)
+        return mean
+
+
+@dataclass(frozen=True, eq=False)
+class Shading:
+    """Traced colours of an image or of a list of pixels.
+
+    Attributes
+    ----------
+    color : (..., 3) float32
+        Linear Rec.709 radiance.
+    variance : (...) float32
+        Variance of the mean of the luminance, from the spread of its paths; 0 where spp is 1.
+    dropped : int
+        Samples that were NaN or infinite and were left out.
+    """
+
+    color: F32
+    variance: F32
+    dropped: int = 0
+
+    def __post_init__(self) -> None:
+        _check(self.color, (*self.variance.shape, 3), np.float32, "color")
+        _check(self.variance, self.color.shape[:-1], np.float32, "variance")
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """A frame that is traced whole."""
+
+    frame: int
+    geometry: Geometry
+    shading: Shading
+
+
+@dataclass(frozen=True, eq=False)
+class Warped:
+    """A keyframe, or what remains of it, seen from another camera (§2.2).
+
+    Attributes
+    ----------
+    color : (H, W, 3) float32
+        0 in holes.
+    variance : (H, W) float32
+        Of the luminance.
+    depth : (H, W) float32
+        From the new camera; 0 in holes.
+    item : (H, W) uint32
+        0 in holes and where the keyframe saw nothing (sky).
+    magnification : (H, W) float32
+        Area, in pixels of the new image, of the keyframe's pixel; large where it is stretched.
+    is_hole : (H, W) bool
+    """
+
+    color: F32
+    variance: F32
+    depth: F32
+    item: U32
+    magnification: F32
+    is_hole: Mask
+
+    def __post_init__(self) -> None:
+        size = self.is_hole.shape
+        _check(self.color, (*size, 3), np.float32, "color")
+        _check(self.variance, size, np.float32, "variance")
+        _check(self.depth, size, np.float32, "depth")
+        _check(self.item, size, np.uint32, "item")
+        _check(self.magnification, size, np.float32, "magnification")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Two keyframes and the frames between them, as indices on the path (§4.3)."""
+
+    first: int
+    last: int
+
+    @property
+    def middle(self) -> int:
+        """The frame that the metric looks at."""
+        return (self.first + self.last) // 2
+
+    @property
+    def inbetweens(self) -> range:
+        """Frames that are neither keyframe."""
+        return range(self.first + 1, self.last)
+
+    def split(self) -> tuple[Segment, Segment]:
+        """Two halves that share the middle frame."""
+        return Segment(self.first, self.middle), Segment(self.middle, self.last)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame on its way to the video: colours, and why each pixel has its own.
+
+    Attributes
+    ----------
+    color : (H, W, 3) float32
+        Linear Rec.709 radiance.
+    source : (H, W) uint8
+        :class:`Source`.
+    """
+
+    color: F32
+    source: U8
+
+    def __post_init__(self) -> None:
+        _check(self.color, (*self.source.shape, 3), np.float32, "color")
+        _check(self.source, self.color.shape[:2], np.uint8, "source")
+
+
+def _check(array: npt.NDArray[Any], shape: tuple[int, ...], kind: type, name: str) -> None:
+    if array.shape != shape or array.dtype != kind:
+        raise ValueError(f"{name} is {array.dtype} {array.shape}, expected {np.dtype(kind)} {shape}")

@@ -1,0 +1,273 @@
+"""Every option of every stage: one frozen dataclass a stage, with defaults, ranges and help.
+
+The command line makes its flags from these classes (``--keyframes-spacing``), and a TOML file sets them
+by section (``[keyframes]`` / ``spacing = 25``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from pathlib import Path
+from typing import Any, Self
+
+from enfilade.errors import SettingsError
+
+
+def option(default: Any, text: str, *, least: float | None = None, most: float | None = None) -> Any:
+    """Declare a setting: its default, one sentence of help, and its range, ends included."""
+    return field(default=default, metadata={"help": text, "least": least, "most": most})
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the settings of all stages share: range checks, and reading from a table."""
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            _check(f, getattr(self, f.name), f"[{section_name(type(self))}] {f.name}")
+
+    @classmethod
+    def from_table(cls, table: dict[str, Any]) -> Self:
+        """Build from a TOML table; unknown keys raise and list the known ones.
+
+        Raises
+        ------
+        SettingsError
+        """
+        known = {f.name: f for f in fields(cls)}
+        for key in table:
+            if key not in known:
+                raise SettingsError(
+                    f"unknown setting {key!r} in [{section_name(cls)}]; known are: {', '.join(known)}"
+                )
+        return cls(**{k: _converted(known[k], v, cls) for k, v in table.items()})
+
+
+class Placement(Enum):
+    """How initial keyframes are placed (§4.2)."""
+
+    ADAPTED = "adapted"
+    UNIFORM = "uniform"
+    EQUAL_FLOW = "equal-flow"
+
+
+class Metering(Enum):
+    """Which retinal velocities the metric assumes (§3.3)."""
+
+    PURSUIT = "pursuit"
+    NONE = "none"
+    BOTH = "both"
+
+
+class SampleFilter(Enum):
+    """Pixel filter of frames that are traced whole and antialiased by themselves."""
+
+    BOX = "box"
+    GAUSSIAN = "gaussian"
+
+
+@dataclass(frozen=True)
+class TraceSettings(Section):
+    """Path tracing."""
+
+    spp: int = option(64, "Paths traced for a pixel.", least=1, most=1_048_576)
+    seed: int = option(0, "Seed of all random numbers.", least=0, most=2**32 - 1)
+    max_depth: int = option(
+        0, "Longest path in edges; 0 takes what the scene's integrator says.", least=0, most=1024
+    )
+    pixel_filter: SampleFilter = option(SampleFilter.GAUSSIAN, "Pixel filter of --method reference.")
+    chunk: int = option(
+        1_048_576, "Paths in flight at once: bounds the memory.", least=1024, most=268_435_456
+    )
+
+
+@dataclass(frozen=True)
+class ViewingSettings(Section):
+    """Who looks at the video, and on what (§5.2): this fixes pixels per degree."""
+
+    diagonal_m: float = option(0.25, "Diagonal of the image on the screen, metres.", least=0.01)
+    distance_m: float = option(0.5, "Distance of the eye from the screen, metres.", least=0.05)
+    peak_cd_m2: float = option(100.0, "Luminance of the display's white, cd/m2.", least=1.0)
+    black_cd_m2: float = option(0.1, "Luminance of the display's black, cd/m2.", least=0.0)
+    exposure_ev: float = option(0.0, "Exposure before the view transform, in stops.", least=-32.0, most=32.0)
+
+
+@dataclass(frozen=True)
+class KeyframeSettings(Section):
+    """Initial placement of keyframes (§4.2)."""
+
+    placement: Placement = option(
+        Placement.ADAPTED, "Uniform spacing adapted by flow (Eq. 6), plain, or equal flow."
+    )
+    spacing: int = option(25, "Uniform spacing of keyframes, frames (Delta).", least=2)
+    adaptation: float = option(
+        0.5, "Largest relative change of the spacing (A of Eq. 6).", least=0.0, most=0.9
+    )
+
+
+@dataclass(frozen=True)
+class WarpSettings(Section):
+    """3D warp and compositing (§2.2)."""
+
+    max_magnification: float = option(
+        4.0,
+        "Splats stretch to at most this many pixels a side; beyond is a hole.",
+        least=1.0,
+        most=16.0,
+    )
+    depth_tolerance: float = option(
+        0.02,
+        "Relative difference of depth within which two samples are one surface.",
+        least=1e-5,
+        most=0.5,
+    )
+
+
+@dataclass(frozen=True)
+class MetricSettings(Section):
+    """The animation quality metric (§3)."""
+
+    metering: Metering = option(
+        Metering.BOTH, "Eye movements assumed when judging: smooth pursuit, none, or the worse."
+    )
+    mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)
+
+
+@dataclass(frozen=True)
+class MaskSettings(Section):
+    """Which pixels must be traced, and when a segment is split (§4.1, §4.3, §6)."""
+
+    slow_deg_s: float = option(0.5, "Pixels slower than this are traced (v_t), deg/s.", least=0.0)
+    specular_jnd: float = option(
+        2.0, "A specular region with a difference above this is traced, JND.", least=0.0
+    )
+    specular_percent: float = option(
+        25.0,
+        "... or with more of its pixels above 1 JND than this, percent.",
+        least=0.0,
+        most=100.0,
+    )
+    split_percent: float = option(
+        10.0, "A segment with more of its unmasked pixels above 1 JND is split, percent.",
+        least=0.0, most=100.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class AntialiasSettings(Section):
+    """Motion-compensated spatiotemporal filter (§5.2, §5.3, §5.4)."""
+
+    frames: int = option(11, "Temporal support, frames.", least=1, most=63)
+    slow_frames: int = option(15, "Largest temporal support of slow pixels, frames.", least=1, most=63)
+    slow_deg_s: float = option(0.15, "Below this the temporal support grows, deg/s.", least=0.0)
+    specular_frames: int = option(3, "Temporal support on specular surfaces, frames.", least=1, most=63)
+    support_still_px: float = option(3.0, "Spatial support at rest, pixels.", least=1.0, most=31.0)
+    support_fast_px: float = option(
+        9.0, "Spatial support at the fast velocity, pixels.", least=1.0, most=31.0
+    )
+    support_beyond_px: float = option(11.0, "Spatial support beyond it, pixels.", least=1.0, most=31.0)
+    fast_deg_s: float = option(16.0, "The fast velocity, deg/s.", least=0.1)
+    separate_items: bool = option(False, "Leave out samples of another surface along the flow (§5.3).")
+
+
+@dataclass(frozen=True)
+class VideoSettings(Section):
+    """Encoding of the video."""
+
+    codec: str = option("h264", "Codec: h264, ffv1, av1 or prores.")
+    quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
+    ocio: str = option("", "An OpenColorIO configuration for the view transform, in place of sRGB.")
+    view: str = option("", "The view of that configuration.")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings of a run."""
+
+    trace: TraceSettings = field(default_factory=TraceSettings)
+    viewing: ViewingSettings = field(default_factory=ViewingSettings)
+    keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
+    warp: WarpSettings = field(default_factory=WarpSettings)
+    metric: MetricSettings = field(default_factory=MetricSettings)
+    masks: MaskSettings = field(default_factory=MaskSettings)
+    antialias: AntialiasSettings = field(default_factory=AntialiasSettings)
+    video: VideoSettings = field(default_factory=VideoSettings)
+
+    @classmethod
+    def from_tables(cls, tables: dict[str, Any]) -> Self:
+        """Build from the tables of a TOML or JSON file.
+
+        Raises
+        ------
+        SettingsError
+            An unknown section or setting, a wrong type, a value out of range.
+        """
+        known = sections()
+        for name, table in tables.items():
+            if name not in known:
+                raise SettingsError(f"unknown section [{name}]; known are: {', '.join(known)}")
+            if not isinstance(table, dict):
+                raise SettingsError(f"[{name}] must be a table of settings, not {table!r}")
+        built: dict[str, Any] = {n: known[n].from_table(t) for n, t in tables.items()}
+        return cls(**built)
+
+    def to_tables(self) -> dict[str, dict[str, Any]]:
+        """All values as plain tables, fit for JSON; read back by :meth:`from_tables`."""
+        return {
+            name: {
+                key: value.value if isinstance(value, Enum) else value
+                for key, value in dataclasses.asdict(getattr(self, name)).items()
+            }
+            for name in sections()
+        }
+
+
+def sections() -> dict[str, type[Section]]:
+    """Name and class of every section of :class:`Settings`, in order."""
+    return {f.name: f.default_factory for f in fields(Settings)}  # type: ignore[misc]
+
+
+def section_name(cls: type[Section]) -> str:
+    """Name under which a section stands in a file."""
+    return next((name for name, c in sections().items() if c is cls), cls.__name__)
+
+
+def read_tables(path: Path) -> dict[str, Any]:
+    """Tables of a TOML file, unchecked; :meth:`Settings.from_tables` checks them.
+
+    Raises
+    ------
+    SettingsError
+        The file can't be read or is no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"can't read the settings {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"{path} is not valid TOML: {error}") from error
+
+
+def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any:
+    kind = type(f.default)
+    where = f"[{section_name(cls)}] {f.name}"
+    if issubclass(kind, Enum):
+        choices = [choice.value for choice in kind]
+        if value not in choices:
+            raise SettingsError(f"{where} = {value!r}: choose one of {', '.join(choices)}")
+        return kind(value)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is not kind:
+        raise SettingsError(f"{where} = {value!r}: expected {kind.__name__}")
+    return value
+
+
+def _check(f: dataclasses.Field[Any], value: Any, where: str) -> None:
+    least, most = f.metadata.get("least"), f.metadata.get("most")
+    if (least is not None and not value >= least) or (most is not None and not value <= most):
+        span = f"at least {least:g}" if most is None else f"between {least:g} and {most:g}"
+        raise SettingsError(f"{where} = {value!r} is out of range: it must be {span}")
