@@ -1,0 +1,47 @@
+# make demo    set up, render a small walkthrough into runs/demo
+# make test    set up, run the tests
+# make check   set up, run format, lint, type and import-floor checks
+# make setup   only set up: .venv with locked versions, and LLVM by apt where it is missing
+# make lock    write requirements.lock anew from pyproject.toml
+# make clean   remove what the above have made; runs/ stays
+
+VENV ?= .venv
+BIN := $(VENV)/bin
+DEMO ?= runs/demo
+.DEFAULT_GOAL := help
+.PHONY: help setup llvm demo test check format lock clean
+
+help:
+	@sed -n 's/^# //p' Makefile
+
+setup: llvm $(VENV)/.ready
+
+llvm:
+	@sh setup/llvm.sh
+
+$(VENV)/.ready: requirements.lock pyproject.toml setup/venv.sh setup/python.sh
+	@sh setup/venv.sh $(VENV)
+	@touch $@
+
+demo: setup
+	@sh setup/demo.sh $(BIN) $(DEMO)
+
+test: setup
+	$(BIN)/python -m pytest $(TESTS)
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: setup
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: setup
+	@sh setup/lock.sh $(VENV)
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
