@@ -1,0 +1,28 @@
+"""Records and layers of pixels <-> files: OpenEXR and JSON, each file whole or not there at all."""
+
+from __future__ import annotations
+
+from enfilade.codec.exr import read_attributes, read_exr, write_exr
+from enfilade.codec.frames import (
+    read_frame,
+    read_shading,
+    write_frame,
+    write_result,
+    write_shading,
+)
+from enfilade.codec.whole import read_json, sweep, whole_file, write_json
+
+__all__ = [
+    "read_attributes",
+    "read_exr",
+    "read_frame",
+    "read_json",
+    "read_shading",
+    "sweep",
+    "whole_file",
+    "write_exr",
+    "write_frame",
+    "write_json",
+    "write_result",
+    "write_shading",
+]

@@ -1,0 +1,138 @@
+"""Records <-> layers of an OpenEXR file: shading, frames on their way, and the delivered frame (§5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.codec.exr import Array, read_attributes, read_exr, write_exr
+from enfilade.errors import ImageError
+from enfilade.records import F32, U8, Flow, Frame, Geometry, Shading
+
+__all__ = ["read_frame", "read_shading", "write_frame", "write_result", "write_shading"]
+
+F16 = npt.NDArray[np.float16]
+HALF_MAX = 65504.0  # largest finite half float, IEEE 754
+
+
+def write_shading(file: Path, shading: Shading) -> None:
+    """Write the shading of an image, exactly.
+
+    Parameters
+    ----------
+    file
+    shading : Shading
+        Of shape (H, W).
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    """
+    layers = {"RGB": shading.color, "variance": shading.variance}
+    write_exr(file, layers, attributes={"dropped": str(int(shading.dropped))})
+
+
+def read_shading(file: Path) -> Shading:
+    """Read what :func:`write_shading` wrote, bit by bit the same.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, damaged, or holds no shading.
+    """
+    layers = _required(file, {"RGB": np.float32, "variance": np.float32})
+    dropped = str(read_attributes(file).get("dropped", ""))
+    if not dropped.isascii() or not dropped.isdigit():
+        raise ImageError(f"{file} doesn't say how many samples were dropped; delete it to make it again")
+    return Shading(layers["RGB"], layers["variance"], int(dropped))
+
+
+def write_frame(file: Path, frame: Frame) -> None:
+    """Write a frame on its way to the video, exactly.
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    """
+    write_exr(file, {"RGB": frame.color, "source": frame.source.astype(np.uint32)})
+
+
+def read_frame(file: Path) -> Frame:
+    """Read what :func:`write_frame` wrote, bit by bit the same.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, damaged, or holds no frame.
+    """
+    layers = _required(file, {"RGB": np.float32, "source": np.uint32})
+    return Frame(layers["RGB"], layers["source"].astype(np.uint8))
+
+
+def write_result(
+    file: Path,
+    color: F32,
+    source: U8,
+    geometry: Geometry,
+    flow: Flow,
+    *,
+    position: F32,
+    attributes: Mapping[str, str | float | int] | None = None,
+) -> None:
+    """Write a delivered frame, in formats that other programs read.
+
+    ``R G B``, ``N`` and ``albedo`` are half floats, ``Z``, ``P``, ``forward.u/v`` and ``backward.u/v``
+    floats, ``item`` and ``source`` unsigned integers.
+
+    Parameters
+    ----------
+    file
+    color : (H, W, 3) float32
+        Linear Rec.709. Values beyond the range of a half float become its ends.
+    source : (H, W) uint8
+        ``records.Source``.
+    geometry
+    flow
+        Pixels per frame, x right, y down.
+    position : (H, W, 3) float32
+        In the world.
+    attributes
+        Of the header, see :func:`~enfilade.codec.exr.write_exr`.
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    """
+    layers: dict[str, Array] = {
+        "RGB": _half(color),
+        "Z": geometry.depth,
+        "P": position,
+        "N": _half(geometry.normal),
+        "albedo": _half(geometry.albedo),
+        "item": geometry.item,
+        "forward": flow.forward,
+        "backward": flow.backward,
+        "source": source.astype(np.uint32),
+    }
+    write_exr(file, layers, attributes=attributes)
+
+
+def _half(values: F32) -> F16:
+    return np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16)
+
+
+def _required(file: Path, kinds: Mapping[str, type]) -> dict[str, Array]:
+    layers = read_exr(file)
+    for name, kind in kinds.items():
+        if name not in layers or layers[name].dtype != kind:
+            raise ImageError(
+                f"{file} has no layer {name!r} of {kind.__name__} (it has {', '.join(layers)}); "
+                "delete it to make it again"
+            )
+    return layers

@@ -1,0 +1,141 @@
+"""Files that appear whole or not at all: written beside, flushed to the disk, renamed.
+
+A process killed at any moment leaves the old file, or none, under the final name; what it leaves beside
+is a hidden file with :data:`MARK` in its name, which :func:`sweep` removes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from enfilade.errors import EnfiladeError, RunFolderError
+
+__all__ = ["MARK", "read_json", "sweep", "whole_file", "write_json"]
+
+MARK = ".writing-"  # in the name of every file that isn't finished
+
+
+@contextmanager
+def whole_file(file: Path) -> Iterator[Path]:
+    """Give a path beside `file` to write to; it becomes `file` when the block ends without an error.
+
+    Parameters
+    ----------
+    file
+        The final name. Its folder is made where it is missing; a file that stands there is replaced.
+
+    Yields
+    ------
+    Path
+        In the same folder, with the same suffix. It need not be created before the block ends: nothing
+        written is an error.
+
+    Raises
+    ------
+    RunFolderError
+        The folder or the file can't be written, or the disk is full. Nothing is left beside it.
+    """
+    beside = file.with_name(f".{file.stem}{MARK}{os.getpid()}-{secrets.token_hex(4)}{file.suffix}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        yield beside
+        _flush(beside)
+        beside.replace(file)
+        _flush(file.parent)
+    except OSError as error:
+        raise unwritable(file, error.strerror or str(error)) from error
+    finally:
+        _remove(beside)
+
+
+def sweep(folder: Path) -> list[Path]:
+    """Remove unfinished files that a killed process left in a folder and those in it.
+
+    Only for the one process that may write there: what another is writing would go too.
+
+    Parameters
+    ----------
+    folder
+
+    Returns
+    -------
+    list of Path
+        What was removed, sorted.
+    """
+    left = sorted(f for f in folder.rglob(f".*{MARK}*") if f.is_file() and not f.is_symlink())
+    for file in left:
+        file.unlink(missing_ok=True)
+    return left
+
+
+def write_json(file: Path, value: Any) -> None:
+    """Write a value as JSON, indented, keys in the order given: the same value, the same bytes.
+
+    Parameters
+    ----------
+    file
+    value
+        Of dicts, lists, strings, finite numbers, booleans and None.
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    ValueError, TypeError
+        The value holds a NaN, an infinity, or something that JSON has no word for.
+    """
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    with whole_file(file) as beside:
+        beside.write_text(text, encoding="utf-8")
+
+
+def read_json(file: Path) -> Any:
+    """Read what :func:`write_json` wrote.
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be read or is no JSON.
+    """
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RunFolderError(f"can't read {file}: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise RunFolderError(f"{file} is damaged ({error}); delete it or its folder") from error
+
+
+def unwritable(file: Path, reason: str) -> EnfiladeError:
+    """Describe a file that can't be written, and what to do.
+
+    Parameters
+    ----------
+    file
+    reason
+        What the operating system or a library said.
+    """
+    return RunFolderError(
+        f"can't write {file}: {reason}; make room or choose another folder, then run the same command "
+        "again: what is finished stays"
+    )
+
+
+def _flush(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _remove(beside: Path) -> None:
+    try:
+        beside.unlink(missing_ok=True)
+    except OSError:  # its folder is a file, or has become read-only: the error on its way says so
+        return

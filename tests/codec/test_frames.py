@@ -1,0 +1,96 @@
+"""Records and OpenEXR files: exact ones come back bit by bit, delivered ones stay in range."""
+
+from __future__ import annotations
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from enfilade.camera import Camera
+from enfilade.codec import (
+    read_exr,
+    read_frame,
+    read_shading,
+    write_exr,
+    write_frame,
+    write_result,
+    write_shading,
+)
+from enfilade.errors import ImageError
+from enfilade.records import Flow, Frame, Geometry, Shading
+
+sizes = st.tuples(st.integers(1, 24), st.integers(1, 24))
+RELAXED = settings(
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@RELAXED
+@given(data=st.data(), size=sizes, dropped=st.integers(0, 2**40))
+def test_shading_comes_back_exactly(tmp_path, data, size, dropped):
+    color, variance = (
+        data.draw(arrays.arrays(np.float32, shape, fill=st.just(1))) for shape in ((*size, 3), size)
+    )
+    write_shading(tmp_path / "a.exr", Shading(color, variance, dropped))
+    back = read_shading(tmp_path / "a.exr")
+    assert back.color.tobytes() == color.tobytes()
+    assert back.variance.tobytes() == variance.tobytes()
+    assert back.dropped == dropped
+
+
+@RELAXED
+@given(data=st.data(), size=sizes)
+def test_frames_come_back_exactly(tmp_path, data, size):
+    color = data.draw(arrays.arrays(np.float32, (*size, 3), fill=st.just(1)))
+    source = data.draw(arrays.arrays(np.uint8, size))
+    write_frame(tmp_path / "a.exr", Frame(color, source))
+    back = read_frame(tmp_path / "a.exr")
+    assert back.color.tobytes() == color.tobytes()
+    assert back.source.tobytes() == source.tobytes()
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    file = tmp_path / "a.exr"
+    write_exr(file, {"RGB": np.zeros((4, 4, 3), np.float16)})
+    for read in (read_frame, read_shading):
+        with pytest.raises(ImageError, match=r"a\.exr has no layer 'RGB' of float32"):
+            read(file)
+    write_exr(file, {"RGB": np.zeros((4, 4, 3), np.float32), "variance": np.zeros((4, 4), np.float32)})
+    with pytest.raises(ImageError, match="dropped"):
+        read_shading(file)
+
+
+def test_the_delivered_frame(tmp_path):
+    rng = np.random.default_rng(3)
+    height, width = 6, 9
+    three, two = rng.random((height, width, 3), np.float32), rng.random((height, width, 2), np.float32)
+    item = rng.integers(0, 2**32, (height, width), dtype=np.uint32)
+    surface = np.ones((height, width), np.uint8)
+    camera = Camera(np.eye(4), 50.0, width, height)
+    geometry = Geometry(camera, three[..., 0].copy(), three, three, item, surface)
+    color = three.copy()
+    color[0, 0] = (1e9, -1e9, 65504)
+    flow = Flow(two, -two, has_backward=True, has_forward=True)
+    write_result(tmp_path / "a.exr", color, surface, geometry, flow, position=three, attributes={"frame": 12})
+    layers = read_exr(tmp_path / "a.exr")
+    np.testing.assert_array_equal(layers["RGB"][0, 0], (65504, -65504, 65504))
+    np.testing.assert_array_equal(layers["RGB"][1:], color[1:].astype(np.float16))
+    exact = {
+        "Z": geometry.depth,
+        "P": three,
+        "item": item,
+        "forward": -two,
+        "backward": two,
+        "source": surface,
+    }
+    for name, array in exact.items():
+        np.testing.assert_array_equal(layers[name], array)
+    assert {name: str(a.dtype) for name, a in layers.items()} == {
+        "RGB": "float16", "N": "float16", "albedo": "float16", "Z": "float32", "P": "float32",
+        "forward": "float32", "backward": "float32", "item": "uint32", "source": "uint32",
+    }  # fmt: skip
+    with OpenEXR.File(str(tmp_path / "a.exr"), header_only=True) as image:
+        assert image.header()["frame"] == 12
