@@ -1,5 +1,6 @@
 #!/bin/sh
-# Make .venv with the versions of requirements.lock and this checkout, editable. Takes a folder as $1.
+# Make a virtual environment (folder $1, .venv by default) with the versions of requirements.lock and
+# this checkout, editable.
 set -eu
 cd "$(dirname "$0")/.."
 folder=${1:-.venv}
@@ -10,8 +11,18 @@ if ! "$folder/bin/python" -c 'import pip' >/dev/null 2>&1; then
     "$python" -m venv --clear "$folder"
 fi
 
-export PIP_DISABLE_PIP_VERSION_CHECK=1
+# pip, one line a package.
+install() {
+    status=$(mktemp)
+    {
+        "$folder/bin/python" -m pip install --disable-pip-version-check --progress-bar off "$@" || echo $? >"$status"
+    } | sed -u -n 's/^Collecting \([^ ]*\).*/setup:   \1/p; s/^Installing collected.*/setup:   unpacking/p'
+    failed=$(cat "$status")
+    rm -f "$status"
+    return "${failed:-0}"
+}
+
 echo "setup: installing the locked versions (about 250 MB the first time)"
-"$folder/bin/python" -m pip install --quiet --no-compile --requirement requirements.lock
+install --no-compile --requirement requirements.lock
 echo "setup: installing enfilade"
-"$folder/bin/python" -m pip install --quiet --no-deps --editable .
+install --no-deps --editable .
