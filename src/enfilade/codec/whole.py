@@ -16,7 +16,7 @@ from typing import Any
 
 from enfilade.errors import EnfiladeError, RunFolderError
 
-__all__ = ["MARK", "read_json", "sweep", "whole_file", "write_json"]
+__all__ = ["MARK", "flush", "read_json", "sweep", "unwritable", "whole_file", "write_json"]
 
 MARK = ".writing-"  # in the name of every file that isn't finished
 
@@ -43,11 +43,11 @@ def whole_file(file: Path) -> Iterator[Path]:
     """
     beside = file.with_name(f".{file.stem}{MARK}{os.getpid()}-{secrets.token_hex(4)}{file.suffix}")
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        _make(file.parent)
         yield beside
-        _flush(beside)
+        flush(beside)
         beside.replace(file)
-        _flush(file.parent)
+        flush(file.parent)
     except OSError as error:
         raise unwritable(file, error.strerror or str(error)) from error
     finally:
@@ -126,12 +126,24 @@ def unwritable(file: Path, reason: str) -> EnfiladeError:
     )
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Wait until the disk has a file's bytes, or a folder's names.
+
+    Raises
+    ------
+    OSError
+    """
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def _make(folder: Path) -> None:
+    if not folder.is_dir():
+        folder.mkdir(parents=True, exist_ok=True)
+        flush(folder.parent)
 
 
 def _remove(beside: Path) -> None:

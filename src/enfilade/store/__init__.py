@@ -1,0 +1,16 @@
+"""The run folder: what a run is, what it has finished, and the files that say so.
+
+::
+
+    run.json         identity: scene fingerprint, path, settings, versions, method
+    keyframes/NNNN.exr   raw/NNNN.exr   frames/NNNN.exr   by frame number, four digits or more
+    ledger.jsonl     one line for each finished unit of work
+    summary.json     plots/     video.mp4
+    run.lock         who is writing here
+"""
+
+from __future__ import annotations
+
+from enfilade.store.run import KINDS, Run
+
+__all__ = ["KINDS", "Run"]

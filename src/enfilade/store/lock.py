@@ -1,0 +1,84 @@
+"""The lock of a run folder: one writer at a time, named, and gone with its holder."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+from datetime import UTC, datetime
+from pathlib import Path
+
+from enfilade.errors import RunFolderError
+
+__all__ = ["LOCK_NAME", "Lock"]
+
+LOCK_NAME = "run.lock"
+
+
+class Lock:
+    """A claim on a run folder, held until :meth:`release` or the end of the process.
+
+    The kernel holds it (``flock``), so that it goes when its holder dies, however that happens; processes
+    forked from the holder share it. The file stays, and only says who holds it: removing it would let two
+    processes lock two files of one name.
+
+    Parameters
+    ----------
+    folder
+        The run folder, which must exist.
+
+    Raises
+    ------
+    RunFolderError
+        Another process is writing there, or the folder can't be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._handle = -1
+        file = folder / LOCK_NAME
+        try:
+            handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise RunFolderError(
+                f"can't write in {folder}: {error.strerror}; choose another --out"
+            ) from error
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = _holder(handle)
+            os.close(handle)
+            if not isinstance(error, BlockingIOError):
+                raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
+            raise RunFolderError(
+                f"another command is writing {folder}: {holder}; wait for it, stop it, "
+                "or choose another --out"
+            ) from error
+        self._handle = handle
+        _sign(handle)
+
+    def release(self) -> None:
+        """Let others write. A second call does nothing."""
+        if self._handle >= 0:
+            os.ftruncate(self._handle, 0)
+            fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing alone leaves it with forked processes
+            os.close(self._handle)
+            self._handle = -1
+
+
+def _sign(handle: int) -> None:
+    name = {
+        "host": socket.gethostname(),
+        "pid": os.getpid(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    os.ftruncate(handle, 0)
+    os.pwrite(handle, json.dumps(name).encode() + b"\n", 0)
+
+
+def _holder(handle: int) -> str:
+    try:
+        name = json.loads(os.pread(handle, 4096, 0))
+        return f"process {name['pid']} on {name['host']}, since {name['started']}"
+    except (OSError, ValueError, KeyError, TypeError):  # it is just signing, or has gone
+        return "a process that hasn't given its name"

@@ -1,0 +1,283 @@
+"""Run folders: continued where they are the same run, refused where not, recovered where torn."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from enfilade.errors import RunFolderError
+from enfilade.store import KINDS, Run
+
+IDENTITY = {
+    "scene": {"fingerprint": "abc"},
+    "path": {"frames": [1, 2, 3], "fps": 24.0},
+    "settings": {"trace": {"spp": 64, "seed": 0}},
+}
+
+
+def other(**trace):
+    return {**IDENTITY, "settings": {"trace": {**IDENTITY["settings"]["trace"], **trace}}}
+
+
+def write(run, kind, number, data=b"pixels"):
+    file = run.file(kind, number)
+    file.parent.mkdir(exist_ok=True)
+    file.write_bytes(data)
+    return file
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "deep" / "run"
+
+
+def test_a_run_is_continued(folder):
+    with Run.open(folder, IDENTITY) as run:
+        assert run.done("keyframe 1") is None
+        file = write(run, "keyframes", 1)
+        run.finish("keyframe 1", files=[file], facts={"spp": np.int64(64), "mean": np.float32(0.5)})
+    with Run.open(folder, IDENTITY) as run:
+        line = run.done("keyframe 1")
+        assert run.notes == []
+        run.check(file)
+    assert line is not None
+    assert line["spp"] == 64
+    assert line["files"]["keyframes/0001.exr"]["bytes"] == 6
+    assert json.loads((folder / "ledger.jsonl").read_text()) == line
+    assert json.loads((folder / "run.json").read_text())["identity"] == IDENTITY
+
+
+def test_reading_changes_nothing_and_sees_a_running_run(folder):
+    with Run.open(folder, IDENTITY) as writer:
+        writer.finish("a", files=[], facts={})
+        with (folder / "ledger.jsonl").open("a") as ledger:
+            ledger.write('{"unit": "half')
+        before = (folder / "ledger.jsonl").read_bytes()
+        with Run.existing(folder) as run:
+            assert [line["unit"] for line in run.lines()] == ["a"]
+            assert run.identity == IDENTITY
+            with pytest.raises(ValueError, match="reading only"):
+                run.finish("b", files=[], facts={})
+        assert (folder / "ledger.jsonl").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("number", "name"), [(0, "0000"), (7, "0007"), (12345, "12345"), (-5, "-0005"), (-12345, "-12345")]
+)
+def test_files_are_named_by_the_frame(folder, number, name):
+    with Run.open(folder, IDENTITY) as run:
+        for kind in KINDS:
+            assert run.file(kind, number) == folder / kind / f"{name}.exr"
+        with pytest.raises(ValueError, match="known are: keyframes, raw, frames"):
+            run.file("plots", number)
+
+
+def test_another_run_is_refused_with_what_differs(folder):
+    Run.open(folder, IDENTITY).close()
+    with pytest.raises(RunFolderError) as refused:
+        Run.open(folder, {**other(spp=128, depth=3), "path": {"fps": 24}})
+    text = str(refused.value)
+    assert "settings.trace.spp: 64 there, 128 now" in text
+    assert "settings.trace.depth: nothing there, 3 now" in text
+    assert "path.frames: [1, 2, 3] there, nothing now" in text
+    assert "fps" not in text  # 24 and 24.0 are one frame rate
+    assert "seed" not in text
+    assert "--out" in text
+    Run.open(folder, IDENTITY).close()
+
+
+def test_many_or_long_differences_are_shortened(folder):
+    Run.open(folder, {**{f"k{i}": i for i in range(50)}, "long": list(range(1000))}).close()
+    with pytest.raises(RunFolderError, match="and 39 more") as refused:
+        Run.open(folder, {"long": 1})
+    assert len(str(refused.value)) < 1500
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("x")
+    with pytest.raises(RunFolderError, match=r"not empty and holds no run \(it has thesis\.tex\)"):
+        Run.open(tmp_path, IDENTITY)
+    assert [f.name for f in tmp_path.iterdir()] == ["thesis.tex"]
+    with pytest.raises(RunFolderError, match="no run folder"):
+        Run.existing(tmp_path)
+
+
+def test_a_place_that_can_not_be_written_is_said(tmp_path):
+    (tmp_path / "file").write_text("x")
+    for place in (tmp_path / "file", tmp_path / "file" / "run"):
+        with pytest.raises(RunFolderError, match="can't make a run in"):
+            Run.open(place, IDENTITY)
+    with pytest.raises(RunFolderError, match="/proc"):
+        Run.open(tmp_path.__class__("/proc/enfilade"), IDENTITY)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "identity": {}}'])
+def test_a_damaged_identity_is_said(folder, text):
+    Run.open(folder, IDENTITY).close()
+    (folder / "run.json").write_text(text)
+    for opening in (lambda: Run.open(folder, IDENTITY), lambda: Run.existing(folder)):
+        with pytest.raises(RunFolderError, match=r"run\.json"):
+            opening()
+
+
+def test_a_unit_is_done_while_its_files_have_their_sizes(folder):
+    with Run.open(folder, IDENTITY) as run:
+        file = write(run, "frames", 1)
+        run.finish("frame 1", files=[file], facts={})
+        file.write_bytes(b"short")
+        assert run.done("frame 1") is None
+        file.write_bytes(b"pixelz")
+        assert run.done("frame 1") is not None
+        with pytest.raises(RunFolderError, match=r"0001\.exr.*'frame 1'.*run the same command"):
+            run.check(file)
+        file.unlink()
+        assert run.done("frame 1") is None
+        with pytest.raises(RunFolderError, match="missing"):
+            run.check(file)
+        run.finish("frame 1", files=[write(run, "frames", 1, b"new")], facts={"try": 2})
+        run.check(file)
+        assert [line["try"] for line in run.lines()] == [2]
+        with pytest.raises(RunFolderError, match="in no ledger line"):
+            run.check(write(run, "frames", 2))
+
+
+def test_facts_and_names_that_the_ledger_can_not_hold(folder):
+    with Run.open(folder, IDENTITY) as run:
+        for facts, error in (
+            ({"unit": 1}, ValueError),
+            ({"x": float("nan")}, ValueError),
+            ({"x": {1}}, TypeError),
+        ):
+            with pytest.raises(error):
+                run.finish("a", files=[], facts=facts)
+        with pytest.raises(RunFolderError, match=r"0009\.exr"):
+            run.finish("a", files=[run.file("raw", 9)], facts={})
+        with pytest.raises(ValueError, match="subpath"):
+            run.finish("a", files=[folder.parent / "x"], facts={})
+        for name in ("../x.json", "/x.json", "run.json", "ledger.jsonl"):
+            with pytest.raises(ValueError, match="no name"):
+                run.write_json(name, {})
+        run.write_json("summary.json", {"slow": 1.5})
+        assert list(run.lines()) == []
+    assert json.loads((folder / "summary.json").read_text()) == {"slow": 1.5}
+
+
+def test_a_line_torn_anywhere_is_recovered(folder):
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("a", files=[], facts={"text": "Zimmer ü\r\n"})
+        run.finish("b", files=[], facts={})
+    ledger = folder / "ledger.jsonl"
+    data = ledger.read_bytes()
+    first = data.index(b"\n") + 1
+    for size in range(first, len(data)):
+        ledger.write_bytes(data[:size])
+        with Run.open(folder, IDENTITY) as run:
+            assert [line["unit"] for line in run.lines()] == ["a"]
+            assert len(run.notes) == (size > first)
+            run.finish("b", files=[], facts={})
+        assert ledger.read_bytes() == data
+
+
+@pytest.mark.parametrize("tail", [b"\0" * 40, b"\0" * 40 + b"\n", b"{}\n", b"\xff\xfe\n", b"[" * 9999])
+def test_a_damaged_last_line_is_recovered_and_said(folder, tail):
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("a", files=[], facts={})
+    with (folder / "ledger.jsonl").open("ab") as ledger:
+        ledger.write(tail)
+    with Run.open(folder, IDENTITY) as run:
+        assert run.done("a") is not None
+        assert "torn" in run.notes[0]
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        b"{",
+        b"",
+        b'{"unit": 3, "files": {}}',
+        b'{"unit": "x", "files": {"../a": {"bytes": 1, "sha256": ""}}}',
+        b'{"unit": "x", "files": {"a": 1}}',
+    ],
+)
+def test_a_damaged_line_in_the_middle_is_named(folder, bad):
+    with Run.open(folder, IDENTITY) as run:
+        for unit in "abc":
+            run.finish(unit, files=[], facts={})
+    lines = (folder / "ledger.jsonl").read_bytes().splitlines()
+    (folder / "ledger.jsonl").write_bytes(b"\n".join([lines[0], bad, lines[2], b""]))
+    with pytest.raises(RunFolderError, match=r"ledger\.jsonl, line 2 is damaged"):
+        Run.open(folder, IDENTITY)
+
+
+def test_a_full_disk_leaves_the_ledger_as_it_was(folder, monkeypatch):
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("a", files=[], facts={})
+        before = (folder / "ledger.jsonl").read_bytes()
+        really = os.write
+
+        def half(handle, data):
+            if len(data) < 10:
+                raise OSError(28, "No space left on device")
+            return really(handle, data[: len(data) // 2])
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "write", half)
+            with pytest.raises(RunFolderError, match="No space left"):
+                run.finish("b", files=[], facts={})
+        assert (folder / "ledger.jsonl").read_bytes() == before
+        assert run.done("b") is None
+        run.finish("b", files=[], facts={})
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from enfilade.store import Run
+run = Run.open(Path(sys.argv[1]), {})
+(Path(sys.argv[1]) / ".0001.writing-1-a.exr").write_text("x")
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_lock_names_its_live_holder_and_goes_with_a_dead_one(folder):
+    with subprocess.Popen(  # noqa: S603
+        [sys.executable, "-c", HOLDER, str(folder)], stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(RunFolderError, match=rf"process {holder.pid} on .*, since 2\d\d\d-.*--out"):
+            Run.open(folder, {})
+        assert list(Run.existing(folder).lines()) == []
+        holder.send_signal(signal.SIGKILL)
+        holder.wait()
+        with Run.open(folder, {}) as run:
+            assert run.notes == ["removed 1 unfinished files of a run that was interrupted"]
+            with pytest.raises(RunFolderError, match=f"process {os.getpid()} "):
+                Run.open(folder, {})
+    Run.open(folder, {}).close()
+
+
+def test_a_run_killed_before_it_had_an_identity_begins_anew(folder):
+    folder.mkdir(parents=True)
+    (folder / "run.lock").write_text("")
+    (folder / ".run.writing-77-aa.json").write_text("{")
+    with Run.open(folder, IDENTITY) as run:
+        assert "1 unfinished" in run.notes[0]
+    assert sorted(f.name for f in folder.iterdir()) == ["ledger.jsonl", "run.json", "run.lock"]
+
+
+def test_ten_thousand_units_open_quickly(folder):
+    with Run.open(folder, IDENTITY):
+        record = {"bytes": 1, "sha256": "0" * 64}
+        lines = (json.dumps({"unit": f"u{i}", "files": {f"raw/{i}.exr": record}}) for i in range(10_000))
+        (folder / "ledger.jsonl").write_text("\n".join(lines) + "\n")
+    with Run.open(folder, IDENTITY) as run:
+        assert sum(run.done(f"u{i}") is not None for i in range(10_000)) == 0
+        assert len(list(run.lines())) == 10_000
