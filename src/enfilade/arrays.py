@@ -39,8 +39,10 @@ __all__ = [
     "UInt64",
     "image",
     "lanes",
+    "matrix3",
     "opaque",
     "pixel_grid",
+    "vector3",
 ]
 
 
@@ -99,3 +101,13 @@ def pixel_grid(height: int, width: int) -> tuple[Any, Any, Any]:
     lane = dr.arange(UInt, height * width)
     row = lane // opaque(width)
     return lane, lane - row * opaque(width), row
+
+
+def vector3(values: npt.ArrayLike) -> Any:
+    """Three numbers as a vector that is the same in all lanes and not compiled into the kernel."""
+    return Array3f(*(opaque(float(v)) for v in np.asarray(values).ravel()))
+
+
+def matrix3(values: npt.ArrayLike) -> Any:
+    """Matrix (3, 3) that is the same in all lanes and not compiled into the kernel."""
+    return Matrix3f(*(opaque(float(v)) for v in np.asarray(values).ravel()))

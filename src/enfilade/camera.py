@@ -138,3 +138,34 @@ def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0,
     pose = np.eye(4)
     pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
     return pose
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarWarp:
+    """McMillan's planar image-warping equation between two cameras (§3.3, Fig. 5).
+
+    A pixel x = (x, y, 1) of generalised disparity delta = 1 / depth goes to
+    ``x + change @ x + delta * epipole``, up to scale; the third component is the ratio of the new depth
+    to the old. Kept as the *change* of the identity, so that small motion loses no digits in float32.
+
+    Attributes
+    ----------
+    change : (3, 3) float64
+        ``P2^-1 P1 - 1``.
+    epipole : (3,) float64
+        ``P2^-1 (C1 - C2)``.
+    """
+
+    change: Matrix
+    epipole: Matrix
+
+
+def planar_warp(source: Camera, target: Camera) -> PlanarWarp:
+    """The warp that takes pixels of `source` to `target`.
+
+    Exactly zero between equal views.
+    """
+    if source.is_same_view(target):
+        return PlanarWarp(np.zeros((3, 3)), np.zeros(3))
+    inverse = target.pixel_from_direction
+    return PlanarWarp(inverse @ source.direction_from_pixel - np.eye(3), inverse @ (source.eye - target.eye))

@@ -1,0 +1,1 @@
+"""Renderers behind the seam of ``renderer.Renderer``: one module each."""

@@ -1,0 +1,304 @@
+"""Mitsuba 3, embedded (Jakob et al. 2022): the renderer that comes with enfilade.
+
+Its own ``path`` integrator traces our own rays, one list of pixels at a time: the film is never used,
+since changing its size or crop compiles anew and its Gaussian filter adds in no fixed order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, matrix3, opaque, vector3
+from enfilade.backends.scenefile import fingerprint
+from enfilade.camera import Camera
+from enfilade.device import Device
+from enfilade.errors import SceneError
+from enfilade.pixels.random import streams
+from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
+from enfilade.records import Shading, SurfaceClass
+from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
+from enfilade.settings import TraceSettings
+
+PASS = 64  # paths of a pixel summed in one go; fixed, so that no setting changes a rounding
+GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5
+REC709 = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear Rec.709
+DIFFUSE_LOBES = ("DiffuseReflection", "DiffuseTransmission")
+LAYERS = 32  # surfaces that let everything pass, looked through before giving up
+LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
+
+
+class MitsubaRenderer:
+    """A Mitsuba scene.
+
+    Parameters
+    ----------
+    file
+        A scene in Mitsuba's XML format, version 3.
+    settings
+        Longest path, and how many paths may be in flight.
+    device
+        What runs the kernels; its variant becomes Mitsuba's.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, malformed, or refused by Mitsuba.
+    """
+
+    def __init__(self, file: Path, settings: TraceSettings, device: Device) -> None:
+        if not file.is_file():
+            raise SceneError(f"there is no scene file {file}")
+        mi.set_variant(device.variant)
+        mi.set_log_level(mi.LogLevel.Error)
+        try:
+            # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
+            scene = mi.load_file(str(file), optimize=False)
+        except Exception as error:
+            raise SceneError(f"Mitsuba can't load {file}: {_reason(error)}") from error
+        if not isinstance(scene, mi.Scene):
+            raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
+        if not scene.shapes():
+            raise SceneError(f"{file} has no shapes: there is nothing to render")
+        self._scene = scene
+        self._chunk = settings.chunk
+        self._integrator = _integrator(scene, settings.max_depth)
+        self._sampler = _lane_sampler()
+        self._items = _items(scene)
+        self._file = file
+        self._device = device
+
+    def describe(self) -> SceneFacts:
+        """Say what is rendered, and by what."""
+        return SceneFacts(
+            renderer=f"Mitsuba {mi.__version__}",
+            variant=self._device.variant,
+            items=self._items.names,
+            fingerprint=fingerprint(self._file),
+        )
+
+    def surfaces(self, rays: Rays) -> Surfaces:
+        """Find the first surface along each ray, looking through masked-out parts of it.
+
+        Where a mask is partly transparent, its surface counts when it is at least half opaque.
+        """
+        direction = mi.Vector3f(rays.direction)
+        length = dr.norm(direction)
+        ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
+        seen, distance = self._visible(ray)
+
+        is_hit = seen.is_valid()
+        material = seen.bsdf(mi.RayDifferential3f(ray))
+        flags = material.flags()
+        albedo = material.eval_diffuse_reflectance(seen, is_hit & _has(flags, *DIFFUSE_LOBES))
+        normal = seen.sh_frame.n
+        normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
+        return Surfaces(
+            is_hit=is_hit,
+            distance=distance / length,
+            normal=Array3f(normal),
+            albedo=_reflectance(albedo),
+            item=dr.gather(UInt, self._items.number, _registry(seen), is_hit),
+            surface=_surface_class(flags, seen.shape.is_emitter(), is_hit),
+        )
+
+    def trace(
+        self,
+        camera: Camera,
+        pixels: npt.NDArray[np.uint32],
+        *,
+        spp: int,
+        seed: int,
+        frame: int,
+        purpose: Purpose,
+        pixel_filter: PixelFilter = PixelFilter.CENTRE,
+    ) -> Shading:
+        """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
+        count = len(pixels)
+        total = np.zeros((3, count))
+        squares = np.zeros(count)
+        valid = np.zeros(count)
+        random = {"seed": seed, "frame": frame, "purpose": int(purpose)}
+        for first in range(0, spp, PASS):
+            width = min(PASS, spp - first)
+            step = max(self._chunk // width, 1)
+            for start in range(0, count, step):
+                part = slice(start, start + step)
+                sums = self._trace_pass(camera, pixels[part], first, width, random, pixel_filter)
+                total[:, part] += sums[:3]
+                squares[part] += sums[3]
+                valid[part] += sums[4]
+        return _mean(total, squares, valid, spp)
+
+    def _trace_pass(
+        self,
+        camera: Camera,
+        pixels: npt.NDArray[np.uint32],
+        first: int,
+        width: int,
+        random: dict[str, int],
+        pixel_filter: PixelFilter,
+    ) -> npt.NDArray[np.float32]:
+        """Sum `width` paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
+        lane = dr.arange(UInt, len(pixels) * width)
+        slot = lane // opaque(width)
+        pixel = dr.gather(UInt, UInt(pixels), slot)
+        path = lane - slot * opaque(width) + opaque(first)
+
+        rng = streams(pixel, path, **random)
+        row = pixel // opaque(camera.width)
+        at = Array2f(pixel - row * opaque(camera.width), row) + 0.5 + _offsets(rng, pixel_filter)
+        direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
+        ray = mi.Ray3f(mi.Point3f(vector3(camera.eye)), dr.normalize(mi.Vector3f(direction)))
+        self._sampler.rng = rng
+        radiance, _, _ = self._integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
+        luminance = mi.luminance(radiance)
+        is_valid = dr.isfinite(radiance.x + radiance.y + radiance.z)
+        values = [radiance.x, radiance.y, radiance.z, luminance * luminance, Float(1)]
+        values = [dr.select(is_valid, v, 0) for v in values]
+        # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
+        dr.eval(values)
+        return np.stack([np.array(dr.block_sum(v, width)) for v in values])
+
+    def _visible(self, ray: Any) -> tuple[Any, Any]:
+        """First interaction whose surface does not let the ray pass, and its distance."""
+        seen = self._scene.ray_intersect(ray)
+        distance = Float(seen.t)
+        if not self._items.any_passable:
+            return seen, distance
+        passing = self._lets_pass(seen)
+        for _ in range(LAYERS):
+            dr.eval(seen, distance, passing)
+            if not dr.any(passing):
+                break
+            behind = self._scene.ray_intersect(seen.spawn_ray(ray.d), passing)
+            distance = dr.select(passing, distance + behind.t, distance)
+            seen = dr.select(passing, behind, seen)
+            passing = passing & self._lets_pass(seen)
+        return seen, distance
+
+    def _lets_pass(self, seen: Any) -> Any:
+        is_passable = dr.gather(Bool, self._items.is_passable, _registry(seen), seen.is_valid())
+        through = seen.bsdf().eval_null_transmission(seen, is_passable)
+        return is_passable & (mi.luminance(through) > 0.5)
+
+
+@dataclass(frozen=True)
+class _Items:
+    """What is known of each of Mitsuba's shapes, by its number in Mitsuba's registry."""
+
+    number: Any  # UInt
+    is_passable: Any  # Bool
+    any_passable: bool
+    names: tuple[str, ...]
+
+
+def _items(scene: Any) -> _Items:
+    shapes = scene.shapes()
+    registry = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(s))[0]) for s in shapes]
+    number = np.zeros(max(registry) + 1, np.uint32)
+    is_passable = np.zeros(max(registry) + 1, bool)
+    names = []
+    for item, (index, shape) in enumerate(zip(registry, shapes, strict=True), start=1):
+        material = shape.bsdf()
+        number[index] = item
+        is_passable[index] = material is not None and material.class_name() in LOOKED_THROUGH
+        names.append(shape.id() or f"{shape.class_name()} {item}")
+    return _Items(UInt(number), Bool(is_passable), bool(is_passable.any()), tuple(names))
+
+
+def _registry(seen: Any) -> Any:
+    """Mitsuba's number of the shape that is seen: of the instance where it is one."""
+    shape = dr.reinterpret_array(mi.UInt32, seen.shape)
+    instance = dr.reinterpret_array(mi.UInt32, seen.instance)
+    return dr.select(instance != 0, instance, shape)
+
+
+def _reflectance(albedo: Any) -> Any:
+    channels = (albedo.x, albedo.y, albedo.z)
+    return Array3f(*(dr.select(dr.isfinite(c), dr.clip(c, 0, 1), 0) for c in channels))
+
+
+def _has(flags: Any, *lobes: str) -> Any:
+    """Whether a material has any of these lobes."""
+    return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
+
+
+def _surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
+    """``records.SurfaceClass`` of a material, from the flags of its lobes."""
+    bends = _has(flags, "DeltaTransmission", "GlossyTransmission")
+    mirrors = _has(flags, "DeltaReflection")
+    is_glossy = _has(flags, "GlossyReflection")
+    is_broad = is_glossy | _has(flags, *DIFFUSE_LOBES)
+    is_thin_glass = _has(flags, "Null") & mirrors & ~is_broad
+
+    surface = UInt(SurfaceClass.DIFFUSE)
+    surface = dr.select(is_emitter, UInt(SurfaceClass.EMISSIVE), surface)
+    surface = dr.select(is_glossy | mirrors, UInt(SurfaceClass.GLOSSY), surface)
+    surface = dr.select(mirrors & ~is_broad, UInt(SurfaceClass.MIRROR), surface)
+    surface = dr.select(bends | is_thin_glass, UInt(SurfaceClass.TRANSPARENT), surface)
+    return dr.select(is_hit, surface, UInt(SurfaceClass.NONE))
+
+
+def _offsets(rng: Any, pixel_filter: PixelFilter) -> Any:
+    match pixel_filter:
+        case PixelFilter.CENTRE:
+            return Array2f(0)
+        case PixelFilter.BOX:
+            return box_offsets(rng)
+        case PixelFilter.GAUSSIAN:
+            return gaussian_offsets(rng, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
+
+
+def _mean(
+    total: npt.NDArray[np.float64],
+    squares: npt.NDArray[np.float64],
+    valid: npt.NDArray[np.float64],
+    spp: int,
+) -> Shading:
+    """Mean colour of the valid samples of each pixel, and the variance of its luminance."""
+    count = np.maximum(valid, 1.0)
+    mean = total / count
+    luminance = REC709 @ mean
+    spread = np.maximum(squares / count - luminance**2, 0.0)
+    return Shading(
+        color=np.ascontiguousarray(mean.T, np.float32),
+        variance=(spread / np.maximum(count - 1.0, 1.0)).astype(np.float32),
+        dropped=int(spp * len(valid) - valid.sum()),
+    )
+
+
+def _integrator(scene: Any, max_depth: int) -> Any:
+    """The scene's own integrator where it computes radiance along a ray, else ``path``."""
+    own = scene.integrator()
+    if max_depth:
+        return mi.load_dict({"type": "path", "max_depth": max_depth})
+    return own if isinstance(own, mi.SamplingIntegrator) else mi.load_dict({"type": "path"})
+
+
+def _lane_sampler() -> Any:
+    """A Mitsuba sampler that draws from generators of ours, one a lane."""
+
+    class LaneSampler(mi.Sampler):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(mi.Properties())
+            self.rng = PCG32()
+
+        def next_1d(self, active: Any = True) -> Any:
+            return self.rng.next_float32(active)
+
+        def next_2d(self, active: Any = True) -> Any:
+            return mi.Point2f(self.rng.next_float32(active), self.rng.next_float32(active))
+
+    return LaneSampler()
+
+
+def _reason(error: Exception) -> str:
+    """Mitsuba's message without the prefix that says where in its own code it was raised."""
+    return str(error).strip().splitlines()[-1].strip()

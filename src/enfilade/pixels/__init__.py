@@ -1,0 +1,1 @@
+"""Kernels that two stages share: arrays first, keyword numbers after, arrays back."""
