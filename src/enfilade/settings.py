@@ -7,6 +7,7 @@ by section (``[keyframes]`` / ``spacing = 25``).
 from __future__ import annotations
 
 import dataclasses
+import math
 import tomllib
 from dataclasses import dataclass, field, fields
 from enum import Enum
@@ -16,9 +17,17 @@ from typing import Any, Self
 from enfilade.errors import SettingsError
 
 
-def option(default: Any, text: str, *, least: float | None = None, most: float | None = None) -> Any:
-    """Declare a setting: its default, one sentence of help, and its range, ends included."""
-    return field(default=default, metadata={"help": text, "least": least, "most": most})
+def option(
+    default: Any,
+    text: str,
+    *,
+    least: float | None = None,
+    most: float | None = None,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """Declare a setting: default, one sentence of help, range (ends included) or words to choose from."""
+    metadata = {"help": text, "least": least, "most": most, "choices": choices}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -177,7 +186,7 @@ class AntialiasSettings(Section):
 class VideoSettings(Section):
     """Encoding of the video."""
 
-    codec: str = option("h264", "Codec: h264, ffv1, av1 or prores.")
+    codec: str = option("h264", "Codec of the video.", choices=("h264", "ffv1", "av1", "prores"))
     quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
     ocio: str = option("", "An OpenColorIO configuration for the view transform, in place of sRGB.")
     view: str = option("", "The view of that configuration.")
@@ -267,7 +276,12 @@ def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any
 
 
 def _check(f: dataclasses.Field[Any], value: Any, where: str) -> None:
-    least, most = f.metadata.get("least"), f.metadata.get("most")
+    choices = f.metadata["choices"]
+    if choices and value not in choices:
+        raise SettingsError(f"{where} = {value!r}: choose one of {', '.join(choices)}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise SettingsError(f"{where} = {value!r}: it must be a finite number")
+    least, most = f.metadata["least"], f.metadata["most"]
     if (least is not None and not value >= least) or (most is not None and not value <= most):
-        span = f"at least {least:g}" if most is None else f"between {least:g} and {most:g}"
+        span = f"at least {least:.10g}" if most is None else f"between {least:.10g} and {most:.10g}"
         raise SettingsError(f"{where} = {value!r} is out of range: it must be {span}")
