@@ -1,0 +1,115 @@
+"""The ``enfilade`` command: its sub-commands, loaded when used, and what becomes of errors."""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+from typing import Any
+
+import click
+
+from enfilade import __version__
+from enfilade.errors import EnfiladeError, InputError
+
+COMMANDS = ("render", "plan", "compare", "scene", "doctor")
+FAILURE = 1
+WRONG_INPUT = 2
+INTERRUPTED = 130
+
+_ARGUMENTS = "enfilade.arguments"
+_DEBUG = "enfilade.debug"
+_RESUMABLE = "enfilade.resumable"
+
+
+class Failure(click.ClickException):
+    """A failure as the user sees it: one message, no traceback."""
+
+    exit_code = FAILURE
+
+
+class WrongInput(click.ClickException):
+    """Wrong input as the user sees it: one message, no traceback."""
+
+    exit_code = WRONG_INPUT
+
+
+class EnfiladeGroup(click.Group):
+    """A group that loads a command's module when it is used and turns errors into exit codes."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands, in the order of use."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Load the module of one command."""
+        del ctx
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"enfilade.cli.{cmd_name}").command
+        return command
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Keep what was typed: it is the line that continues the job."""
+        ctx.meta[_ARGUMENTS] = tuple(args)
+        return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; an error of ours becomes one message and an exit code."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo(_farewell(ctx), err=True)
+            ctx.exit(INTERRUPTED)
+        except BrokenPipeError:
+            raise
+        except (EnfiladeError, OSError, MemoryError) as error:
+            if ctx.meta.get(_DEBUG):
+                raise
+            kind = WrongInput if isinstance(error, InputError) else Failure
+            raise kind(_message(error)) from error
+
+
+def mark_resumable(ctx: click.Context) -> None:
+    """Say that the command now running goes on where it stopped when it is typed again."""
+    ctx.meta[_RESUMABLE] = True
+
+
+def _message(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    if isinstance(error, MemoryError):
+        return "out of memory; a smaller --trace-chunk or --size needs less"
+    return str(error)
+
+
+def _farewell(ctx: click.Context) -> str:
+    if not ctx.meta.get(_RESUMABLE):
+        return "\nInterrupted."
+    line = shlex.join(["enfilade", *ctx.meta[_ARGUMENTS]])
+    return f"\nInterrupted. What is finished stays in the run folder; to continue:\n  {line}"
+
+
+def _set_debug(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value:
+        ctx.meta[_DEBUG] = True
+
+
+debug_option = click.option(
+    "--debug",
+    is_flag=True,
+    expose_value=False,
+    callback=_set_debug,
+    help="Show the traceback of an error.",
+)
+
+
+@click.group(
+    cls=EnfiladeGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="`enfilade COMMAND --help` lists the options of a command.",
+)
+@click.version_option(__version__, prog_name="enfilade", help="Show the version and exit.")
+@debug_option
+def main() -> None:
+    """Render a camera walkthrough of a 3D scene at a small part of the cost of path tracing every frame."""

@@ -1,0 +1,124 @@
+"""Arguments and flags that several commands share: scene, camera path, size, frames, output."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from enfilade.cli.flags import settings_of
+from enfilade.device import activate
+
+if TYPE_CHECKING:
+    from enfilade.pipeline.job import Job
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+METHODS = ("reference", "paper")
+JOB_SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "video")
+
+
+class Size(click.ParamType[tuple[int, int]]):
+    """Width and height in pixels, written ``640x480``."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Read the two numbers; the camera path says whether they fit."""
+        if isinstance(value, tuple):
+            return value
+        match = re.fullmatch(r"([0-9]{1,9})[xX×]([0-9]{1,9})", str(value).strip())
+        if match is None:
+            self.fail(f"{value!r} is no size; write it like 640x480", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+def job_options(command: Command) -> Command:
+    """Decorate a command with the scene, the camera path and how to look at them."""
+    file = click.Path(path_type=Path)
+    for decorate in reversed(
+        [
+            click.argument("scene", type=file),
+            click.option(
+                "--path",
+                "path_file",
+                type=file,
+                required=True,
+                help="The camera path: nerfstudio's camera_path.json or keyed poses.",
+            ),
+            click.option(
+                "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
+            ),
+            click.option(
+                "--frames",
+                metavar="RANGES",
+                help="Frames to take, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
+            ),
+            click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
+            click.option(
+                "--method",
+                type=click.Choice(METHODS),
+                default="paper",
+                show_default=True,
+                help="Trace every frame (reference), or reuse what may be reused (paper).",
+            ),
+        ]
+    ):
+        command = decorate(command)
+    return command
+
+
+def output_options(command: Command) -> Command:
+    """Decorate a command with how it runs and what it shows."""
+    for decorate in (
+        click.option(
+            "--device",
+            type=click.Choice(("auto", "cpu", "gpu")),
+            default="auto",
+            show_default=True,
+            help="Run on the CPU, on an NVIDIA GPU, or on the GPU where there is one.",
+        ),
+        json_option,
+        quiet_option,
+    )[::-1]:
+        command = decorate(command)
+    return command
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, for programs.")
+quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+
+
+def job_of(
+    ctx: click.Context,
+    *,
+    scene: Path,
+    path_file: Path,
+    size: tuple[int, int] | None,
+    frames: str | None,
+    fps: float | None,
+    method: str,
+    device: str,
+) -> Job:
+    """Put together what to render; everything wrong in it raises here, before any work.
+
+    Raises
+    ------
+    InputError
+        A setting, the path or the selection of frames is wrong.
+    DeviceError
+        The device is not there.
+    """
+    settings = settings_of(ctx)
+    activate(device)  # type: ignore[arg-type]  # click has checked the choice
+    from enfilade.path import load_path, parse_frames
+    from enfilade.pipeline.job import Job
+
+    selected = None if frames is None else parse_frames(frames)
+    path = load_path(path_file, size=size, frames=selected, fps=fps)
+    return Job(scene=scene, path=path, settings=settings, method=method)

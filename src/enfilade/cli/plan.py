@@ -1,0 +1,54 @@
+"""``enfilade plan``: everything that can be known of a walkthrough without shading a pixel."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from enfilade.cli.flags import SettingsCommand, settings_options
+from enfilade.cli.group import debug_option
+from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
+
+
+@click.command("plan", cls=SettingsCommand)
+@job_options
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Draw the plan into this PNG file.",
+)
+@output_options
+@debug_option
+@settings_options(*JOB_SECTIONS)
+@click.pass_context
+def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: bool, **inputs: Any) -> None:
+    """Say what rendering SCENE would take: image flow, keyframes, expected holes, forecast of cost."""
+    job = job_of(ctx, **inputs)
+    from enfilade.cli.progress import watch
+    from enfilade.pipeline.plan import plan
+
+    with watch(quiet=quiet) as monitor:
+        made = plan(job, monitor).to_dict()
+    if plot is not None:
+        from enfilade.report.plots import plot_plan
+
+        plot_plan(made, plot)
+    if as_json:
+        click.echo(json.dumps(made, indent=2))
+        return
+    _show(made, plot)
+
+
+def _show(made: dict[str, Any], plot: Path | None) -> None:
+    from rich.console import Console
+
+    from enfilade.report.tables import plan_tables
+
+    console = Console()
+    for table in plan_tables(made):
+        console.print(table)
+    if plot is not None:
+        click.echo(f"plot    {plot}")

@@ -1,0 +1,166 @@
+"""What a terminal shows while a run is going on: a bar for each stage, or plain lines in a log."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from enfilade.monitor import Monitor, Silence
+
+LINE_EVERY_S = 5.0  # a plain line of progress at most this often
+
+
+class BarMonitor:
+    """Progress bars on a terminal.
+
+    Parameters
+    ----------
+    progress
+        Rich's display, already started.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._tasks: dict[str, TaskID] = {}
+        self._now: str | None = None
+
+    def stage(self, name: str, total: int) -> None:
+        """Show a bar for a stage; one that begins again goes on in its old bar."""
+        if name in self._tasks:
+            self._now = name
+            self.extend(total)
+            return
+        self._tasks[name] = self._progress.add_task(name, total=total)
+        self._now = name
+
+    def advance(self, count: int = 1) -> None:
+        """Move the present bar."""
+        if self._now is not None:
+            self._progress.advance(self._tasks[self._now], count)
+
+    def extend(self, count: int) -> None:
+        """Lengthen the present bar."""
+        if self._now is not None:
+            task = self._tasks[self._now]
+            total = self._progress.tasks[self._progress.task_ids.index(task)].total or 0
+            self._progress.update(task, total=total + count)
+
+    def say(self, text: str) -> None:
+        """Print a line above the bars."""
+        self._progress.console.print(text, markup=False, highlight=False)
+
+
+@dataclass
+class _Count:
+    total: int
+    started_s: float
+    done: int = 0
+    shown_s: float = 0.0
+
+
+class LineMonitor:
+    """Progress as plain lines, not too many.
+
+    Parameters
+    ----------
+    write
+        Takes one line.
+    clock
+        Seconds, rising.
+    every_s
+        A stage in progress writes at most one line in this time.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[str], object],
+        clock: Callable[[], float] = time.monotonic,
+        every_s: float = LINE_EVERY_S,
+    ) -> None:
+        self._write = write
+        self._clock = clock
+        self._every_s = every_s
+        self._stages: dict[str, _Count] = {}
+        self._now = ""
+
+    def stage(self, name: str, total: int) -> None:
+        """Write that a stage begins."""
+        self._now = name
+        if name in self._stages:
+            self.extend(total)
+            return
+        now = self._clock()
+        self._stages[name] = _Count(total, now, shown_s=now)
+        self._write(f"{name}: {total} to do")
+
+    def advance(self, count: int = 1) -> None:
+        """Write how far the stage is, when the last line is old enough or the stage is done."""
+        stage = self._stages.get(self._now)
+        if stage is None:
+            return
+        stage.done += count
+        now = self._clock()
+        if stage.done < stage.total and now - stage.shown_s < self._every_s:
+            return
+        stage.shown_s = now
+        self._write(f"{self._now}: {stage.done}/{stage.total}, {_times(stage, now)}")
+
+    def extend(self, count: int) -> None:
+        """Count the added units."""
+        if self._now in self._stages:
+            self._stages[self._now].total += count
+
+    def say(self, text: str) -> None:
+        """Write a line."""
+        self._write(text)
+
+
+def _times(stage: _Count, now: float) -> str:
+    elapsed = now - stage.started_s
+    if stage.done >= stage.total:
+        return f"took {clock_time(elapsed)}"
+    left = elapsed / max(stage.done, 1) * (stage.total - stage.done)
+    return f"{clock_time(elapsed)} passed, about {clock_time(left)} left"
+
+
+def clock_time(seconds: float) -> str:
+    """Seconds as ``m:ss``, or ``h:mm:ss`` from an hour on."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+@contextmanager
+def watch(*, quiet: bool) -> Iterator[Monitor]:
+    """Give a monitor that fits the place: silent, bars on a terminal, lines in a log; all on stderr."""
+    if quiet:
+        yield Silence()
+        return
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield LineMonitor(lambda line: click.echo(line, err=True))
+        return
+    columns = (
+        TextColumn("{task.description:<12}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        yield BarMonitor(progress)

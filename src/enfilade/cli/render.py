@@ -1,0 +1,58 @@
+"""``enfilade render``: from scene and camera path to frames and video."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from enfilade.cli.flags import SettingsCommand, settings_options
+from enfilade.cli.group import debug_option, mark_resumable
+from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
+
+
+@click.command("render", cls=SettingsCommand)
+@job_options
+@click.option(
+    "--out",
+    "folder",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="The run folder; the same command goes on with what is there.",
+)
+@output_options
+@debug_option
+@settings_options(*JOB_SECTIONS)
+@click.pass_context
+def command(ctx: click.Context, /, *, folder: Path, as_json: bool, quiet: bool, **inputs: Any) -> None:
+    """Render a walkthrough of SCENE (Mitsuba 3 XML) into frames, a video and a report of the cost."""
+    mark_resumable(ctx)
+    job = job_of(ctx, **inputs)
+    from enfilade.cli.progress import watch
+    from enfilade.pipeline.walkthrough import render
+
+    with watch(quiet=quiet) as monitor:
+        summary = render(job, folder, monitor)
+    if as_json:
+        click.echo(json.dumps(summary, indent=2))
+        return
+    _show(summary, folder)
+
+
+def _show(summary: dict[str, Any], folder: Path) -> None:
+    from rich.console import Console
+
+    from enfilade.report.tables import run_tables
+
+    console = Console()
+    for table in run_tables(summary):
+        console.print(table)
+    if summary.get("dropped_samples"):
+        click.echo(f"{summary['dropped_samples']} samples were NaN or infinite and were left out.")
+    if summary.get("video"):
+        click.echo(f"video   {summary['video']}")
+    for plot in summary.get("plots", []):
+        click.echo(f"plot    {plot}")
+    click.echo(f"run     {folder}")

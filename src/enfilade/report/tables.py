@@ -1,0 +1,139 @@
+"""Tables 1 and 2 (§6) of a run, and the table of a plan, for a terminal or a text file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from io import StringIO
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+SOURCES = {  # Table 1, in its order: key of the summary, heading
+    "slow": "slow",
+    "specular": "specular",
+    "occlusion": "occlusion",
+    "keyframes": "keyframes",
+    "total": "total",
+}
+
+
+def run_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Tables 1 and 2 of a finished run.
+
+    Parameters
+    ----------
+    summary
+        What ``summary.json`` holds.
+    """
+    return [traced_table(summary), time_table(summary)]
+
+
+def traced_table(summary: Mapping[str, Any]) -> Table:
+    """Table 1: percentage of pixels that were path traced, by reason."""
+    table = _table("Pixels traced, percent (Table 1)", "method", *SOURCES.values())
+    shares = summary["table1"]
+    table.add_row(str(summary.get("method", "")), *(percent(shares[key]) for key in SOURCES))
+    return table
+
+
+def time_table(summary: Mapping[str, Any]) -> Table:
+    """Table 2: where the time went, stage by stage; wall-clock and CPU seconds."""
+    times = summary["table2"]
+    count = _frame_count(summary)
+    table = _table("Time (Table 2)", "stage", "wall", "CPU", "wall per frame", "share")
+    total = max(float(times["total_s"]), 1e-9)
+    for name, stage in times["stages"].items():
+        wall = float(stage["wall_s"])
+        cells = (seconds(wall), seconds(stage["cpu_s"]), seconds(wall / count), percent(100.0 * wall / total))
+        table.add_row(name, *cells)
+    table.add_section()
+    row = (seconds(times["total_s"]), seconds(times["cpu_s"]), seconds(times["per_frame_s"]), percent(100.0))
+    table.add_row("total", *row)
+    return table
+
+
+def plan_tables(plan: Mapping[str, Any]) -> list[Table]:
+    """What a plan expects: the walkthrough at a glance, and the forecast of cost.
+
+    Parameters
+    ----------
+    plan
+        ``Plan.to_dict()``.
+    """
+    return [_walk_table(plan), _forecast_table(plan["forecast"])]
+
+
+def _walk_table(plan: Mapping[str, Any]) -> Table:
+    table = _table("Walkthrough, per frame", "", "mean", "least", "most")
+    rows = {
+        "image velocity, deg/s": ("mean_speed_deg_s", "{:.2f}"),
+        "slow pixels, percent": ("slow_percent", "{:.1f}"),
+        "specular pixels, percent": ("specular_percent", "{:.1f}"),
+        "holes, percent (estimate)": ("hole_percent", "{:.1f}"),
+    }
+    for title, (key, form) in rows.items():
+        values = [float(v) for v in plan.get(key) or [] if v is not None]
+        if values:
+            figures = (sum(values) / len(values), min(values), max(values))
+            table.add_row(title, *(form.format(v) for v in figures))
+    frames, keyframes = plan["frames"], plan["keyframes"]
+    table.caption = f"{len(frames)} frames, {len(keyframes)} initial keyframes: {_listed(keyframes)}"
+    return table
+
+
+def _forecast_table(forecast: Mapping[str, Any]) -> Table:
+    table = _table("Forecast", "", "value")
+    for key, value in forecast.items():
+        if isinstance(value, Mapping):
+            for source, share in value.items():
+                table.add_row(f"{key.replace('_', ' ')}: {source.replace('_', ' ')}", _figure(share))
+        else:
+            table.add_row(key.replace("_", " "), _figure(value))
+    return table
+
+
+def as_text(table: Table, width: int = 100) -> str:
+    """A table as plain text without colours, for a log or a file."""
+    out = StringIO()
+    Console(file=out, width=width, color_system=None).print(table)
+    return out.getvalue()
+
+
+def percent(value: float) -> str:
+    """A share with one digit after the point; two below 1 percent, where the paper's holes are."""
+    return f"{value:.2f}" if 0.0 < abs(value) < 1.0 else f"{value:.1f}"
+
+
+def seconds(value: float) -> str:
+    """A time with its unit and about three digits."""
+    if value >= 3600.0:
+        return f"{value / 3600.0:.2f} h"
+    if value >= 100.0:
+        return f"{value / 60.0:.1f} min"
+    return f"{value:.2f} s" if value >= 0.1 else f"{1000.0 * value:.1f} ms"
+
+
+def _figure(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:,.2f}" if abs(value) < 1000.0 else f"{value:,.0f}"
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def _listed(numbers: list[int], most: int = 12) -> str:
+    shown = ", ".join(str(n) for n in numbers[:most])
+    return shown if len(numbers) <= most else f"{shown}, ... {numbers[-1]}"
+
+
+def _frame_count(summary: Mapping[str, Any]) -> int:
+    frames = summary["frames"]
+    return max(len(frames) if isinstance(frames, list) else int(frames), 1)
+
+
+def _table(title: str, first: str, *others: str) -> Table:
+    table = Table(title=title, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column(first)
+    for name in others:
+        table.add_column(name, justify="right")
+    return table

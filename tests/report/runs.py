@@ -1,0 +1,82 @@
+"""A made-up run and a made-up plan, with figures like those of the paper's Figs. 12 and 13."""
+
+import math
+
+
+def made_up_summary(count=120, *, spacing=20, method="paper"):
+    per_frame = []
+    for i in range(count):
+        keyframe = i % spacing == 0 or i == count - 1
+        speed = abs(6.0 * math.sin(i / 17.0)) + 0.3
+        slow = max(0.0, 60.0 - 40.0 * speed)
+        row = {"frame": i + 1, "velocity_deg_s": speed, "slow": slow, "specular": 8.0 + 4.0 * math.cos(i / 9.0)}
+        row |= {"hole": 1.5, "keyframe": keyframe}
+        row["traced"] = 100.0 if keyframe else row["slow"] + row["specular"] + row["hole"]
+        per_frame.append(row)
+    return {
+        "frames": count,
+        "size": [640, 480],
+        "method": method,
+        "spp": 64,
+        "table1": {"slow": 20.0, "specular": 7.9, "occlusion": 0.43, "keyframes": 5.8, "total": 34.13},
+        "table2": {
+            "total_s": 240.0,
+            "per_frame_s": 2.0,
+            "cpu_s": 430.0,
+            "stages": {
+                "keyframes": {"wall_s": 60.0, "cpu_s": 110.0},
+                "fill": {"wall_s": 150.0, "cpu_s": 290.0},
+                "antialias": {"wall_s": 29.96, "cpu_s": 29.9},
+                "video": {"wall_s": 0.04, "cpu_s": 0.1},
+            },
+        },
+        "per_frame": per_frame,
+        "segments": _segments(count, spacing),
+        "dropped_samples": 0,
+        "peak_memory_bytes": 2_000_000_000,
+        "video": "runs/demo/video.mp4",
+        "plots": [],
+    }
+
+
+def _segments(count, spacing):
+    made = []
+    for first in range(1, count, spacing):
+        last = min(first + spacing, count)
+        split = first == 1 + 2 * spacing
+        made.append(_segment(first, last, 14.0 if split else 3.0 + first / 30.0, split, 0))
+        if split:
+            middle = (first + last) // 2
+            made += [_segment(first, middle, 4.0, False, 1), _segment(middle, last, 6.0, False, 1)]
+    return made
+
+
+def _segment(first, last, visible, is_split, depth):
+    return {
+        "first": first,
+        "last": last,
+        "middle": (first + last) // 2,
+        "percent_visible": visible,
+        "percent_visible_no_pursuit": 0.4 * visible,
+        "is_split": is_split,
+        "depth": depth,
+    }
+
+
+def made_up_plan(count=60):
+    speed = [abs(6.0 * math.sin(i / 17.0)) + 0.3 for i in range(count)]
+    return {
+        "frames": list(range(1, count + 1)),
+        "mean_speed_deg_s": speed,
+        "slow_percent": [max(0.0, 60.0 - 40.0 * v) for v in speed],
+        "specular_percent": [8.0] * count,
+        "hole_percent": [1.0, 2.0, 1.5],
+        "keyframes": [1, 21, 41, 60],
+        "segments": [{"first": 1, "last": 21}, {"first": 21, "last": 41}, {"first": 41, "last": 60}],
+        "forecast": {
+            "traced_percent": 31.5,
+            "paths": 123_456_789,
+            "seconds": 512.25,
+            "by_source": {"slow": 15.0, "specular": 7.5, "hole": 1.5, "keyframes": 7.5},
+        },
+    }
