@@ -129,6 +129,11 @@ class Geometry:
         return self.item > 0
 
     @property
+    def disparity(self) -> F32:
+        """One over the depth, (H, W); 0 where nothing is hit: at infinity."""
+        return np.divide(1.0, self.depth, out=np.zeros_like(self.depth), where=self.is_hit)
+
+    @property
     def is_specular(self) -> Mask:
         """Pixels that see a glossy, mirroring or transparent surface."""
         return np.isin(self.surface, SPECULAR)

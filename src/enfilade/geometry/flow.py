@@ -31,19 +31,13 @@ def image_flow(geometry: Geometry, previous: Camera | None, following: Camera | 
         neighbouring camera has behind it get the flow of a point just before it.
     """
     camera = geometry.camera
-    disparity = lanes(disparities(geometry))
+    disparity = lanes(geometry.disparity)
     return Flow(
         backward=_flow_to(camera, disparity, previous),
         forward=_flow_to(camera, disparity, following),
         has_backward=previous is not None,
         has_forward=following is not None,
     )
-
-
-def disparities(geometry: Geometry) -> F32:
-    """One over the depth, (H, W); 0 where nothing is hit: at infinity."""
-    is_hit = geometry.is_hit
-    return np.divide(1.0, geometry.depth, out=np.zeros_like(geometry.depth), where=is_hit)
 
 
 def _flow_to(camera: Camera, disparity: Any, other: Camera | None) -> F32:

@@ -1,0 +1,51 @@
+"""How wide the filter is, by the velocity of the pattern (§5.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from enfilade.records import F32, Geometry
+from enfilade.settings import AntialiasSettings
+
+COVERED_PX = 0.5  # flow after which the samples along it cover the pixel (§5.2)
+
+
+@dataclass(frozen=True, eq=False)
+class TemporalLimits:
+    """How far along the flow each pixel of a frame looks.
+
+    Attributes
+    ----------
+    reach : (H, W) float32
+        Most frames to either side.
+    least : (H, W) float32
+        Frames to either side before the growth may end; the same as `reach` where it does not grow.
+    """
+
+    reach: F32
+    least: F32
+
+
+def spatial_support_px(speed_deg_s: F32, settings: AntialiasSettings) -> F32:
+    """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11."""
+    rise = settings.support_fast_px - settings.support_still_px
+    linear = settings.support_still_px + rise * speed_deg_s / settings.fast_deg_s
+    support = np.where(speed_deg_s > settings.fast_deg_s, settings.support_beyond_px, linear)
+    return support.astype(np.float32)
+
+
+def temporal_limits(speed_deg_s: F32, geometry: Geometry, settings: AntialiasSettings) -> TemporalLimits:
+    """Temporal support: 11 frames, up to 15 where the pattern is slow, few on specular surfaces.
+
+    Slow pixels (below 0.15 deg/s) collect samples until these cover half a pixel, or until the
+    largest support. On mirroring, transparent and glossy surfaces (§5.4) the flow of the surface is
+    not the flow of what is seen in it.
+    """
+    normal, most = settings.frames // 2, max(settings.slow_frames, settings.frames) // 2
+    is_slow = speed_deg_s < settings.slow_deg_s
+    reach = np.where(is_slow, most, normal)
+    reach = np.where(geometry.is_specular, np.minimum(settings.specular_frames // 2, reach), reach)
+    least = np.minimum(reach, normal)
+    return TemporalLimits(reach.astype(np.float32), least.astype(np.float32))
