@@ -346,7 +346,7 @@ def test_scenes_survive_their_file(tmp_path):
             "parallel",
         ),
         (
-            '{"shapes": [{"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "material": {"surface": "x"}}]}',
+            '{"shapes": [{"kind": "sphere", "centre": [0, 0, 0], "radius": 1, "material": {"surface":"x"}}]}',
             "'x'; choose one of diffuse, emissive",
         ),
         (

@@ -1,0 +1,28 @@
+"""The tree of errors, as its docstring draws it."""
+
+import inspect
+import re
+
+from enfilade import errors
+
+
+def test_the_docstring_draws_every_error_in_its_place():
+    classes = {
+        name: cls
+        for name, cls in inspect.getmembers(errors, inspect.isclass)
+        if cls.__module__ == errors.__name__
+    }
+    drawn = re.findall(r"^    ([│├└─ ]*)(\w+Error)", errors.__doc__, re.MULTILINE)
+    assert [name for _, name in drawn] == list(dict.fromkeys(name for _, name in drawn))
+    assert {name for _, name in drawn} == set(classes)
+    above: list[str] = []
+    for indent, name in drawn:
+        depth = len(indent) // 4
+        above[depth:] = [name]
+        if depth:
+            assert classes[above[depth - 1]] in classes[name].__bases__
+
+
+def test_wrong_input_is_a_value_error_and_a_missing_device_is_not():
+    assert issubclass(errors.InputError, ValueError)
+    assert not issubclass(errors.DeviceError, ValueError)

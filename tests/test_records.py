@@ -1,0 +1,133 @@
+"""Records check their shapes, and know a little of themselves."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from enfilade.camera import Camera, look_at
+from enfilade.records import (
+    CameraPath,
+    Flow,
+    Frame,
+    Geometry,
+    Segment,
+    Shading,
+    SurfaceClass,
+    Warped,
+)
+
+H, W = 3, 4
+CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
+
+
+def floats(*shape):
+    return np.zeros((H, W, *shape), np.float32)
+
+
+def words(kind=np.uint32):
+    return np.zeros((H, W), kind)
+
+
+def geometry(**fields):
+    known = {
+        "depth": floats(),
+        "normal": floats(3),
+        "albedo": floats(3),
+        "item": words(),
+        "surface": words(np.uint8),
+    }
+    return Geometry(CAMERA, **(known | fields))
+
+
+def warped():
+    return Warped(floats(3), floats(), floats(), words(), floats(), np.zeros((H, W), bool))
+
+
+RECORDS = [
+    geometry(),
+    Flow(floats(2), floats(2), has_backward=True, has_forward=True),
+    Shading(floats(3), floats()),
+    warped(),
+    Frame(floats(3), words(np.uint8)),
+]
+
+
+def arrays(record):
+    return [f.name for f in dataclasses.fields(record) if isinstance(getattr(record, f.name), np.ndarray)]
+
+
+@pytest.mark.parametrize(
+    ("record", "name"),
+    [(record, name) for record in RECORDS for name in arrays(record)],
+    ids=lambda v: str(v)[:12],
+)
+def test_every_array_has_its_shape(record, name):
+    grown = np.repeat(getattr(record, name), 2, axis=0)
+    with pytest.raises(ValueError, match=r"expected|broadcast"):
+        dataclasses.replace(record, **{name: grown})
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda r: type(r).__name__)
+def test_floats_are_of_single_precision(record):
+    name = next(n for n in arrays(record) if getattr(record, n).dtype == np.float32)
+    with pytest.raises(ValueError, match="expected float32"):
+        dataclasses.replace(record, **{name: getattr(record, name).astype(np.float64)})
+
+
+def test_geometry_knows_what_is_hit_and_specular():
+    surface = words(np.uint8)
+    surface[0] = [SurfaceClass.DIFFUSE, SurfaceClass.EMISSIVE, SurfaceClass.GLOSSY, SurfaceClass.MIRROR]
+    surface[1, 0] = SurfaceClass.TRANSPARENT
+    item = (surface > 0).astype(np.uint32)
+    g = geometry(surface=surface, item=item)
+    assert g.is_hit.sum() == 5
+    assert g.is_specular.ravel()[:5].tolist() == [False, False, True, True, True]
+
+
+def test_motion_is_signed_and_speed_is_not():
+    backward, forward = floats(2), floats(2)
+    backward[..., 0], forward[..., 0] = -3.0, 3.0
+    steady = Flow(backward, forward, has_backward=True, has_forward=True)
+    assert (steady.motion[..., 0] == 3.0).all()
+    assert (steady.speed == 3.0).all()
+    turning = Flow(forward, forward, has_backward=True, has_forward=True)
+    assert (turning.motion == 0.0).all()
+    assert (turning.speed == 3.0).all()
+
+
+def test_flow_at_the_ends_of_a_shot_is_that_of_its_one_neighbour():
+    forward = floats(2)
+    forward[...] = (3.0, 4.0)
+    first = Flow(floats(2), forward, has_backward=False, has_forward=True)
+    last = Flow(-forward, floats(2), has_backward=True, has_forward=False)
+    for flow in (first, last):
+        assert (flow.motion == forward).all()
+        assert (flow.speed == 5.0).all()
+    alone = Flow(floats(2), floats(2), has_backward=False, has_forward=False)
+    assert (alone.speed == 0.0).all()
+
+
+def test_a_path_falls_into_shots():
+    path = CameraPath((CAMERA,) * 6, tuple(range(1, 7)), 24.0, frozenset({2, 5}))
+    assert path.shots() == [range(2), range(2, 5), range(5, 6)]
+    assert (len(path), path.width, path.height) == (6, W, H)
+    assert CameraPath((CAMERA,), (1,), 24.0).shots() == [range(1)]
+
+
+def test_every_camera_has_a_number():
+    with pytest.raises(ValueError, match="2 cameras with 1 numbers"):
+        CameraPath((CAMERA, CAMERA), (1,), 24.0)
+
+
+@pytest.mark.parametrize("first", [0, 3])
+@pytest.mark.parametrize("length", [1, 2, 7, 24])
+def test_segments_split_until_nothing_is_between(first, length):
+    todo, seen = [Segment(first, first + length)], set()
+    while todo:
+        segment = todo.pop()
+        seen.update((segment.first, segment.last))
+        if len(segment.inbetweens):
+            assert segment.middle in segment.inbetweens
+            todo.extend(segment.split())
+    assert seen == set(range(first, first + length + 1))

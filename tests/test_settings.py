@@ -1,0 +1,133 @@
+"""Settings: defaults, ranges, files, and what is said of wrong ones."""
+
+import dataclasses
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enfilade.errors import SettingsError
+from enfilade.settings import (
+    KeyframeSettings,
+    Placement,
+    SampleFilter,
+    Settings,
+    TraceSettings,
+    ViewingSettings,
+    read_tables,
+    sections,
+)
+
+FIELDS = [(cls, f) for cls in sections().values() for f in dataclasses.fields(cls)]
+RANGED = [(cls, f) for cls, f in FIELDS if f.metadata["least"] is not None]
+
+
+def name(value):
+    return getattr(value, "name", None) or getattr(value, "__name__", None)
+
+
+def test_the_paper_is_the_default():
+    settings = Settings()
+    assert (settings.keyframes.spacing, settings.keyframes.adaptation) == (25, 0.5)  # §4.2
+    assert settings.masks.slow_deg_s == 0.5  # §4.1
+    assert settings.masks.split_percent == 10.0  # §4.3
+    assert (settings.masks.specular_jnd, settings.masks.specular_percent) == (2.0, 25.0)
+    assert (settings.antialias.frames, settings.antialias.slow_frames) == (11, 15)  # §5.2
+    assert (settings.viewing.diagonal_m, settings.viewing.distance_m) == (0.25, 0.5)
+
+
+def test_settings_survive_their_tables():
+    settings = Settings.from_tables(
+        {
+            "trace": {"spp": 3, "pixel_filter": "box"},
+            "keyframes": {"placement": "equal-flow"},
+            "viewing": {"diagonal_m": 1},
+        }
+    )
+    assert settings.trace == TraceSettings(spp=3, pixel_filter=SampleFilter.BOX)
+    assert settings.keyframes.placement is Placement.EQUAL_FLOW
+    assert isinstance(settings.viewing.diagonal_m, float)
+    through_json = json.loads(json.dumps(settings.to_tables()))
+    assert Settings.from_tables(through_json) == settings
+    assert Settings.from_tables({}) == Settings()
+
+
+@given(st.integers(1, 1_048_576), st.floats(0.0, 0.9), st.sampled_from(list(Placement)), st.booleans())
+def test_any_settings_survive_their_tables(spp, adaptation, placement, separate):
+    tables = {
+        "trace": {"spp": spp},
+        "keyframes": {"adaptation": adaptation, "placement": placement.value},
+        "antialias": {"separate_items": separate},
+    }
+    settings = Settings.from_tables(tables)
+    assert settings.keyframes == KeyframeSettings(placement=placement, adaptation=adaptation)
+    assert Settings.from_tables(settings.to_tables()) == settings
+
+
+@pytest.mark.parametrize(("cls", "f"), FIELDS, ids=name)
+def test_every_setting_has_a_sentence_of_help(cls, f):
+    text = f.metadata["help"]
+    assert text[0].isupper() or text.startswith("...")
+    assert text.endswith(".")
+
+
+@pytest.mark.parametrize(("cls", "f"), RANGED, ids=name)
+def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
+    kind = type(f.default)
+    step = 1 if kind is int else 1e-6
+    for end, beyond in ((f.metadata["least"], -step), (f.metadata["most"], step)):
+        if end is None:
+            continue
+        assert getattr(cls(**{f.name: kind(end)}), f.name) == end
+        with pytest.raises(SettingsError, match=rf"\] {f.name} = .* out of range"):
+            cls(**{f.name: kind(end + beyond * max(abs(end), 1))})
+
+
+@pytest.mark.parametrize(
+    ("tables", "problem"),
+    [
+        ({"tracing": {}}, r"unknown section \[tracing\]; known are: trace, viewing"),
+        ({"trace": 3}, r"\[trace\] must be a table of settings, not 3"),
+        ({"trace": {"ssp": 3}}, r"unknown setting 'ssp' in \[trace\]; known are: spp, seed"),
+        ({"trace": {"spp": 0}}, r"\[trace\] spp = 0 is out of range: it must be between 1 and 1048576"),
+        ({"trace": {"spp": 2.5}}, r"\[trace\] spp = 2.5: expected int"),
+        ({"trace": {"spp": "64"}}, "expected int"),
+        ({"trace": {"spp": True}}, "expected int"),
+        ({"viewing": {"distance_m": True}}, "expected float"),
+        ({"viewing": {"distance_m": 0.0}}, r"must be at least 0.05"),
+        ({"viewing": {"distance_m": math.nan}}, "distance_m = nan"),
+        ({"viewing": {"distance_m": math.inf}}, "finite"),
+        ({"antialias": {"separate_items": 1}}, "expected bool"),
+        ({"keyframes": {"placement": "best"}}, "'best': choose one of adapted, uniform, equal-flow"),
+        ({"keyframes": {"placement": 3}}, "choose one of"),
+        ({"video": {"codec": "divx"}}, "'divx': choose one of h264, ffv1, av1, prores"),
+        ({"video": {"codec": ["h264"]}}, "expected str"),
+    ],
+)
+def test_wrong_settings_are_named(tables, problem):
+    with pytest.raises(SettingsError, match=problem):
+        Settings.from_tables(tables)
+
+
+def test_sections_check_themselves_when_made():
+    with pytest.raises(SettingsError, match=r"\[viewing\] peak_cd_m2 = 0.5 is out of range"):
+        ViewingSettings(peak_cd_m2=0.5)
+
+
+def test_a_file_is_read(tmp_path):
+    file = tmp_path / "s.toml"
+    file.write_text("[keyframes]\nspacing = 12\nplacement = 'uniform'\n")
+    settings = Settings.from_tables(read_tables(file))
+    assert settings.keyframes == KeyframeSettings(Placement.UNIFORM, 12)
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path):
+    file = tmp_path / "s.toml"
+    with pytest.raises(SettingsError, match=r"can't read the settings .*s\.toml: No such file"):
+        read_tables(file)
+    for content in (b"[trace\nspp = 1", b"spp 3", b"\xff\xfe"):
+        file.write_bytes(content)
+        with pytest.raises(SettingsError, match=r"s\.toml is not valid TOML"):
+            read_tables(file)
