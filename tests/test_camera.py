@@ -88,7 +88,7 @@ def changed(row, column, value):
         (changed(0, 3, np.nan), "NaN"),
         (changed(1, 3, np.inf), "infinity"),
         (changed(3, 0, 0.5), "last row"),
-        (changed(0, 0, 1.01), "not rigid .* 0.0201"),
+        (changed(0, 0, 1.01), "not rigid: .* 0.0201"),
         (changed(0, 1, 0.01), "not rigid"),
         (np.zeros((4, 4)), "last row"),
         (changed(0, 0, -1.0), "mirror image"),

@@ -43,7 +43,7 @@ def test_an_old_llvm_is_refused_with_the_way_out(monkeypatch, version):
 
 def test_a_missing_llvm_is_named_with_the_way_out(monkeypatch):
     pretend(monkeypatch, llvm=False)
-    with pytest.raises(DeviceError, match="not found .* apt-get install"):
+    with pytest.raises(DeviceError, match=r"not found .* apt-get install"):
         activate("auto")
 
 

@@ -99,6 +99,7 @@ def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
         ({"viewing": {"distance_m": 0.0}}, r"must be at least 0.05"),
         ({"viewing": {"distance_m": math.nan}}, "distance_m = nan"),
         ({"viewing": {"distance_m": math.inf}}, "finite"),
+        ({"viewing": {"distance_m": 10**400}}, "finite"),
         ({"antialias": {"separate_items": 1}}, "expected bool"),
         ({"keyframes": {"placement": "best"}}, "'best': choose one of adapted, uniform, equal-flow"),
         ({"keyframes": {"placement": 3}}, "choose one of"),
@@ -127,7 +128,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
     file = tmp_path / "s.toml"
     with pytest.raises(SettingsError, match=r"can't read the settings .*s\.toml: No such file"):
         read_tables(file)
-    for content in (b"[trace\nspp = 1", b"spp 3", b"\xff\xfe"):
+    for content in (b"[trace\nspp = 1", b"spp 3", b"\xff\xfe", b"a = " + b"9" * 5000, b"a = " + b"[" * 9999):
         file.write_bytes(content)
         with pytest.raises(SettingsError, match=r"s\.toml is not valid TOML"):
             read_tables(file)

@@ -256,7 +256,7 @@ def read_tables(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SettingsError(f"can't read the settings {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # numbers of 5000 digits and deep nesting included
         raise SettingsError(f"{path} is not valid TOML: {error}") from error
 
 
@@ -269,7 +269,7 @@ def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any
             raise SettingsError(f"{where} = {value!r}: choose one of {', '.join(choices)}")
         return kind(value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+        return float(value) if abs(value) < 1e300 else math.inf  # which the check refuses
     if type(value) is not kind:
         raise SettingsError(f"{where} = {value!r}: expected {kind.__name__}")
     return value
