@@ -1,0 +1,125 @@
+"""Eye movements: how fast an image moves over the retina (§3.3, Eq. 5, Daly 1998)."""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Pursuit", "channel_speed", "retinal_speed", "retinal_velocity"]
+
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+
+EYE_DRIFT_DEG_S = 0.15  # §3.3, v_Min: drift of the eye that fixates
+PURSUIT_MAX_DEG_S = 80.0  # §3.3, v_Max: fastest smooth pursuit
+PURSUIT_EFFICIENCY = 0.82  # §3.3, no unit: share of a target's speed that the eye takes up
+
+SLOWEST_DEG_S = 1e-6  # below this a direction of motion means nothing
+
+
+class Pursuit(enum.Enum):
+    """What the eye does while the image moves (§3.3).
+
+    PURSUIT
+        It follows the motion at each pixel as well as it can (Eq. 5). Segment splitting uses this.
+    NONE
+        It stands still: the image moves over the retina at its own velocity.
+    BOTH
+        Either may happen: each channel takes the larger sensitivity of the two.
+    """
+
+    PURSUIT = "pursuit"
+    NONE = "none"
+    BOTH = "both"
+
+    @property
+    def hypotheses(self) -> tuple[Pursuit, ...]:
+        """The single eye movements to evaluate, of which the most sensitive counts."""
+        return (Pursuit.PURSUIT, Pursuit.NONE) if self is Pursuit.BOTH else (self,)
+
+
+def retinal_speed(image_speed_deg_s: Float32Array, pursuit: Pursuit) -> Float32Array:
+    """Speed over the retina of an image that moves (Eq. 5, with a floor).
+
+    v = max(abs(v_I - min(0.82 v_I + 0.15, 80)), 0.15) with pursuit, max(v_I, 0.15) without.
+
+    Parameters
+    ----------
+    image_speed_deg_s : (...) float32
+        Speed v_I of the image, degrees per second, 0 or more.
+    pursuit : Pursuit
+        PURSUIT or NONE.
+
+    Returns
+    -------
+    (...) float32
+        Degrees per second, never below the eye's drift of 0.15.
+
+    Notes
+    -----
+    As printed, Eq. 5 is zero at v_I = 0.833 deg/s and negative below, where Eq. 4 would make the
+    viewer blind. The eye is never stiller than its drift, hence the floor.
+    """
+    if pursuit is Pursuit.NONE:
+        return np.maximum(image_speed_deg_s, np.float32(EYE_DRIFT_DEG_S))
+    eye = PURSUIT_EFFICIENCY * image_speed_deg_s + EYE_DRIFT_DEG_S
+    over_retina: Float32Array = image_speed_deg_s - np.minimum(eye, PURSUIT_MAX_DEG_S)
+    return np.maximum(np.abs(over_retina), np.float32(EYE_DRIFT_DEG_S))
+
+
+def retinal_velocity(velocity_deg_s: Float32Array, pursuit: Pursuit) -> Float32Array:
+    """Velocity over the retina: the direction of the image's, with the speed of Eq. 5.
+
+    Parameters
+    ----------
+    velocity_deg_s : (2, ...) float32
+        Image velocity, degrees per second: to the right, down.
+    pursuit : Pursuit
+        PURSUIT or NONE.
+
+    Returns
+    -------
+    (2, ...) float32
+        Degrees per second. Zero where the image stands still; the floor is left to
+        `channel_speed`.
+    """
+    if pursuit is Pursuit.NONE:
+        return velocity_deg_s
+    speed = np.hypot(velocity_deg_s[0], velocity_deg_s[1])
+    share = retinal_speed(speed, pursuit)
+    share /= np.maximum(speed, np.float32(SLOWEST_DEG_S), out=speed)
+    return velocity_deg_s * share
+
+
+def channel_speed(retinal_velocity_deg_s: Float32Array, theta_deg: float | None) -> Float32Array:
+    """Speed over the retina along the frequency vector of a channel (§3.4).
+
+    A pattern blurs along its motion: bars across it lose their detail, bars along it keep theirs.
+    So the retinal velocity is projected on the direction in which the bars repeat.
+
+    Parameters
+    ----------
+    retinal_velocity_deg_s : (2, ...) float32
+        From `retinal_velocity`, degrees per second.
+    theta_deg : float or None
+        Direction of the frequency vector (the normal of the bars), degrees from x (right) towards
+        y (down); None for the base band, which has no direction and takes the whole speed.
+
+    Returns
+    -------
+    (...) float32
+        Degrees per second, never below the eye's drift of 0.15.
+    """
+    across, down = retinal_velocity_deg_s
+    if theta_deg is None:
+        along: Float32Array = np.hypot(across, down)
+    else:
+        theta = math.radians(theta_deg)
+        along = np.float32(math.cos(theta)) * across
+        along += np.float32(math.sin(theta)) * down
+        np.abs(along, out=along)
+    np.maximum(along, np.float32(EYE_DRIFT_DEG_S), out=along)
+    return along

@@ -1,0 +1,123 @@
+"""Sensitivity of every channel at every pixel: velocities through the CSF (Fig. 6)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
+from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed
+from enfilade.metric.pyramid import halve
+
+__all__ = ["ChannelSensitivity", "SensitivityTable"]
+
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+Float64Array: TypeAlias = npt.NDArray[np.float64]
+IndexArray: TypeAlias = npt.NDArray[np.intp]
+
+FASTEST_DEG_S = 2000.0  # faster retinal motion is taken as this: nothing is seen any more
+TABLE_SIZE = 4096  # 0.23 % between speeds
+LEAST_SENSITIVITY = 1e-3  # contrast of 1000: never seen, and float32 powers stay normal
+
+
+class SensitivityTable:
+    """Sensitivity by retinal speed for every band, looked up on a logarithmic scale.
+
+    Parameters
+    ----------
+    csf : callable
+        (frequency_cpd, velocities_deg_s) -> sensitivities, as `csf.spatiovelocity_sensitivity`.
+    bands : tuple of Band
+        Bands of the Cortex transform.
+    pixels_per_degree : float
+        Turns their centres into cycles per degree.
+    """
+
+    def __init__(
+        self,
+        csf: Callable[[float, Float64Array], Float64Array],
+        bands: tuple[Band, ...],
+        pixels_per_degree: float,
+    ) -> None:
+        speeds = np.geomspace(EYE_DRIFT_DEG_S, FASTEST_DEG_S, TABLE_SIZE)
+        rows = [csf(band.centre_cpp * pixels_per_degree, speeds) for band in bands]
+        self._rows: list[Float32Array] = [
+            np.maximum(row, LEAST_SENSITIVITY).astype(np.float32) for row in rows
+        ]
+        self._steps_per_e = (TABLE_SIZE - 1) / math.log(FASTEST_DEG_S / EYE_DRIFT_DEG_S)
+
+    def index(self, speed_deg_s: Float32Array) -> IndexArray:
+        """Nearest entries for retinal speeds in deg/s, which are 0.15 or more."""
+        steps = np.log(speed_deg_s * np.float32(1.0 / EYE_DRIFT_DEG_S))
+        steps *= np.float32(self._steps_per_e)
+        steps += np.float32(0.5)
+        np.clip(steps, 0, TABLE_SIZE - 1, out=steps)
+        return np.asarray(steps, dtype=np.intp)
+
+    def row(self, band: Band) -> Float32Array:
+        """Sensitivities of a band by entry."""
+        return self._rows[band.level - 1]
+
+
+class ChannelSensitivity:
+    """Sensitivities of one orientation in all bands, at the size of each.
+
+    Speeds are averaged over the area of a coarse sample as magnitudes, after the projection on the
+    channel's direction, so that motions to the left and to the right do not cancel.
+
+    Parameters
+    ----------
+    table : SensitivityTable
+        The CSF.
+    velocities : sequence of (2, H, W) float32
+        Retinal velocities, deg/s, one for each eye movement that may happen; the largest
+        sensitivity counts. Empty when nothing moves.
+    orientation : int or None
+        Index into ORIENTATIONS_DEG; None for the base band.
+    """
+
+    def __init__(
+        self,
+        table: SensitivityTable,
+        velocities: Sequence[Float32Array],
+        orientation: int | None,
+    ) -> None:
+        self._table = table
+        self._reduction = 1
+        theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
+        self._speeds = [channel_speed(velocity, theta) for velocity in velocities]
+        self._indices = [table.index(speed) for speed in self._speeds]
+
+    def _coarsen(self, reduction: int) -> None:
+        if reduction == self._reduction:
+            return
+        while self._reduction < reduction:
+            self._speeds = [halve(speed) for speed in self._speeds]
+            self._reduction *= 2
+        self._indices = [self._table.index(speed) for speed in self._speeds]
+
+    def map(self, band: Band) -> Float32Array:
+        """Sensitivity in a band; ask for fine bands first.
+
+        Parameters
+        ----------
+        band : Band
+            Not finer than the last one asked for.
+
+        Returns
+        -------
+        () or (h, w) float32
+            A single number when nothing moves, else a map at the band's reduced size.
+        """
+        row = self._table.row(band)
+        if not self._speeds:
+            return np.asarray(row[0])
+        self._coarsen(band.reduction)
+        first, *others = (row.take(index) for index in self._indices)
+        for other in others:
+            np.maximum(first, other, out=first)
+        return first

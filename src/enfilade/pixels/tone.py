@@ -1,0 +1,129 @@
+"""From linear radiance to what the screen emits: sRGB transfer (IEC 61966-2-1) and the display.
+
+The viewer, and so the metric, sees the image after the view transform of the video (exposure, sRGB
+encoding, clipping at white) and the screen that undoes the encoding.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.errors import InputError
+
+__all__ = ["display_luminance", "luminance", "srgb_decode", "srgb_encode"]
+
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+
+REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)  # ITU-R BT.709-6, item 3.2; R, G, B
+
+SRGB_LINEAR_LIMIT = 0.0031308  # IEC 61966-2-1; linear below this linear value
+SRGB_ENCODED_LIMIT = 0.04045  # IEC 61966-2-1; the same point, encoded
+SRGB_SLOPE = 12.92  # IEC 61966-2-1
+SRGB_OFFSET = 0.055  # IEC 61966-2-1
+SRGB_GAMMA = 2.4  # IEC 61966-2-1
+
+
+def srgb_encode(linear: Float32Array) -> Float32Array:
+    """Encode linear values for an sRGB video or image (OETF), without clipping.
+
+    Parameters
+    ----------
+    linear : (...) float32
+        Linear values, 1 = white. Negative ones take the straight part of the curve.
+
+    Returns
+    -------
+    (...) float32
+        Encoded values, 1 = white.
+
+    Notes
+    -----
+    Source: IEC 61966-2-1.
+    """
+    power = np.maximum(linear, SRGB_LINEAR_LIMIT) ** np.float32(1.0 / SRGB_GAMMA)
+    curved = (1.0 + SRGB_OFFSET) * power - SRGB_OFFSET
+    encoded: Float32Array = np.where(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
+    return encoded
+
+
+def srgb_decode(encoded: Float32Array) -> Float32Array:
+    """Linear light that an sRGB screen makes of encoded values (EOTF), without clipping.
+
+    Parameters
+    ----------
+    encoded : (...) float32
+        Encoded values, 1 = white. Negative ones take the straight part of the curve.
+
+    Returns
+    -------
+    (...) float32
+        Linear values, 1 = white.
+
+    Notes
+    -----
+    Source: IEC 61966-2-1.
+    """
+    shifted = (np.maximum(encoded, SRGB_ENCODED_LIMIT) + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)
+    curved = shifted ** np.float32(SRGB_GAMMA)
+    linear: Float32Array = np.where(encoded <= SRGB_ENCODED_LIMIT, encoded / SRGB_SLOPE, curved)
+    return linear
+
+
+def luminance(linear_rgb: Float32Array) -> Float32Array:
+    """Relative luminance of linear Rec.709 colours (ITU-R BT.709-6).
+
+    Parameters
+    ----------
+    linear_rgb : (..., 3) float32
+        Linear R, G, B.
+
+    Returns
+    -------
+    (...) float32
+        0.2126 R + 0.7152 G + 0.0722 B.
+
+    Raises
+    ------
+    InputError
+        The last axis is not three long.
+    """
+    if linear_rgb.ndim == 0 or linear_rgb.shape[-1] != len(REC709_LUMINANCE):
+        msg = f"luminance: expected linear RGB of shape (..., 3), got {linear_rgb.shape}"
+        raise InputError(msg)
+    weights = np.asarray(REC709_LUMINANCE, dtype=np.float32)
+    return np.asarray(linear_rgb @ weights, dtype=np.float32)
+
+
+def display_luminance(
+    linear_rgb: Float32Array, *, exposure_ev: float, peak_cd_m2: float, black_cd_m2: float
+) -> Float32Array:
+    """Luminance that leaves the screen when a linear image is shown, as the viewer sees it.
+
+    Exposure, sRGB encoding, clipping to the encodable range, decoding by the screen, peak and
+    black. Encoding and decoding undo each other, so that of the two only the clipping stays;
+    rounding to 8 bits is left out.
+
+    Parameters
+    ----------
+    linear_rgb : (..., 3) float32
+        Scene-linear Rec.709 radiance, 1 = white at exposure 0.
+    exposure_ev : float
+        Exposure in stops: +1 doubles.
+    peak_cd_m2, black_cd_m2 : float
+        Luminance of white and of black on the screen, cd/m2.
+
+    Returns
+    -------
+    (...) float32
+        cd/m2, between black and peak. A NaN stays a NaN: the metric refuses it by name.
+
+    Raises
+    ------
+    InputError
+        The last axis is not three long.
+    """
+    shown = np.clip(linear_rgb * np.float32(2.0**exposure_ev), 0.0, 1.0)
+    return luminance(shown) * np.float32(peak_cd_m2 - black_cd_m2) + np.float32(black_cd_m2)

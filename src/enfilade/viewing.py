@@ -1,0 +1,111 @@
+"""Viewing conditions: screen and distance, pixels to degrees (§6)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.errors import InputError
+
+__all__ = ["Viewing"]
+
+Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.float64])
+
+SAMPLES_PER_CYCLE = 2.0  # the sampling theorem
+
+
+@dataclass(frozen=True)
+class Viewing:
+    """Where the viewer sits and what the screen shows; the defaults are the paper's (§6).
+
+    Angles are those at the centre of the screen, looked at straight on; towards the corners of a
+    screen that is near, a pixel covers a smaller angle, which is left out.
+
+    Parameters
+    ----------
+    width_px, height_px : int
+        Size of the image in pixels, which fills the screen; at least 1.
+    diagonal_m : float
+        Diagonal of the image on the screen, metres.
+    distance_m : float
+        From the eye to the screen, metres.
+    fps : float
+        Frames per second at which the sequence is shown.
+    peak_cd_m2, black_cd_m2 : float
+        Luminance of white and of black on the screen, reflected room light included, cd/m2;
+        black may be zero.
+
+    Raises
+    ------
+    InputError
+        A number is not finite or out of range; the message names the field.
+    """
+
+    width_px: int
+    height_px: int
+    diagonal_m: float = 0.25
+    distance_m: float = 0.5
+    fps: float = 30.0
+    peak_cd_m2: float = 100.0
+    black_cd_m2: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            pixels = getattr(self, name)
+            if not isinstance(pixels, (int, np.integer)) or pixels < 1:
+                msg = f"viewing: {name} is {pixels!r}; give a whole number of pixels, 1 or more"
+                raise InputError(msg)
+        for name in ("diagonal_m", "distance_m", "fps", "peak_cd_m2"):
+            number = getattr(self, name)
+            if not (math.isfinite(number) and number > 0):
+                msg = f"viewing: {name} is {number!r}; give a finite number above 0"
+                raise InputError(msg)
+        if not 0 <= self.black_cd_m2 < self.peak_cd_m2:
+            msg = (
+                f"viewing: black_cd_m2 is {self.black_cd_m2!r}; "
+                f"give 0 or more, and less than peak_cd_m2 ({self.peak_cd_m2!r})"
+            )
+            raise InputError(msg)
+
+    @property
+    def pixel_pitch_m(self) -> float:
+        """Distance between neighbouring pixels on the screen, metres (pixels are square)."""
+        return self.diagonal_m / math.hypot(self.width_px, self.height_px)
+
+    @property
+    def pixels_per_degree(self) -> float:
+        """Pixels in one degree of visual angle at the centre (27.93 for the paper's 640x480)."""
+        return self.distance_m * math.tan(math.radians(1.0)) / self.pixel_pitch_m
+
+    @property
+    def nyquist_cpd(self) -> float:
+        """Highest frequency along rows and columns, cycles per degree (13.96 for 640x480)."""
+        return self.pixels_per_degree / SAMPLES_PER_CYCLE
+
+    def velocity_deg_s(self, flow_px_per_frame: Quantity) -> Quantity:
+        """Image velocity in degrees per second, from image flow in pixels per frame."""
+        return flow_px_per_frame * (self.fps / self.pixels_per_degree)
+
+    def flow_px(self, velocity_deg_s: Quantity) -> Quantity:
+        """Image flow in pixels per frame, from image velocity in degrees per second."""
+        return velocity_deg_s * (self.pixels_per_degree / self.fps)
+
+    def cropped(self, width_px: int, height_px: int) -> Viewing:
+        """Conditions for an image of another size shown with the same pixels, pixel for pixel.
+
+        Parameters
+        ----------
+        width_px, height_px : int
+            Size of the crop (or of a larger image), pixels.
+
+        Returns
+        -------
+        Viewing
+            Same pixels per degree, frame rate and luminances.
+        """
+        diagonal_m = self.pixel_pitch_m * math.hypot(width_px, height_px)
+        return replace(self, width_px=width_px, height_px=height_px, diagonal_m=diagonal_m)

@@ -1,0 +1,66 @@
+"""Eq. 5 with its floor, and the projection on channels."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enfilade.metric.eye import Pursuit, channel_speed, retinal_speed, retinal_velocity
+
+speeds = st.floats(0, 300, width=32)
+
+
+@pytest.mark.parametrize(
+    ("image", "retina"),
+    # Eq. 5 by hand; the first three fall under the floor.
+    [
+        (0.0, 0.15),
+        (0.5, 0.15),
+        (0.8333, 0.15),
+        (2.0, 0.210),
+        (5.0, 0.750),
+        (10.0, 1.65),
+        (16.0, 2.73),
+        (30.0, 5.25),
+        (97.4, 17.4),
+        (120.0, 40.0),
+    ],
+)
+def test_equation_5(image, retina):
+    got = retinal_speed(np.float32([image]), Pursuit.PURSUIT)
+    assert got[0] == pytest.approx(retina, rel=2e-3)
+
+
+@given(speeds)
+def test_without_pursuit_only_drift_is_added(image):
+    assert retinal_speed(np.float32([image]), Pursuit.NONE)[0] == max(np.float32(image), np.float32(0.15))
+
+
+@given(speeds, st.floats(0, 360), st.sampled_from([Pursuit.PURSUIT, Pursuit.NONE]))
+def test_retinal_velocity_has_the_direction_of_the_image(image, angle, eye):
+    heading = np.radians(angle)
+    velocity = np.float32([[image * np.cos(heading)], [image * np.sin(heading)]])
+    retinal = retinal_velocity(velocity, eye)
+    across = retinal[0] * velocity[1] - retinal[1] * velocity[0]
+    assert abs(across[0]) <= 1e-4 * max(image, 1.0) ** 2
+    assert channel_speed(retinal, None)[0] == pytest.approx(
+        retinal_speed(np.float32([image]), eye)[0], rel=1e-3
+    )
+
+
+def test_projection_is_on_the_frequency_vector():
+    # Moving right at 30 deg/s unpursued: upright bars (frequency vector along x) blur, level ones
+    # keep full acuity, at 60 degrees half the speed counts.
+    velocity = np.float32([[30.0], [0.0]])
+    assert channel_speed(velocity, 0.0)[0] == pytest.approx(30.0)
+    assert channel_speed(velocity, -90.0)[0] == np.float32(0.15)
+    assert channel_speed(velocity, 60.0)[0] == pytest.approx(15.0, rel=1e-5)
+    # y points down, and theta turns from x towards y.
+    downwards_right = np.float32([[10.0], [10.0 * 3**0.5]])
+    assert channel_speed(downwards_right, 60.0)[0] == pytest.approx(20.0, rel=1e-5)
+    assert channel_speed(downwards_right, -30.0)[0] == pytest.approx(0.15, abs=1e-5)
+
+
+def test_hypotheses():
+    assert Pursuit.BOTH.hypotheses == (Pursuit.PURSUIT, Pursuit.NONE)
+    assert Pursuit.NONE.hypotheses == (Pursuit.NONE,)

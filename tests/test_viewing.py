@@ -1,0 +1,73 @@
+"""Pixels to degrees (§6), and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enfilade.errors import InputError
+from enfilade.viewing import Viewing
+
+
+def test_paper_conditions():
+    # §6: half a metre from a 640x480 image of 0.25 m diagonal.
+    viewing = Viewing(640, 480)
+    assert viewing.pixels_per_degree == pytest.approx(27.93, abs=0.005)
+    assert viewing.nyquist_cpd == pytest.approx(13.96, abs=0.005)
+    assert viewing.flow_px(0.15) == pytest.approx(0.14, abs=0.001)
+
+
+def test_five_degrees_are_4_5_centimetres():
+    # §6, footnote 2: 5.2 degrees at half a metre are a region of 4.5 cm.
+    viewing = Viewing(640, 480)
+    assert 5.2 * viewing.pixels_per_degree * viewing.pixel_pitch_m == pytest.approx(0.045, abs=5e-4)
+
+
+@given(
+    width=st.integers(1, 5000),
+    height=st.integers(1, 5000),
+    distance=st.floats(0.1, 20),
+    fps=st.floats(1, 240),
+    velocity=st.floats(-200, 200),
+)
+def test_velocity_and_flow_are_inverse(width, height, distance, fps, velocity):
+    viewing = Viewing(width, height, distance_m=distance, fps=fps)
+    assert viewing.velocity_deg_s(viewing.flow_px(velocity)) == pytest.approx(velocity, rel=1e-12)
+
+
+def test_maps_of_flow_convert_whole():
+    viewing = Viewing(640, 480)
+    flow = np.array([[[1.0, -2.0]]], dtype=np.float32)
+    velocity = viewing.velocity_deg_s(flow)
+    assert velocity.dtype == np.float32
+    np.testing.assert_allclose(velocity, flow * 30 / viewing.pixels_per_degree, rtol=1e-6)
+
+
+def test_crop_keeps_the_pixels():
+    viewing = Viewing(1920, 1080, diagonal_m=0.6, fps=24.0)
+    crop = viewing.cropped(64, 48)
+    assert (crop.width_px, crop.height_px, crop.fps) == (64, 48, 24.0)
+    assert crop.pixels_per_degree == pytest.approx(viewing.pixels_per_degree)
+
+
+@pytest.mark.parametrize(
+    ("field", "number"),
+    [
+        ("width_px", 0),
+        ("height_px", -3),
+        ("width_px", 64.5),
+        ("diagonal_m", 0.0),
+        ("distance_m", math.nan),
+        ("fps", math.inf),
+        ("peak_cd_m2", -1.0),
+        ("black_cd_m2", -0.1),
+        ("black_cd_m2", 100.0),
+        ("black_cd_m2", math.nan),
+    ],
+)
+def test_out_of_range_is_refused_by_name(field, number):
+    numbers = {"width_px": 640, "height_px": 480, field: number}
+    with pytest.raises(InputError, match=field):
+        Viewing(**numbers)
