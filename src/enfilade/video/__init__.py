@@ -1,0 +1,9 @@
+"""Videos and image sequences: encoded from finished frames, and read to be compared."""
+
+from __future__ import annotations
+
+from enfilade.video.codecs import video_suffix
+from enfilade.video.encode import encode_video, exact_fps
+from enfilade.video.sequence import Sequence, open_sequence
+
+__all__ = ["Sequence", "encode_video", "exact_fps", "open_sequence", "video_suffix"]

@@ -1,0 +1,163 @@
+"""Encoding of finished frames: the view transform, Y'CbCr, the codec, and tags that say what was done."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+
+from enfilade.codec import whole
+from enfilade.errors import ImageError
+from enfilade.records import F32
+from enfilade.settings import VideoSettings
+from enfilade.video.codecs import Codec, codec_named
+from enfilade.video.view import View, open_view
+from enfilade.video.ycbcr import planes_from_rgb, quantized
+
+__all__ = ["encode_video", "exact_fps"]
+
+BT709 = 1  # primaries and matrix, ITU-T H.273, tables 2 and 4
+IDENTITY_MATRIX = 0  # R'G'B' as it is, ITU-T H.273, table 4
+LIMITED, FULL = 1, 2  # FFmpeg's AVColorRange
+NTSC = Fraction(1000, 1001)
+NTSC_TOLERANCE = 0.005  # people write 23.98 for 24000/1001
+
+
+def encode_video(
+    file: Path,
+    frames: Iterable[F32],
+    *,
+    fps: float | Fraction,
+    width: int,
+    height: int,
+    settings: VideoSettings,
+    exposure_ev: float,
+) -> None:
+    """Encode frames as a video, tagged as what it is; the same frames, the same bytes.
+
+    H.264 is 8 bit 4:2:0, or 4:4:4 where width or height is odd (few players show that); AV1 10 bit 4:2:0,
+    even sizes only; ProRes 10 bit 4:4:4; FFV1 12 bit R'G'B', without loss beyond that rounding. Y'CbCr
+    has the BT.709 matrix and limited range, primaries are BT.709, the transfer is sRGB's or that of the
+    OpenColorIO display.
+
+    Parameters
+    ----------
+    file
+        Its suffix should be that of :func:`~enfilade.video.codecs.video_suffix`.
+    frames : iterable of (H, W, 3) float32
+        Scene-linear Rec.709. Taken one by one.
+    fps
+        Frames per second; see :func:`exact_fps`.
+    width, height
+        Pixels.
+    settings, exposure_ev
+        Codec, quality and view transform.
+
+    Raises
+    ------
+    SettingsError
+        An unknown codec or view, or a size that the codec can't encode.
+    ImageError
+        There are no frames, or one has another size or holds a NaN.
+    RunFolderError
+        The file can't be written. An older one stays.
+    """
+    codec = codec_named(settings.codec)
+    pixels = codec.pixels_for(width, height)
+    options = codec.options_for(settings.quality)
+    view = open_view(settings, exposure_ev)
+    pictures = _pictures(frames, (height, width, 3), view, pixels, codec.bits)
+    with whole.whole_file(file) as beside:
+        beside.touch()
+        try:
+            with _container(beside, codec) as container:
+                stream = _stream(container, codec, exact_fps(fps), options)
+                stream.width, stream.height, stream.pix_fmt = width, height, pixels
+                _tag(stream.codec_context, view, pixels)
+                for picture in pictures:
+                    container.mux(stream.encode(picture))
+                container.mux(stream.encode(None))
+        except av.FFmpegError as error:
+            raise whole.unwritable(file, f"{codec.encoder}: {error}") from error
+
+
+def exact_fps(fps: float | Fraction) -> Fraction:
+    """Frames per second as the fraction that is meant: 23.976 and 23.98 are 24000/1001.
+
+    Parameters
+    ----------
+    fps
+        Positive. A fraction is taken as it is.
+    """
+    if isinstance(fps, Fraction):
+        return fps
+    if not (np.isfinite(fps) and fps > 0.0):
+        raise ValueError(f"{fps} frames per second")
+    if abs(fps - round(fps)) > 1e-6:
+        ntsc = NTSC * round(fps / NTSC)
+        if ntsc > 0 and abs(float(ntsc) - fps) < NTSC_TOLERANCE:
+            return ntsc
+    return Fraction(fps).limit_denominator(1001)
+
+
+def _container(file: Path, codec: Codec) -> Any:
+    # bitexact: Matroska would otherwise carry a random number, MP4 the name of the muxer's version
+    options = {"fflags": "+bitexact"}
+    if codec.container != "matroska":
+        options["movflags"] = "+faststart+write_colr"
+    return av.open(str(file), "w", format=codec.container, container_options=options)
+
+
+def _stream(container: Any, codec: Codec, fps: Fraction, options: dict[str, str]) -> Any:
+    os.environ.setdefault("SVT_LOG", "1")  # SVT-AV1 has no other way to keep it from stderr: errors only
+    stream = container.add_stream(codec.encoder, rate=fps, options=options)
+    stream.codec_context.time_base = 1 / fps
+    return stream
+
+
+def _tag(target: Any, view: View, pixels: str) -> None:
+    target.color_primaries = BT709
+    target.color_trc = view.transfer
+    target.colorspace = IDENTITY_MATRIX if _is_rgb(pixels) else BT709
+    target.color_range = FULL if _is_rgb(pixels) else LIMITED
+
+
+def _is_rgb(pixels: str) -> bool:
+    return pixels.startswith("gbr")
+
+
+def _pictures(
+    frames: Iterable[F32], shape: tuple[int, int, int], view: View, pixels: str, bits: int
+) -> Iterator[Any]:
+    index = -1
+    for index, linear in enumerate(frames):
+        if linear.shape != shape:
+            raise ImageError(f"frame {index} of the video has shape {linear.shape}, not {shape}")
+        if np.isnan(linear).any():
+            raise ImageError(f"frame {index} of the video holds a NaN; it can't be encoded")
+        picture = _picture(view.encode(linear), pixels, bits)
+        _tag(picture, view, pixels)
+        picture.pts = index
+        yield picture
+    if index < 0:
+        raise ImageError("a video of no frames can't be encoded")
+
+
+def _picture(encoded: F32, pixels: str, bits: int) -> Any:
+    height, width = encoded.shape[:2]
+    if _is_rgb(pixels):
+        planes = tuple(quantized(encoded[..., c], bits, unit=2.0**bits - 1.0) for c in (1, 2, 0))
+    else:
+        planes = planes_from_rgb(encoded, bits=bits, is_halved="420" in pixels)
+    picture = av.VideoFrame(width, height, pixels)
+    for plane, values in zip(picture.planes, planes, strict=True):
+        rows = np.zeros((plane.height, plane.line_size), np.uint8)
+        raw = np.ascontiguousarray(values).view(np.uint8)
+        rows[:, : raw.shape[1]] = raw
+        plane.update(rows)
+    return picture

@@ -1,0 +1,127 @@
+"""A sequence of images, wherever it comes from: a folder, a pattern, a video, a run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+from enfilade.codec import read_json
+from enfilade.errors import ImageError
+from enfilade.records import F32
+from enfilade.video.decode import DEMUXERS, VideoFile
+from enfilade.video.images import SUFFIXES, ImageFiles
+
+__all__ = ["Sequence", "open_sequence"]
+
+NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
+
+
+class Sequence(Protocol):
+    """Images of one size, in order, read one at a time: memory doesn't grow with their number."""
+
+    width: int
+    height: int
+    fps: float | None
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        ...
+
+    def __iter__(self) -> Iterator[F32]:
+        """Frames as (H, W, 3) float32 linear Rec.709; a second iteration begins anew.
+
+        Raises ``ImageError``, naming the frame, where one can't be read or has another size.
+        """
+        ...
+
+    def name(self, index: int) -> str:
+        """Name of a frame, for messages."""
+        ...
+
+    def layers(self, index: int) -> dict[str, Any]:
+        """All layers of an OpenEXR frame; ``ImageError`` for anything else."""
+        ...
+
+
+def open_sequence(source: Path | str) -> Sequence:
+    """Open an image sequence to be read.
+
+    Parameters
+    ----------
+    source
+        A folder of images of one kind (OpenEXR, PNG, JPEG), in natural order of their names; a run folder,
+        of which the finished frames are taken; one image; a pattern (``f.%04d.exr``, ``f.####.png``,
+        ``f*.jpg``); or a video.
+
+    Returns
+    -------
+    Sequence
+
+    Raises
+    ------
+    ImageError
+        There is no such file, no image in the folder, or the first one can't be read.
+    """
+    path = Path(source)
+    if path.is_dir():
+        return _from_folder(path)
+    if path.is_file():
+        suffix = path.suffix.lower()
+        if suffix in DEMUXERS:
+            return VideoFile(path)
+        if suffix in SUFFIXES:
+            return ImageFiles([path])
+        known = ", ".join(sorted(SUFFIXES | set(DEMUXERS)))
+        raise ImageError(f"{path}: can't tell what a {suffix or 'file without suffix'} is; read are: {known}")
+    files = _matching(path)
+    if not files:
+        raise ImageError(f"there is no file, folder or pattern with files {path}")
+    return ImageFiles(files)
+
+
+def _from_folder(folder: Path) -> ImageFiles:
+    run = folder / "run.json"
+    fps = _fps_of_run(run) if run.is_file() else None
+    place = folder / "frames" if run.is_file() else folder
+    files = _images(place.iterdir()) if place.is_dir() else []
+    if not files:
+        raise ImageError(f"{place} has no images in it; read are: {', '.join(sorted(SUFFIXES))}")
+    kinds = {file.suffix.lower() for file in files}
+    if len(kinds) > 1:
+        raise ImageError(
+            f"{place} has images of several kinds ({', '.join(sorted(kinds))}); give a pattern such as "
+            f"{place}/*{min(kinds)}"
+        )
+    return ImageFiles(files, fps)
+
+
+def _matching(pattern: Path) -> list[Path]:
+    name = pattern.name
+    if not pattern.parent.is_dir():
+        return []
+    if NUMBER_FIELD.search(name):
+        parts = [re.escape(part) for part in NUMBER_FIELD.split(name)]
+        wanted = re.compile(r"(-?\d+)".join(parts))
+        return _images(f for f in pattern.parent.iterdir() if wanted.fullmatch(f.name))
+    return _images(pattern.parent.glob(name)) if any(c in name for c in "*?[") else []
+
+
+def _images(files: Iterator[Path]) -> list[Path]:
+    chosen = [f for f in files if f.suffix.lower() in SUFFIXES and not f.name.startswith(".") and f.is_file()]
+    return sorted(chosen, key=_natural)
+
+
+def _natural(file: Path) -> tuple[list[tuple[int, int, str]], str]:
+    # numbers by value; one that begins the name may be negative
+    parts = re.findall(r"^-?\d+|\d+|\D+", file.stem)
+    key = [(0, int(p), "") if p.lstrip("-").isdigit() else (1, 0, p.lower()) for p in parts]
+    return key, file.name
+
+
+def _fps_of_run(file: Path) -> float | None:
+    value = read_json(file)
+    for key in ("identity", "path", "fps"):
+        value = value.get(key) if isinstance(value, dict) else None
+    return float(value) if isinstance(value, int | float) and value > 0 else None

@@ -1,0 +1,117 @@
+"""R'G'B' <-> Y'CbCr (ITU-T H.273, 8.3), by ourselves: the same bytes on any machine.
+
+FFmpeg's converter takes BT.601 where it is not told otherwise, rounds as its SIMD does, and repeats chroma.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.records import F32
+
+__all__ = ["BT601", "BT709", "planes_from_rgb", "quantized", "rgb_from_planes"]
+
+Plane = npt.NDArray[Any]
+
+BT709 = (0.2126, 0.0722)  # K_R, K_B, ITU-R BT.709-6, item 3.2
+BT601 = (0.299, 0.114)  # K_R, K_B, ITU-R BT.601-7, 2.5.1
+
+
+def planes_from_rgb(rgb: F32, *, bits: int, is_halved: bool) -> tuple[Plane, Plane, Plane]:
+    """Encode as Y', Cb, Cr of BT.709 in limited range.
+
+    Parameters
+    ----------
+    rgb : (H, W, 3) float32
+        Encoded (not linear) values, 0..1.
+    bits
+        Of a sample: 8 (uint8 planes) to 16 (uint16).
+    is_halved
+        Whether chroma has half the columns and rows (4:2:0), placed on the left luma column between two
+        rows, as H.264 and AV1 take it where nothing is said.
+
+    Returns
+    -------
+    tuple of (H, W), (H', W'), (H', W') uint8 or uint16
+        Half sizes are rounded up.
+    """
+    kr, kb = BT709
+    luma = rgb @ np.array([kr, 1.0 - kr - kb, kb], np.float32)
+    blue = (rgb[..., 2] - luma) / np.float32(2.0 * (1.0 - kb))
+    red = (rgb[..., 0] - luma) / np.float32(2.0 * (1.0 - kr))
+    if is_halved:
+        blue, red = _halved(blue), _halved(red)
+    y, cb, cr = (
+        quantized(values * scale + zero, bits, unit=2.0 ** (bits - 8))
+        for values, scale, zero in ((luma, 219.0, 16.0), (blue, 224.0, 128.0), (red, 224.0, 128.0))
+    )
+    return y, cb, cr
+
+
+def rgb_from_planes(
+    planes: tuple[Plane, Plane, Plane], *, bits: int, weights: tuple[float, float], is_full_range: bool
+) -> F32:
+    """Decode Y', Cb, Cr to encoded R'G'B', the inverse of :func:`planes_from_rgb`.
+
+    Parameters
+    ----------
+    planes : tuple of (H, W), (H', W'), (H', W')
+        Chroma of full or half columns and rows; half columns lie on the left luma column.
+    bits
+        Of a sample.
+    weights
+        K_R and K_B: :data:`BT709` or :data:`BT601`.
+    is_full_range
+        0..255 in place of 16..235 (of 8 bits).
+
+    Returns
+    -------
+    (H, W, 3) float32
+        0..1, clipped.
+    """
+    kr, kb = weights
+    height, width = planes[0].shape
+    unit = np.float32(2.0 ** (bits - 8))
+    top = np.float32(2.0**bits - 1.0)
+    black, luma_span, chroma_span = (0.0, top, top) if is_full_range else (16 * unit, 219 * unit, 224 * unit)
+    luma = (planes[0].astype(np.float32) - np.float32(black)) / np.float32(luma_span)
+    blue, red = (
+        _doubled((plane.astype(np.float32) - 128 * unit) / np.float32(chroma_span), height, width)
+        for plane in planes[1:]
+    )
+    r = luma + np.float32(2.0 * (1.0 - kr)) * red
+    b = luma + np.float32(2.0 * (1.0 - kb)) * blue
+    g = (luma - np.float32(kr) * r - np.float32(kb) * b) / np.float32(1.0 - kr - kb)
+    rgb: F32 = np.clip(np.stack([r, g, b], axis=2), 0.0, 1.0)
+    return rgb
+
+
+def quantized(values: F32, bits: int, *, unit: float) -> Plane:
+    """Round to integers of so many bits, ``floor(unit * values + 1/2)``, clipped to their range."""
+    rounded = np.floor(values * np.float32(unit) + np.float32(0.5))
+    integers: Plane = np.clip(rounded, 0.0, 2.0**bits - 1.0).astype(np.uint8 if bits == 8 else np.uint16)
+    return integers
+
+
+def _halved(plane: F32) -> F32:
+    height, width = plane.shape
+    # columns: weights 1 2 1 around every even one
+    wide = np.pad(plane, ((0, height % 2), (1, 1 + width % 2)), mode="edge")
+    columns = 0.25 * wide[:, :-2:2] + 0.5 * wide[:, 1:-1:2] + 0.25 * wide[:, 2::2]
+    # rows: mean of each pair
+    halved: F32 = (0.5 * (columns[0::2] + columns[1::2])).astype(np.float32)
+    return halved
+
+
+def _doubled(plane: F32, height: int, width: int) -> F32:
+    if plane.shape[1] < width:
+        nxt = np.pad(plane, ((0, 0), (0, 1)), mode="edge")[:, 1:]
+        plane = np.stack([plane, 0.5 * (plane + nxt)], axis=2).reshape(plane.shape[0], -1)[:, :width]
+    if plane.shape[0] < height:
+        around = np.pad(plane, ((1, 1), (0, 0)), mode="edge")
+        above, below = 0.25 * around[:-2] + 0.75 * plane, 0.25 * around[2:] + 0.75 * plane
+        plane = np.stack([above, below], axis=1).reshape(-1, plane.shape[1])[:height]
+    return plane

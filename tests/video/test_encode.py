@@ -1,0 +1,182 @@
+"""Videos: colours and tags as decoded again, the same bytes, and what can't be encoded."""
+
+from __future__ import annotations
+
+import hashlib
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from enfilade.errors import ImageError, RunFolderError, SettingsError
+from enfilade.pixels.tone import srgb_encode
+from enfilade.settings import VideoSettings
+from enfilade.video import encode_video, exact_fps, open_sequence, video_suffix
+
+CODECS = ("h264", "ffv1", "av1", "prores")
+BARS = np.float32(
+    [
+        (1, 0, 0),
+        (0, 1, 0),
+        (0, 0, 1),
+        (1, 1, 1),
+        (0, 0, 0),
+        (0.18, 0.18, 0.18),
+        (0.5, 0.2, 0.05),
+        (0.02, 0.1, 0.3),
+    ]
+)
+
+
+def bars(height=64, width=128, count=3):
+    columns = np.arange(width) * len(BARS) // width
+    return [np.ascontiguousarray(np.broadcast_to(BARS[columns], (height, width, 3)))] * count
+
+
+def encoded(file, frames, *, fps=24.0, exposure_ev=0.0, **settings):
+    height, width = frames[0].shape[:2] if frames else (64, 64)
+    encode_video(
+        file,
+        iter(frames),
+        fps=fps,
+        width=width,
+        height=height,
+        settings=VideoSettings(**settings),
+        exposure_ev=exposure_ev,
+    )
+    return file
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_colours_come_back(tmp_path, codec):
+    file = encoded(tmp_path / f"a{video_suffix(codec)}", bars(), codec=codec, quality=10)
+    sequence = open_sequence(file)
+    assert (len(sequence), sequence.width, sequence.height, sequence.fps) == (3, 128, 64, 24.0)
+    frames = list(sequence)
+    assert len(frames) == 3
+    middles = frames[1][32, 8::16]
+    # in code values of sRGB: what 8 bits and a rate factor of 10 leave; FFV1 only rounds
+    tolerance = 0.5 / 4095 if codec == "ffv1" else 0.012
+    assert abs(srgb_encode(middles) - srgb_encode(BARS)).max() < tolerance + 1e-5
+
+
+def test_another_decoder_agrees(tmp_path):
+    file = encoded(tmp_path / "a.mp4", bars(), quality=1)
+    with av.open(str(file)) as container:
+        frame = next(container.decode(video=0))
+        matrices = {m: frame.to_ndarray(format="rgb24", src_colorspace=m) for m in ("itu709", "itu601")}
+    wanted = srgb_encode(BARS) * 255
+    errors = {m: abs(rgb[32, 8::16] - wanted).max() for m, rgb in matrices.items()}
+    assert errors["itu709"] <= 3  # FFmpeg's converter truncates
+    assert errors["itu601"] > 20
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_tags_say_what_was_encoded(tmp_path, codec):
+    file = encoded(tmp_path / f"a{video_suffix(codec)}", bars(), codec=codec)
+    with av.open(str(file)) as container:
+        frame = next(container.decode(video=0))
+        tags = (frame.color_primaries, frame.color_trc, int(frame.colorspace), int(frame.color_range))
+    # BT.709 primaries, IEC 61966-2-1, BT.709 matrix, limited range; FFV1 holds R'G'B' of full range
+    assert tags == ((1, 13, 0, 2) if codec == "ffv1" else (1, 13, 1, 1))
+    if codec != "ffv1":
+        kind = b"nclc" if codec == "prores" else b"nclx"
+        data = file.read_bytes()
+        at = data.index(b"colr" + kind) + 8
+        assert data[at : at + 6] == bytes([0, 1, 0, 13, 0, 1])
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_same_frames_same_bytes(tmp_path, codec):
+    rng = np.random.default_rng(5)
+    frames = [rng.random((96, 128, 3), np.float32) for _ in range(6)]
+    digests = {
+        hashlib.sha256(
+            encoded(tmp_path / f"{k}{video_suffix(codec)}", frames, codec=codec).read_bytes()
+        ).digest()
+        for k in range(3)
+    }
+    assert len(digests) == 1
+
+
+def test_exposure_and_clipping(tmp_path):
+    frames = [np.full((8, 8, 3), value, np.float32) for value in (0.25, 0.5, 3.0, np.inf, -1.0)]
+    shown = [
+        f.mean() for f in open_sequence(encoded(tmp_path / "a.mkv", frames, codec="ffv1", exposure_ev=1.0))
+    ]
+    np.testing.assert_allclose(shown, (0.5, 1, 1, 1, 0), atol=2e-3)
+
+
+@pytest.mark.parametrize("codec", ["h264", "ffv1", "prores"])
+def test_odd_sizes_keep_their_pixels(tmp_path, codec):
+    file = encoded(tmp_path / f"a{video_suffix(codec)}", bars(65, 121), codec=codec)
+    assert next(iter(open_sequence(file))).shape == (65, 121, 3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "size", "message"),
+    [
+        ({"codec": "mjpeg"}, (64, 64), "h264, ffv1, av1, prores"),
+        ({"codec": "av1"}, (65, 64), "64x65 pixels; choose an even size"),
+        ({"codec": "av1"}, (32, 32), "64 is its least"),
+        ({"codec": "h264", "quality": 60}, (64, 64), "between 0 and 51"),
+        ({"view": "Filmic"}, (64, 64), "set .video. ocio too"),
+        ({"ocio": "/nowhere/config.ocio"}, (64, 64), "/nowhere/config.ocio"),
+    ],
+)
+def test_settings_that_can_not_be_are_said(tmp_path, settings, size, message):
+    with pytest.raises(SettingsError, match=message):
+        encoded(tmp_path / "a.mp4", bars(*size), **settings)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [],
+        [np.full((64, 64, 3), np.nan, np.float32)],
+        [*bars(64, 64), np.zeros((64, 62, 3), np.float32)],
+        [*bars(64, 64), np.full((64, 64, 3), np.nan, np.float32)],
+    ],
+)
+@pytest.mark.parametrize("codec", CODECS)
+def test_bad_frames_leave_the_older_video(tmp_path, frames, codec):
+    file = tmp_path / f"a{video_suffix(codec)}"
+    file.write_text("older")
+    with pytest.raises(ImageError, match=r"no frames|frame [03] of the video"):
+        encoded(file, frames, codec=codec)
+    assert [f.read_text() for f in tmp_path.iterdir()] == ["older"]
+
+
+def test_a_place_that_can_not_be_written_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunFolderError, match=r"file/a\.mp4"):
+        encoded(tmp_path / "file" / "a.mp4", bars())
+
+
+@pytest.mark.parametrize(
+    ("fps", "exact"),
+    [
+        (24, 24),
+        (25.0, 25),
+        (23.976, Fraction(24000, 1001)),
+        (23.98, Fraction(24000, 1001)),
+        (29.97, Fraction(30000, 1001)),
+        (59.94, Fraction(60000, 1001)),
+        (12.5, Fraction(25, 2)),
+        (0.5, Fraction(1, 2)),
+        (Fraction(24000, 1001), Fraction(24000, 1001)),
+    ],
+)
+def test_frames_per_second_are_what_was_meant(tmp_path, fps, exact):
+    assert exact_fps(fps) == exact
+    file = encoded(tmp_path / "a.mp4", bars(16, 16), fps=fps)
+    with av.open(str(file)) as container:
+        assert container.streams.video[0].average_rate == exact
+
+
+@pytest.mark.parametrize("fps", [0.0, -1.0, float("nan"), float("inf")])
+def test_impossible_rates_are_refused(fps):
+    with pytest.raises(ValueError, match="frames per second"):
+        exact_fps(fps)

@@ -1,0 +1,174 @@
+"""Sequences: every source read as the same pixels, in order, and refused by name where they can't be."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from enfilade.codec import write_exr
+from enfilade.errors import ImageError
+from enfilade.pixels.tone import srgb_decode
+from enfilade.video import open_sequence
+
+RNG = np.random.default_rng(2)
+
+
+def exr(file, value=0.5, size=(4, 6)):
+    write_exr(file, {"RGB": np.full((*size, 3), value, np.float32), "Z": np.ones(size, np.float32)})
+
+
+def png(file, array, mode=None):
+    Image.fromarray(array, mode).save(file)
+
+
+def deep_png(file, pixels):
+    """16 bits a channel, written by FFmpeg's encoder."""
+    height, width, channels = pixels.shape
+    name = "rgb48be" if channels == 3 else "rgba64be"
+    context = av.CodecContext.create("png", "w")
+    context.width, context.height, context.pix_fmt = width, height, name
+    context.time_base = Fraction(1)
+    frame = av.VideoFrame(width, height, name)
+    rows = np.zeros((height, frame.planes[0].line_size), np.uint8)
+    raw = pixels.astype(">u2").reshape(height, -1).view(np.uint8)
+    rows[:, : raw.shape[1]] = raw
+    frame.planes[0].update(rows)
+    file.write_bytes(b"".join(bytes(p) for p in [*context.encode(frame), *context.encode(None)]))
+
+
+def means(sequence):
+    return [round(float(frame.mean()), 4) for frame in sequence]
+
+
+def test_a_folder_is_read_in_natural_order(tmp_path):
+    for name, value in (("-0002", 1), ("-0001", 2), ("0000", 3), ("0009", 4), ("9999", 5), ("10000", 6)):
+        exr(tmp_path / f"{name}.exr", value)
+    (tmp_path / "notes.txt").write_text("")
+    (tmp_path / ".0001.writing-1-a.exr").write_text("")
+    sequence = open_sequence(tmp_path)
+    assert means(sequence) == means(sequence) == [1, 2, 3, 4, 5, 6]
+    assert (len(sequence), sequence.width, sequence.height, sequence.fps) == (6, 6, 4, None)
+    assert sequence.name(1).endswith("-0001.exr")
+    assert set(sequence.layers(0)) == {"RGB", "Z"}
+
+
+@pytest.mark.parametrize(
+    "pattern", ["shot-%04d.exr", "shot-%d.exr", "shot-####.exr", "shot-*.exr", "shot-[0-9]*.exr"]
+)
+def test_patterns(tmp_path, pattern):
+    for k in (1, 2, 10):
+        exr(tmp_path / f"shot-{k}.exr", k)
+        exr(tmp_path / f"other{k}.exr", 0)
+    assert means(open_sequence(str(tmp_path / pattern))) == [1, 2, 10]
+
+
+def test_a_single_image_and_a_run_folder(tmp_path):
+    (tmp_path / "frames").mkdir()
+    exr(tmp_path / "frames" / "0001.exr", 7)
+    assert means(open_sequence(tmp_path / "frames" / "0001.exr")) == [7]
+    (tmp_path / "run.json").write_text(json.dumps({"format": 1, "identity": {"path": {"fps": 23.976}}}))
+    run = open_sequence(tmp_path)
+    assert (means(run), run.fps) == ([7], 23.976)
+
+
+def test_display_referred_images_are_decoded(tmp_path):
+    eight = RNG.integers(0, 256, (4, 6, 3), np.uint8)
+    png(tmp_path / "a.png", eight)
+    expected = srgb_decode(eight.astype(np.float32) / np.float32(255))
+    np.testing.assert_allclose(next(iter(open_sequence(tmp_path / "a.png"))), expected, atol=1e-6)
+    grey = eight[..., 0]
+    png(tmp_path / "g.png", grey)
+    first = next(iter(open_sequence(tmp_path / "g.png")))
+    np.testing.assert_allclose(
+        first[..., 1], srgb_decode(grey.astype(np.float32) / np.float32(255)), atol=1e-6
+    )
+    smooth = np.full((32, 32, 3), (200, 100, 50), np.uint8)
+    Image.fromarray(smooth).save(tmp_path / "a.jpg", quality=95)
+    jpeg = next(iter(open_sequence(tmp_path / "a.jpg")))
+    np.testing.assert_allclose(jpeg[16, 16], srgb_decode(np.float32([200, 100, 50]) / 255), atol=0.01)
+
+
+def test_sixteen_bits_keep_all_of_them(tmp_path):
+    deep = RNG.integers(0, 65536, (5, 7, 3), np.uint16)
+    deep_png(tmp_path / "a.png", deep)
+    expected = srgb_decode(deep.astype(np.float32) / np.float32(65535))
+    np.testing.assert_allclose(next(iter(open_sequence(tmp_path / "a.png"))), expected, atol=1e-6)
+    grey = RNG.integers(0, 65536, (5, 7), np.uint16)
+    Image.fromarray(grey).save(tmp_path / "g.png")
+    first = next(iter(open_sequence(tmp_path / "g.png")))
+    np.testing.assert_allclose(
+        first[..., 2], srgb_decode(grey.astype(np.float32) / np.float32(65535)), atol=1e-4
+    )
+
+
+def test_transparency_is_refused_and_opaque_alpha_dropped(tmp_path):
+    rgba = RNG.integers(0, 256, (4, 6, 4), np.uint8)
+    rgba[..., 3] = 255
+    png(tmp_path / "a.png", rgba)
+    assert next(iter(open_sequence(tmp_path / "a.png"))).shape == (4, 6, 3)
+    rgba[0, 0, 3] = 254
+    png(tmp_path / "a.png", rgba)
+    deep_png(tmp_path / "b.png", rgba.astype(np.uint16) * 257)
+    for name in ("a.png", "b.png"):
+        with pytest.raises(ImageError, match=rf"{name} has transparent pixels"):
+            open_sequence(tmp_path / name)
+
+
+def test_mixed_sizes_name_the_frame(tmp_path):
+    exr(tmp_path / "0001.exr")
+    exr(tmp_path / "0002.exr", size=(4, 8))
+    with pytest.raises(ImageError, match=r"0002\.exr has 8x4 pixels, the first image 0001\.exr 6x4"):
+        list(open_sequence(tmp_path))
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "a.txt").write_text("x")
+    cases = {
+        "empty": "no images in it",
+        "none": "there is no file",
+        "none%04d.exr": "there is no file",
+        "no/where/*.png": "there is no file",
+        "a.txt": "can't tell what a .txt is",
+    }
+    for name, message in cases.items():
+        with pytest.raises(ImageError, match=message):
+            open_sequence(tmp_path / name)
+    (tmp_path / "mixed").mkdir()
+    exr(tmp_path / "mixed" / "a.exr")
+    png(tmp_path / "mixed" / "a.png", np.zeros((4, 6, 3), np.uint8))
+    with pytest.raises(ImageError, match=r"several kinds \(\.exr, \.png\)"):
+        open_sequence(tmp_path / "mixed")
+
+
+def test_foreign_layers(tmp_path):
+    three, one = np.full((4, 6, 3), 0.25, np.float32), np.full((4, 6), 0.5, np.float16)
+    write_exr(tmp_path / "blender.exr", {"View Layer.Combined": three, "View Layer.Depth": one})
+    write_exr(tmp_path / "grey.exr", {"Y": one})
+    write_exr(tmp_path / "depth.exr", {"Z": one})
+    assert means(open_sequence(tmp_path / "blender.exr")) == [0.25]
+    assert means(open_sequence(tmp_path / "grey.exr")) == [0.5]
+    with pytest.raises(ImageError, match="no channels R G B; it has the layers Z"):
+        open_sequence(tmp_path / "depth.exr")
+
+
+@pytest.mark.parametrize("kind", ["exr", "png", "deep.png", "jpg"])
+def test_truncated_images_are_refused_by_name(tmp_path, kind):
+    file = tmp_path / f"a.{kind}"
+    pixels = RNG.integers(0, 256, (40, 40, 3), np.uint8)
+    if kind == "exr":
+        write_exr(file, {"RGB": pixels.astype(np.float32)})
+    elif kind == "deep.png":
+        deep_png(file, pixels.astype(np.uint16) * 251)
+    else:
+        Image.fromarray(pixels).save(file)
+    data = file.read_bytes()
+    for part in range(20):
+        file.write_bytes(data[: len(data) * part // 20])
+        with pytest.raises(ImageError, match=f"a.{kind}"):
+            open_sequence(file)
