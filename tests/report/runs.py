@@ -9,7 +9,12 @@ def made_up_summary(count=120, *, spacing=20, method="paper"):
         keyframe = i % spacing == 0 or i == count - 1
         speed = abs(6.0 * math.sin(i / 17.0)) + 0.3
         slow = max(0.0, 60.0 - 40.0 * speed)
-        row = {"frame": i + 1, "velocity_deg_s": speed, "slow": slow, "specular": 8.0 + 4.0 * math.cos(i / 9.0)}
+        row = {
+            "frame": i + 1,
+            "velocity_deg_s": speed,
+            "slow": slow,
+            "specular": 8.0 + 4.0 * math.cos(i / 9.0),
+        }
         row |= {"hole": 1.5, "keyframe": keyframe}
         row["traced"] = 100.0 if keyframe else row["slow"] + row["specular"] + row["hole"]
         per_frame.append(row)

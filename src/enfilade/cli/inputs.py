@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from enfilade.cli.flags import settings_of
-from enfilade.device import activate
+from enfilade.device import Choice, activate
 
 if TYPE_CHECKING:
     from enfilade.pipeline.job import Job
@@ -73,25 +73,20 @@ def job_options(command: Command) -> Command:
     return command
 
 
-def output_options(command: Command) -> Command:
-    """Decorate a command with how it runs and what it shows."""
-    for decorate in (
-        click.option(
-            "--device",
-            type=click.Choice(("auto", "cpu", "gpu")),
-            default="auto",
-            show_default=True,
-            help="Run on the CPU, on an NVIDIA GPU, or on the GPU where there is one.",
-        ),
-        json_option,
-        quiet_option,
-    )[::-1]:
-        command = decorate(command)
-    return command
-
-
+device_option = click.option(
+    "--device",
+    type=click.Choice(("auto", "cpu", "gpu")),
+    default="auto",
+    show_default=True,
+    help="Run on the CPU, on an NVIDIA GPU, or on the GPU where there is one.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, for programs.")
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+
+
+def output_options(command: Command) -> Command:
+    """Decorate a command with where it runs and what it shows."""
+    return device_option(json_option(quiet_option(command)))
 
 
 def job_of(
@@ -103,7 +98,7 @@ def job_of(
     frames: str | None,
     fps: float | None,
     method: str,
-    device: str,
+    device: Choice,
 ) -> Job:
     """Put together what to render; everything wrong in it raises here, before any work.
 
@@ -115,7 +110,7 @@ def job_of(
         The device is not there.
     """
     settings = settings_of(ctx)
-    activate(device)  # type: ignore[arg-type]  # click has checked the choice
+    activate(device)
     from enfilade.path import load_path, parse_frames
     from enfilade.pipeline.job import Job
 

@@ -13,7 +13,7 @@ from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
 
 
-@click.command("plan", cls=SettingsCommand)
+@click.command("plan", cls=SettingsCommand, short_help="What rendering would take, without shading a pixel.")
 @job_options
 @click.option(
     "--plot",

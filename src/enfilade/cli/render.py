@@ -13,7 +13,9 @@ from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
 
 
-@click.command("render", cls=SettingsCommand)
+@click.command(
+    "render", cls=SettingsCommand, short_help="Render a walkthrough: frames, video, report of the cost."
+)
 @job_options
 @click.option(
     "--out",

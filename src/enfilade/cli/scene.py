@@ -13,7 +13,7 @@ from enfilade.cli.inputs import json_option
 from enfilade.scenes import PRESETS, SCENES
 
 
-@click.command("scene")
+@click.command("scene", short_help="Write one of the two generated scenes.")
 @click.argument("name", type=click.Choice(SCENES))
 @click.option(
     "--out",

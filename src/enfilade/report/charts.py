@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 from matplotlib.ticker import MaxNLocator
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "mark_keyframes",
     "new_figure",
     "save",
+    "save_map",
     "stack",
 ]
 
@@ -111,4 +113,17 @@ def save(figure: Figure, file: Path) -> Path:
     """Write a PNG, its folder made if absent."""
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, format="png", metadata={"Software": "enfilade"})
+    return file
+
+
+def save_map(values: npt.NDArray[np.float32], file: Path) -> Path:
+    """Write a map of values in 0..1 as a PNG of its own size: black is 0, pale yellow is 1.
+
+    Parameters
+    ----------
+    values : (H, W) float32
+    file
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    imsave(file, values, vmin=0.0, vmax=1.0, cmap="magma", format="png", metadata={"Software": "enfilade"})
     return file

@@ -19,6 +19,9 @@ SOURCES = {  # Table 1, in its order: key of the summary, heading
 }
 
 
+WORST_FRAMES = 8  # of a comparison: what fits on a screen
+
+
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
     """Tables 1 and 2 of a finished run.
 
@@ -88,9 +91,35 @@ def _forecast_table(forecast: Mapping[str, Any]) -> Table:
     for key, value in forecast.items():
         if isinstance(value, Mapping):
             for source, share in value.items():
-                table.add_row(f"{key.replace('_', ' ')}: {source.replace('_', ' ')}", _figure(share))
+                table.add_row(f"{_title(key)}: {_title(source)}", _figure(source, share))
         else:
-            table.add_row(key.replace("_", " "), _figure(value))
+            table.add_row(_title(key), _figure(key, value))
+    return table
+
+
+def comparison_table(found: Mapping[str, Any]) -> Table:
+    """What the metric says of two sequences, and of the frames where it sees most.
+
+    Parameters
+    ----------
+    found
+        ``SequenceDifference.to_dict()``.
+    """
+    width, height = found["size"]
+    table = _table("", "frame", "visible, %", "score, JND", "PSNR, dB", "velocity, deg/s")
+    rows = found["per_frame"]
+    for row in sorted(rows, key=lambda r: -r["percent_visible"])[:WORST_FRAMES]:
+        table.add_row(row["name"], *_difference(row, row["percent_visible"], row["score_jnd"]))
+    if len(rows) > WORST_FRAMES:
+        table.caption = f"the {WORST_FRAMES} frames with most; --json lists all"
+    table.add_section()
+    velocity = sum(row["velocity_deg_s"] for row in rows) / len(rows)
+    mean = {"psnr_db": found["psnr_db"], "velocity_deg_s": velocity}
+    table.add_row("mean", *_difference(mean, found["percent_visible"]["mean"], found["score_jnd"]["mean"]))
+    density = f"{found['pixels_per_degree']:.1f} pixels per degree"
+    table.title = (
+        f"Visible differences: {len(rows)} frames, {width}x{height}, {density}, {found['fps']:g} fps"
+    )
     return table
 
 
@@ -115,9 +144,21 @@ def seconds(value: float) -> str:
     return f"{value:.2f} s" if value >= 0.1 else f"{1000.0 * value:.1f} ms"
 
 
-def _figure(value: Any) -> str:
+def _title(key: str) -> str:
+    name, _, unit = key.rpartition("_")
+    return f"{name.replace('_', ' ')}, percent" if unit == "percent" else key.replace("_", " ")
+
+
+def _difference(row: Mapping[str, Any], visible: float, score: float) -> list[str]:
+    psnr = "identical" if row["psnr_db"] is None else f"{row['psnr_db']:.2f}"
+    return [percent(visible), f"{score:.3f}", psnr, f"{row['velocity_deg_s']:.2f}"]
+
+
+def _figure(key: str, value: Any) -> str:
+    if key in ("seconds", "total_s"):
+        return seconds(float(value))
     if isinstance(value, float):
-        return f"{value:,.2f}" if abs(value) < 1000.0 else f"{value:,.0f}"
+        return percent(value) if abs(value) < 1000.0 else f"{value:,.0f}"
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 

@@ -1,0 +1,52 @@
+"""``enfilade doctor``: what is installed, which variant will run, and how to get what is missing."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from enfilade.cli.group import FAILURE, debug_option
+from enfilade.cli.inputs import device_option, json_option
+
+if TYPE_CHECKING:
+    from enfilade.device import Choice
+    from enfilade.pipeline.installation import Check
+
+
+@click.command("doctor", short_help="What is installed, what is missing and how to get it.")
+@device_option
+@json_option
+@debug_option
+@click.pass_context
+def command(ctx: click.Context, /, *, device: Choice, as_json: bool) -> None:
+    """Say what is installed, which variant will run, what is missing and how to get it."""
+    from enfilade.pipeline.installation import examine
+
+    checks = examine(device)
+    missing = [check for check in checks if check.is_required and not check.is_ok]
+    if as_json:
+        report = {"is_ready": not missing, "checks": [check.to_dict() for check in checks]}
+        click.echo(json.dumps(report, indent=2))
+    else:
+        _show(checks)
+        names = ", ".join(check.name for check in missing)
+        click.echo(f"Missing: {names}." if missing else "Ready to render.")
+    if missing:
+        ctx.exit(FAILURE)
+
+
+def _show(checks: list[Check]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for heading in ("", "what", "found, or how to get it"):
+        table.add_column(heading, overflow="fold")
+    for check in checks:
+        mark = "ok" if check.is_ok else ("MISSING" if check.is_required else "none")
+        table.add_row(mark, check.name, Text("; ".join(filter(None, (check.found, check.remedy)))))
+    Console().print(table)

@@ -1,0 +1,1 @@
+"""Where the stages meet: plan, keyframes, refinement, in-betweens, result."""

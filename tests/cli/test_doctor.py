@@ -1,0 +1,56 @@
+"""``enfilade doctor`` says what is there, and ends with 1 where something required is missing."""
+
+import importlib.metadata
+import json
+
+import pytest
+
+from enfilade.pipeline import installation
+from enfilade.pipeline.installation import Check, examine
+
+
+def test_this_machine_is_ready(run):
+    result = run("doctor", "--device", "cpu")
+    assert result.exit_code == 0, result.output
+    assert "Ready to render." in result.stdout
+    assert "llvm_ad_rgb" in result.stdout
+
+
+def test_as_json(run):
+    report = json.loads(run("doctor", "--json").stdout)
+    found = {check["name"]: check for check in report["checks"]}
+    assert report["is_ready"]
+    assert found["mitsuba"]["found"] == importlib.metadata.version("mitsuba")
+    assert found["codec h264"]["found"] == "libx264"
+    assert any(name.startswith("LLVM") for name in found)
+
+
+def test_a_missing_package_is_named_with_its_remedy(run, monkeypatch):
+    version = importlib.metadata.version
+
+    def without_mitsuba(name):
+        if name in ("mitsuba", "opencolorio"):
+            raise importlib.metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(installation.importlib.metadata, "version", without_mitsuba)
+    result = run("doctor")
+    assert result.exit_code == 1
+    assert "Missing: mitsuba." in result.stdout
+    checks = {check.name: check for check in examine()}
+    assert "mitsuba" in checks["mitsuba"].remedy
+    extra = checks["opencolorio (extra ocio)"]
+    assert (extra.is_required, extra.remedy) == (False, "pip install 'enfilade[ocio]'")
+
+
+def test_what_is_optional_does_not_fail(run, monkeypatch):
+    checks = [Check("enfilade", "1"), Check("NVIDIA GPU", "", False, "a GPU")]
+    monkeypatch.setattr(installation, "examine", lambda _: checks)
+    assert run("doctor").exit_code == 0
+
+
+@pytest.mark.parametrize("device", ["cpu", "auto"])
+def test_every_check_has_a_name_and_a_finding_or_a_remedy(device):
+    for check in examine(device):
+        assert check.name
+        assert check.found or check.remedy

@@ -1,0 +1,50 @@
+"""What the commands print: tables for people, JSON for programs, results on stdout only."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "report"))
+from runs import made_up_plan, made_up_summary
+
+
+def test_render_prints_both_tables_and_names_its_files(run, jobs, camera_path):
+    jobs.answer = {**made_up_summary(), "plots": ["runs/demo/plots/walkthrough.png"], "dropped_samples": 3}
+    output = run("render", "s.xml", "--path", camera_path, "--out", "runs/demo").stdout
+    for words in ("Table 1", "34.1", "Table 2", "antialias", "3 samples", "video.mp4", "walkthrough.png"):
+        assert words in output
+    assert output.splitlines()[-1].split() == ["run", "runs/demo"]
+
+
+def test_plan_prints_a_table_and_draws(run, jobs, camera_path, tmp_path):
+    jobs.answer = made_up_plan()
+    plot = tmp_path / "plan.png"
+    output = run("plan", "s.xml", "--path", camera_path, "--plot", plot).stdout
+    assert "4 initial keyframes: 1, 21, 41, 60" in output
+    assert str(plot) in output.replace("\n", "")
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_plan_as_json(run, jobs, camera_path):
+    jobs.answer = made_up_plan()
+    assert json.loads(run("plan", "s.xml", "--path", camera_path, "--json").stdout) == made_up_plan()
+
+
+def test_scene_says_what_to_type_next(run, tmp_path):
+    folder = tmp_path / "a room"
+    result = run("scene", "room", "--out", folder, "--preset", "small")
+    assert result.exit_code == 0
+    assert (folder / "scene.xml").exists()
+    assert f"enfilade render '{folder}/scene.xml' --path '{folder}/camera_path.json'" in result.stdout
+
+
+def test_scene_as_json(run, tmp_path):
+    files = json.loads(run("scene", "room", "--out", tmp_path, "--preset", "small", "--json").stdout)
+    assert all(Path(file).exists() for file in files.values())
+
+
+@pytest.mark.parametrize("arguments", [("scene", "kitchen", "--out", "x"), ("scene", "room")])
+def test_scene_refuses(run, arguments):
+    assert run(*arguments).exit_code == 2

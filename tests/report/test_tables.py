@@ -1,0 +1,57 @@
+"""Tables 1 and 2 hold the figures of the summary."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from runs import made_up_plan, made_up_summary
+
+from enfilade.report.tables import as_text, percent, plan_tables, run_tables, seconds
+
+
+def rows(table):
+    return [line.split() for line in as_text(table).splitlines() if line.strip()]
+
+
+def test_table_1_has_the_papers_columns():
+    table = rows(run_tables(made_up_summary())[0])
+    assert table[1] == ["method", "slow", "specular", "occlusion", "keyframes", "total"]
+    assert table[-1] == ["paper", "20.0", "7.9", "0.43", "5.8", "34.1"]
+
+
+def test_table_2_lists_the_stages_and_adds_up():
+    table = rows(run_tables(made_up_summary())[1])
+    assert ["fill", "2.5", "min", "4.8", "min", "1.25", "s", "62.5"] in table
+    assert table[-1] == ["total", "4.0", "min", "7.2", "min", "2.00", "s", "100.0"]
+
+
+def test_frames_may_be_a_list():
+    summary = {**made_up_summary(), "frames": list(range(1, 61))}
+    assert ["fill", "2.5", "min", "4.8", "min", "2.50", "s", "62.5"] in rows(run_tables(summary)[1])
+
+
+def test_plan():
+    walk, forecast = (as_text(table) for table in plan_tables(made_up_plan()))
+    assert "60 frames, 4 initial keyframes: 1, 21, 41, 60" in walk
+    assert "123,456,789" in forecast
+    assert "8.5 min" in forecast
+
+
+def test_many_keyframes_are_cut_short():
+    plan = {**made_up_plan(), "keyframes": list(range(1, 61, 2))}
+    assert "21, 23, ... 59" in as_text(plan_tables(plan)[0])
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(7200.0, "2.00 h"), (150.0, "2.5 min"), (99.5, "99.50 s"), (0.1, "0.10 s"), (0.0123, "12.3 ms")],
+)
+def test_seconds(value, text):
+    assert seconds(value) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.0, "0.0"), (0.3, "0.30"), (40.81, "40.8"), (100.0, "100.0")])
+def test_percent(value, text):
+    assert percent(value) == text
