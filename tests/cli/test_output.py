@@ -1,13 +1,11 @@
 """What the commands print: tables for people, JSON for programs, results on stdout only."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "report"))
-from runs import made_up_plan, made_up_summary
+from made_up_runs import made_up_plan, made_up_summary
 
 
 def test_render_prints_both_tables_and_names_its_files(run, jobs, camera_path):

@@ -1,18 +1,14 @@
 """The plots show what the summary says: the axes are read, not the pixels."""
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from runs import made_up_plan, made_up_summary
-
 from enfilade.errors import RunFolderError
 from enfilade.report.charts import frame_edges
 from enfilade.report.plots import plan_figure, plot_plan, plot_run, walkthrough_figure
+from made_up_runs import made_up_plan, made_up_summary
 
 
 def lines(ax):

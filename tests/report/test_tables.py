@@ -1,14 +1,9 @@
 """Tables 1 and 2 hold the figures of the summary."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from runs import made_up_plan, made_up_summary
-
 from enfilade.report.tables import as_text, percent, plan_tables, run_tables, seconds
+from made_up_runs import made_up_plan, made_up_summary
 
 
 def rows(table):
