@@ -58,6 +58,24 @@ def activate(choice: Choice = "auto") -> Device:
     return device
 
 
+def active() -> Device:
+    """The device that Dr.Jit's automatic array types stand for now.
+
+    Raises
+    ------
+    DeviceError
+        Neither LLVM nor CUDA is usable here.
+    """
+    import drjit as dr
+
+    if dr.has_backend(dr.JitBackend.CUDA):
+        from drjit.auto.ad import Float
+
+        if dr.backend_v(Float) == dr.JitBackend.CUDA:
+            return Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version()))
+    return _llvm()
+
+
 def _llvm() -> Device:
     import drjit as dr
 

@@ -83,6 +83,20 @@ class CameraPath:
         """Pixels."""
         return self.cameras[0].height
 
+    def neighbours(self, frame: int) -> tuple[Camera | None, Camera | None]:
+        """Cameras of the previous and the next frame; None at the ends of a shot."""
+        previous = None if frame == 0 or frame in self.cuts else self.cameras[frame - 1]
+        is_last = frame == len(self) - 1 or frame + 1 in self.cuts
+        return previous, None if is_last else self.cameras[frame + 1]
+
+    def original(self, frame: int) -> int:
+        """First frame of the run of equal views to which a frame belongs: itself where it moves."""
+        while frame > 0 and frame not in self.cuts:
+            if not self.cameras[frame].is_same_view(self.cameras[frame - 1]):
+                break
+            frame -= 1
+        return frame
+
     def shots(self) -> list[range]:
         """Runs of frames without a cut between them."""
         starts = sorted({0, *self.cuts})
@@ -246,24 +260,35 @@ class Warped:
 
 @dataclass(frozen=True)
 class Segment:
-    """Two keyframes and the frames between them, as indices on the path (§4.3)."""
+    """Two keyframes and the frames between them, as indices on the path (§4.3).
+
+    Attributes
+    ----------
+    first, last : int
+        The keyframes.
+    depth : int
+        How often an initial segment was split to make this one.
+    """
 
     first: int
     last: int
-
-    @property
-    def middle(self) -> int:
-        """The frame that the metric looks at."""
-        return (self.first + self.last) // 2
+    depth: int = 0
 
     @property
     def inbetweens(self) -> range:
         """Frames that are neither keyframe."""
         return range(self.first + 1, self.last)
 
-    def split(self) -> tuple[Segment, Segment]:
-        """Two halves that share the middle frame."""
-        return Segment(self.first, self.middle), Segment(self.middle, self.last)
+    def progress(self, frame: int) -> float:
+        """Where a frame lies between the keyframes, 0..1."""
+        return (frame - self.first) / (self.last - self.first)
+
+    def split(self, frame: int) -> tuple[Segment, Segment]:
+        """Two halves that share a frame."""
+        return (
+            Segment(self.first, frame, self.depth + 1),
+            Segment(frame, self.last, self.depth + 1),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, matrix3, opaque, vector3
 from enfilade.backends.scenefile import fingerprint
 from enfilade.camera import Camera
-from enfilade.device import Device
+from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
@@ -43,8 +43,6 @@ class MitsubaRenderer:
         A scene in Mitsuba's XML format, version 3.
     settings
         Longest path, and how many paths may be in flight.
-    device
-        What runs the kernels; its variant becomes Mitsuba's.
 
     Raises
     ------
@@ -52,10 +50,11 @@ class MitsubaRenderer:
         The file is missing, malformed, or refused by Mitsuba.
     """
 
-    def __init__(self, file: Path, settings: TraceSettings, device: Device) -> None:
+    def __init__(self, file: Path, settings: TraceSettings) -> None:
         if not file.is_file():
             raise SceneError(f"there is no scene file {file}")
-        mi.set_variant(device.variant)
+        self._device = active()
+        mi.set_variant(self._device.variant)
         mi.set_log_level(mi.LogLevel.Error)
         try:
             # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
@@ -72,7 +71,6 @@ class MitsubaRenderer:
         self._sampler = _lane_sampler()
         self._items = _items(scene)
         self._file = file
-        self._device = device
 
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""

@@ -1,0 +1,135 @@
+"""From raw frames to the result: antialiasing along the flow, files, and the video (§5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from enfilade.antialias import (
+    Slice,
+    filter_along_flow,
+    reconstruct,
+    spatial_support_px,
+    temporal_limits,
+)
+from enfilade.codec import read_exr, write_result
+from enfilade.geometry import positions
+from enfilade.pipeline.inbetween import read_raw
+from enfilade.pipeline.workshop import Workshop
+from enfilade.records import F32, U8, Flow, Frame, Geometry, Source
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.video import encode_video, video_suffix
+
+
+def result_unit(workshop: Workshop, frame: int) -> str:
+    """Name of a delivered frame in the ledger."""
+    return f"frame {workshop.number(frame)}"
+
+
+def antialias_shot(workshop: Workshop, shot: range) -> None:
+    """Filter the frames of a shot and write them.
+
+    Memory is bounded by the frames that the filter spans, whatever the length of the shot.
+    """
+    settings = workshop.job.settings.antialias
+    reach = max(settings.frames, settings.slow_frames) // 2
+    window: dict[int, _Raw] = {}
+    for frame in shot:
+        if not workshop.run.done(result_unit(workshop, frame)):
+            span = range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
+            window = {f: window[f] if f in window else _raw(workshop, f) for f in span}
+            color = _filtered(workshop, frame, window)
+            here = window[frame]
+            made = Frame(color, here.source)
+            _write(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
+        workshop.monitor.advance()
+
+
+def trace_reference(workshop: Workshop, frame: int) -> None:
+    """Trace and antialias a whole frame by itself: what the savings are measured against (ART)."""
+    if workshop.run.done(result_unit(workshop, frame)):
+        return
+    view = workshop.views[frame]
+    pixel_filter = PixelFilter[workshop.job.settings.trace.pixel_filter.name]
+    everything = np.ones(view.geometry.item.shape, bool)
+    shading = workshop.trace(frame, everything, Purpose.REFERENCE, pixel_filter)
+    source = np.full(everything.shape, Source.KEYFRAME, np.uint8)
+    made = Frame(shading.color.reshape(*everything.shape, 3), source)
+    _write(workshop, frame, view.geometry, view.flow, made, shading.dropped)
+
+
+def write_video(workshop: Workshop) -> str:
+    """Encode the finished frames; returns the file's name in the run folder."""
+    job = workshop.job
+    file = workshop.run.folder / f"video{video_suffix(job.settings.video.codec)}"
+    workshop.monitor.stage("video", len(job.path))
+    if not workshop.run.done("video"):
+        with workshop.costs.of("video"):
+            encode_video(
+                file,
+                _finished(workshop),
+                fps=job.path.fps,
+                width=job.path.width,
+                height=job.path.height,
+                settings=job.settings.video,
+                exposure_ev=job.settings.viewing.exposure_ev,
+            )
+        workshop.finish("video", [file])
+    return file.name
+
+
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """A frame before the temporal filter, and why its pixels have their values."""
+
+    slice: Slice
+    source: U8
+
+
+def _raw(workshop: Workshop, frame: int) -> _Raw:
+    view = workshop.views[frame]
+    with workshop.costs.of("files"):
+        raw = read_raw(workshop, frame)
+    support = spatial_support_px(view.speed_deg_s, workshop.job.settings.antialias)
+    with workshop.costs.of("antialias"):
+        color = reconstruct(raw.color, support)
+    return _Raw(Slice(color, view.geometry, view.flow), raw.source)
+
+
+def _filtered(workshop: Workshop, frame: int, window: dict[int, _Raw]) -> F32:
+    settings = workshop.job.settings.antialias
+    here = window[frame].slice
+    speed_deg_s = workshop.job.viewing.velocity_deg_s(here.flow.speed)
+    with workshop.costs.of("antialias"):
+        return filter_along_flow(
+            here,
+            [window[f].slice for f in sorted(window, reverse=True) if f < frame],
+            [window[f].slice for f in sorted(window) if f > frame],
+            temporal_limits(speed_deg_s, here.geometry, settings),
+            settings,
+        )
+
+
+def _write(workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made: Frame, dropped: int) -> None:
+    file = workshop.run.file("frames", workshop.number(frame))
+    with workshop.costs.of("files"):
+        write_result(
+            file,
+            made.color,
+            made.source,
+            geometry,
+            flow,
+            position=positions(geometry),
+            attributes={"framesPerSecond": float(workshop.job.path.fps)},
+        )
+    workshop.finish(result_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
+
+
+def _finished(workshop: Workshop) -> Iterator[F32]:
+    for frame in range(len(workshop.job.path)):
+        file = workshop.run.file("frames", workshop.number(frame))
+        workshop.run.check(file)
+        yield read_exr(file)["RGB"].astype(np.float32)
+        workshop.monitor.advance()

@@ -1,0 +1,182 @@
+"""Adaptive refinement of keyframe placement: the metric decides which segments are split (§4.3)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from enfilade.antialias import reconstruct, spatial_support_px
+from enfilade.masks import item_pixels, slow_pixels, visible_items
+from enfilade.metric import Pursuit
+from enfilade.pipeline.views import View
+from enfilade.pipeline.workshop import Workshop
+from enfilade.pixels.tone import display_luminance
+from enfilade.records import F32, Mask, Segment, Warped
+from enfilade.warp import agrees, warp_keyframe
+
+JUDGED_SHARE = 0.01  # of the image: fewer unmasked pixels than this say nothing about a segment
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the metric says of a segment.
+
+    Attributes
+    ----------
+    middle : int or None
+        The frame that was judged; None where there was none to judge.
+    items : tuple of int
+        Specular items that must be traced in the whole segment.
+    percent_visible, percent_visible_no_pursuit : float
+        Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
+    is_split : bool
+    """
+
+    middle: int | None
+    items: tuple[int, ...] = ()
+    percent_visible: float = 0.0
+    percent_visible_no_pursuit: float = 0.0
+    is_split: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a plain table, fit for JSON."""
+        return {**asdict(self), "items": list(self.items)}
+
+    @staticmethod
+    def from_dict(table: dict[str, Any]) -> Verdict:
+        """Read back from :meth:`to_dict`."""
+        return Verdict(**{**table, "items": tuple(table["items"])})
+
+
+def refine(workshop: Workshop, segment: Segment) -> list[tuple[Segment, Verdict]]:
+    """Split a segment until what is reused in it can't be told from what is traced.
+
+    Returns
+    -------
+    list of (Segment, Verdict)
+        The segments that remain, in order.
+    """
+    verdict = _recorded(workshop, segment) or _judge_and_record(workshop, segment)
+    workshop.monitor.advance()
+    if not verdict.is_split or verdict.middle is None:
+        return [(segment, verdict)]
+    halves = segment.split(verdict.middle)
+    workshop.monitor.extend(len(halves))
+    return [kept for half in halves for kept in refine(workshop, half)]
+
+
+def segment_unit(workshop: Workshop, segment: Segment) -> str:
+    """Name of a segment's refinement in the ledger."""
+    return f"segment {workshop.number(segment.first)}-{workshop.number(segment.last)}"
+
+
+def _recorded(workshop: Workshop, segment: Segment) -> Verdict | None:
+    line = workshop.run.done(segment_unit(workshop, segment))
+    return Verdict.from_dict(line["verdict"]) if line else None
+
+
+def _judge_and_record(workshop: Workshop, segment: Segment) -> Verdict:
+    workshop.keyframe(segment.first)
+    workshop.keyframe(segment.last)
+    verdict = judge(workshop, segment)
+    workshop.finish(
+        segment_unit(workshop, segment),
+        [],
+        first=workshop.number(segment.first),
+        last=workshop.number(segment.last),
+        middle=None if verdict.middle is None else workshop.number(verdict.middle),
+        depth=segment.depth,
+        verdict=verdict.to_dict(),
+    )
+    return verdict
+
+
+def judge(workshop: Workshop, segment: Segment) -> Verdict:
+    """Warp both keyframes to the middle, and let the metric look for differences (§4.3, 2-5)."""
+    path, settings = workshop.job.path, workshop.job.settings
+    moving = [frame for frame in segment.inbetweens if path.original(frame) == frame]
+    if not moving:
+        return Verdict(None)
+    middle = moving[(len(moving) - 1) // 2]
+    view = workshop.views[middle]
+    before, after = warped_pair(workshop, segment, middle)
+
+    # Where both keyframes see the surface, the metric has something to compare.
+    tolerance = settings.warp.depth_tolerance
+    is_judged = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
+    with workshop.costs.of("metric"):
+        jnd, jnd_no_pursuit = _differences(workshop, view, before, after, is_judged)
+
+    # Mask out what will be traced: slow pixels, then specular items whose reuse would be seen.
+    items = visible_items(jnd, is_judged, view.geometry, settings.masks)
+    is_slow = slow_pixels(view.speed_deg_s, settings.masks)
+    rest = is_judged & ~is_slow & ~item_pixels(view.geometry.item, items)
+    percent, percent_no_pursuit = (_percent_visible(j, rest) for j in (jnd, jnd_no_pursuit))
+    return Verdict(
+        middle=middle,
+        items=tuple(sorted(items)),
+        percent_visible=percent,
+        percent_visible_no_pursuit=percent_no_pursuit,
+        is_split=percent > settings.masks.split_percent,
+    )
+
+
+def warped_pair(workshop: Workshop, segment: Segment, frame: int) -> tuple[Warped, Warped]:
+    """Both keyframes of a segment, seen from a frame between them."""
+    first, last = workshop.keyframe(segment.first), workshop.keyframe(segment.last)
+    camera, settings = workshop.job.path.cameras[frame], workshop.job.settings.warp
+    with workshop.costs.of("warp"):
+        return warp_keyframe(first, camera, settings), warp_keyframe(last, camera, settings)
+
+
+def _differences(
+    workshop: Workshop, view: View, before: Warped, after: Warped, is_judged: Mask
+) -> tuple[F32, F32]:
+    """JND maps between two warped keyframes, with smooth pursuit and without.
+
+    Both are filtered as the viewer will see them, and a difference that their noise explains does
+    not count.
+    """
+    support = spatial_support_px(view.speed_deg_s, workshop.job.settings.antialias)
+    shown = [
+        _shown(workshop, np.where(one.is_hole[..., None], other.color, one.color), support)
+        for one, other in ((before, after), (after, before))
+    ]
+    noise = _shown_variance(workshop, before.variance + after.variance)
+    pursuits = (Pursuit.PURSUIT, Pursuit.NONE)
+    jnd, jnd_no_pursuit = (
+        workshop.aqm.compare(
+            *shown,
+            velocity=view.velocity_deg_s,
+            valid=is_judged,
+            noise_variance=noise,
+            pursuit=pursuit,
+        ).jnd
+        for pursuit in pursuits
+    )
+    return jnd, jnd_no_pursuit
+
+
+def _shown(workshop: Workshop, color: F32, support: F32) -> F32:
+    of = workshop.job.settings.viewing
+    return display_luminance(
+        reconstruct(color, support),
+        exposure_ev=of.exposure_ev,
+        peak_cd_m2=of.peak_cd_m2,
+        black_cd_m2=of.black_cd_m2,
+    )
+
+
+def _shown_variance(workshop: Workshop, variance: F32) -> F32:
+    """Variance on the screen, (cd/m2)^2: exposure and screen are linear but for the clipping."""
+    of = workshop.job.settings.viewing
+    slope = 2.0**of.exposure_ev * (of.peak_cd_m2 - of.black_cd_m2)
+    return (variance * slope**2).astype(np.float32)
+
+
+def _percent_visible(jnd: F32, where: Mask) -> float:
+    if where.mean() < JUDGED_SHARE:
+        return 0.0
+    return 100.0 * float((jnd[where] > 1.0).mean())

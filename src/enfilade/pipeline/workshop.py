@@ -1,0 +1,104 @@
+"""What the stages of one run share: renderer, settings, run folder, and the keyframes in it."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+
+from enfilade.codec import read_shading, write_shading
+from enfilade.masks import slow_pixels
+from enfilade.metric import Aqm
+from enfilade.monitor import Monitor
+from enfilade.pipeline.cost import Costs
+from enfilade.pipeline.job import Job
+from enfilade.pipeline.views import Views
+from enfilade.records import Keyframe, Mask, Shading
+from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.store import Run
+
+KEPT = 3  # keyframes kept in memory
+
+
+class Workshop:
+    """Where a run is made. It knows how to trace, and what has been made already.
+
+    Attributes
+    ----------
+    job, renderer, run, monitor
+    views : Views
+    costs : Costs
+    aqm : Aqm
+    """
+
+    def __init__(self, job: Job, renderer: Renderer, run: Run, monitor: Monitor) -> None:
+        self.job = job
+        self.renderer = renderer
+        self.run = run
+        self.monitor = monitor
+        self.costs = Costs()
+        self.views = Views(renderer, job.path, job.viewing, self.costs)
+        self.aqm = Aqm(job.viewing, mask_slope=job.settings.metric.mask_slope, workers=2)
+        self._keyframes: OrderedDict[int, Keyframe] = OrderedDict()
+
+    def number(self, frame: int) -> int:
+        """Number by which the user knows a frame."""
+        return self.job.path.numbers[frame]
+
+    def trace(self, frame: int, where: Mask, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
+        """Path trace some pixels of a frame, as a list in the order of the lanes."""
+        settings = self.job.settings.trace
+        with self.costs.of("trace"):
+            return self.renderer.trace(
+                self.job.path.cameras[frame],
+                np.flatnonzero(where).astype(np.uint32),
+                spp=settings.spp,
+                seed=settings.seed,
+                frame=self.number(frame),
+                purpose=purpose,
+                pixel_filter=pixel_filter,
+            )
+
+    def keyframe(self, frame: int) -> Keyframe:
+        """A keyframe: from memory, from the run folder, or traced now."""
+        if frame in self._keyframes:
+            self._keyframes.move_to_end(frame)
+            return self._keyframes[frame]
+        keyframe = Keyframe(frame, self.views[frame].geometry, self._keyframe_shading(frame))
+        self._keyframes[frame] = keyframe
+        if len(self._keyframes) > KEPT:
+            self._keyframes.popitem(last=False)
+        return keyframe
+
+    def finish(self, unit: str, files: list[Any], **facts: Any) -> None:
+        """Record a unit of work as done, with its costs."""
+        self.run.finish(unit, files=files, facts={**facts, "cost": self.costs.take()})
+
+    def _keyframe_shading(self, frame: int) -> Shading:
+        unit, file = f"keyframe {self.number(frame)}", self.run.file("keyframes", self.number(frame))
+        if self.run.done(unit):
+            self.run.check(file)
+            return read_shading(file)
+        shading = self._trace_keyframe(frame)
+        write_shading(file, shading)
+        self.finish(unit, [file], frame=self.number(frame), dropped=shading.dropped)
+        return shading
+
+    def _trace_keyframe(self, frame: int) -> Shading:
+        """Trace a frame whole.
+
+        Paths begin at the pixels' centres, where the geometry was found: what is warped must lie on
+        one surface. Slow pixels are not warped (§4.1), and no later filter would find new samples for
+        them (§5.2): their paths are spread over the pixel.
+        """
+        is_slow = slow_pixels(self.views[frame].speed_deg_s, self.job.settings.masks)
+        color = np.zeros((*is_slow.shape, 3), np.float32)
+        variance = np.zeros(is_slow.shape, np.float32)
+        dropped = 0
+        for where, pixel_filter in ((~is_slow, PixelFilter.CENTRE), (is_slow, PixelFilter.BOX)):
+            if where.any():
+                part = self.trace(frame, where, Purpose.KEYFRAME, pixel_filter)
+                color[where], variance[where] = part.color, part.variance
+                dropped += part.dropped
+        return Shading(color, variance, dropped)
