@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from enfilade.metric.cortex import CortexTransform, Partition, bands
-from enfilade.metric.pyramid import double, halved_shape
 from enfilade.viewing import Viewing
 
 PPD = Viewing(640, 480).pixels_per_degree
@@ -95,9 +94,3 @@ def test_orientation_is_that_of_the_frequency_vector():
     cortex = CortexTransform(64, 96, PPD)
     loudest = max(every_channel(cortex, upright), key=lambda found: np.abs(found[2]).max())
     assert loudest[1] == 3  # theta = 0: the vector points along x
-
-
-@pytest.mark.parametrize("length", [1, 2, 5, 16, 481])
-def test_reduced_maps_span_the_image(length):
-    coarse = np.ones(halved_shape((length, length), 2), np.float32)
-    np.testing.assert_array_equal(double(coarse, (length, length)), np.ones((length, length)))

@@ -38,7 +38,7 @@ Float32Array: TypeAlias = npt.NDArray[np.float32]
 DARKEST_CD_M2 = 1e-3  # an image darker than this on average is judged as if it were this bright
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pair:
     """Two images on their way through the channels.
 
