@@ -127,7 +127,20 @@ def test_segments_split_until_nothing_is_between(first, length):
     while todo:
         segment = todo.pop()
         seen.update((segment.first, segment.last))
+        assert segment.depth <= 5  # log2 of 24, rounded up
         if len(segment.inbetweens):
-            assert segment.middle in segment.inbetweens
-            todo.extend(segment.split())
+            middle = segment.inbetweens[len(segment.inbetweens) // 2]
+            assert 0 < segment.progress(middle) < 1
+            todo.extend(segment.split(middle))
     assert seen == set(range(first, first + length + 1))
+
+
+def test_neighbours_and_rest_end_at_a_cut():
+    other = Camera(look_at((1, 0, 1), (0, 0, 0)), 50.0, W, H)
+    path = CameraPath((CAMERA, other, other, other, other, CAMERA), tuple(range(6)), 24.0, frozenset({3}))
+    assert path.neighbours(0) == (None, other)
+    assert path.neighbours(1) == (CAMERA, other)
+    assert path.neighbours(2) == (other, None)
+    assert path.neighbours(3) == (None, other)
+    assert path.neighbours(5) == (other, None)
+    assert [path.original(frame) for frame in range(6)] == [0, 1, 1, 3, 3, 5]

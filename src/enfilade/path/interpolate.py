@@ -33,7 +33,8 @@ def interpolate_values(knots: Matrix, values: Matrix, times: Matrix) -> Matrix:
 
     if len(knots) == 1:
         return np.repeat(values, len(times), axis=0)
-    result: Matrix = PchipInterpolator(knots, values, axis=0)(times)
+    with np.errstate(over="ignore"):  # the reciprocal of a denormal slope; its mean is rightly 0
+        result: Matrix = PchipInterpolator(knots, values, axis=0)(times)
     return result
 
 
@@ -83,7 +84,8 @@ def interpolate_rotations(knots: Matrix, rotations: Matrix, times: Matrix) -> Ma
     at_key = Rotation.from_matrix(rotations)
     turn = (at_key[:-1].inv() * at_key[1:]).as_rotvec()
     travelled = np.concatenate([np.zeros((1, 3)), np.cumsum(turn, axis=0)])
-    rate = PchipInterpolator(knots, travelled, axis=0).derivative()(knots)
+    with np.errstate(over="ignore"):
+        rate = PchipInterpolator(knots, travelled, axis=0).derivative()(knots)
 
     # control rotations of the cubic Bézier curve of each interval
     span = np.diff(knots)[:, None]
