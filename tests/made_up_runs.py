@@ -6,17 +6,13 @@ import math
 def made_up_summary(count=120, *, spacing=20, method="paper"):
     per_frame = []
     for i in range(count):
-        keyframe = i % spacing == 0 or i == count - 1
+        is_keyframe = method == "reference" or i % spacing == 0 or i == count - 1
         speed = abs(6.0 * math.sin(i / 17.0)) + 0.3
-        slow = max(0.0, 60.0 - 40.0 * speed)
-        row = {
-            "frame": i + 1,
-            "velocity_deg_s": speed,
-            "slow": slow,
-            "specular": 8.0 + 4.0 * math.cos(i / 9.0),
-        }
-        row |= {"hole": 1.5, "keyframe": keyframe}
-        row["traced"] = 100.0 if keyframe else row["slow"] + row["specular"] + row["hole"]
+        shares = {"slow": 0.0, "specular": 0.0, "hole": 0.0, "keyframe": 100.0}
+        if not is_keyframe:
+            shares = {"slow": max(0.0, 60.0 - 40.0 * speed), "specular": 8.0 + 4.0 * math.cos(i / 9.0)}
+            shares |= {"hole": 1.5, "keyframe": 0.0}
+        row = {"frame": i + 1, "velocity_deg_s": speed, **shares, "traced": sum(shares.values())}
         per_frame.append(row)
     return {
         "frames": count,
@@ -36,11 +32,11 @@ def made_up_summary(count=120, *, spacing=20, method="paper"):
             },
         },
         "per_frame": per_frame,
-        "segments": _segments(count, spacing),
+        "segments": [] if method == "reference" else _segments(count, spacing),
         "dropped_samples": 0,
         "peak_memory_bytes": 2_000_000_000,
-        "video": "runs/demo/video.mp4",
-        "plots": [],
+        "video": "video.mp4",
+        "split_percent": 10.0,
     }
 
 

@@ -6,6 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from enfilade.cli import main
+from made_up_runs import made_up_summary
 
 
 @pytest.fixture
@@ -30,13 +31,19 @@ def camera_path(tmp_path):
 @pytest.fixture
 def jobs(monkeypatch):
     """Stands for the pipeline: takes the jobs that the command line makes, and does what it is told."""
-    told = SimpleNamespace(seen=[], answer={}, error=None)
+    told = SimpleNamespace(seen=[], answer=made_up_summary(), error=None)
 
-    def take(job, *_):
+    def take(job):
         told.seen.append(job)
         if told.error is not None:
             raise told.error
         return told.answer
+
+    def render(job, folder, monitor):
+        answer = take(job)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "summary.json").write_text(json.dumps(answer))
+        return answer
 
     def plan(job, monitor):
         answer = take(job)
@@ -46,6 +53,6 @@ def jobs(monkeypatch):
         monkeypatch.setitem(sys.modules, f"enfilade.pipeline.{name}", SimpleNamespace(**members))
 
     fake("job", Job=SimpleNamespace)
-    fake("walkthrough", render=take)
+    fake("walkthrough", render=render)
     fake("plan", plan=plan)
     return told

@@ -1,7 +1,6 @@
 """Flags, the TOML file and defaults, in that order of strength."""
 
 import dataclasses
-import json
 
 import click
 import pytest
@@ -15,7 +14,9 @@ from enfilade.settings import Metering, Placement, Settings, sections
 @pytest.fixture
 def settings(run, jobs, camera_path):
     def made(*flags):
-        result = run("render", "s.xml", "--path", camera_path, "--out", "run", "--json", *flags)
+        result = run(
+            "render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", "--json", *flags
+        )
         assert result.exit_code == 0, result.output
         return jobs.seen[-1].settings
 
@@ -62,15 +63,13 @@ def test_every_setting_has_a_flag():
 
 
 def test_size_frames_fps_method(run, jobs, camera_path):
-    jobs.answer = {"frames": 2}
-    result = run(
-        *("render", "s.xml", "--path", camera_path, "--out", "run", "--json"),
+    run(
+        *("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", "--json"),
         *("--size", "128x96", "--frames", "1-3:2", "--fps", "30", "--method", "reference"),
     )
     job = jobs.seen[-1]
     assert (job.path.width, job.path.height, job.path.numbers, job.path.fps) == (128, 96, (1, 3), 30.0)
     assert (str(job.scene), job.method) == ("s.xml", "reference")
-    assert json.loads(result.stdout) == {"frames": 2}
 
 
 @pytest.mark.parametrize(
@@ -94,7 +93,7 @@ def test_size_frames_fps_method(run, jobs, camera_path):
     ],
 )
 def test_wrong_input_is_one_message_and_2(run, jobs, camera_path, flags, words):
-    result = run("render", "s.xml", "--path", camera_path, "--out", "run", *flags)
+    result = run("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", *flags)
     assert result.exit_code == 2
     assert jobs.seen == []
     assert result.stdout == ""
@@ -118,7 +117,7 @@ def test_a_wrong_file_names_the_place(run, jobs, camera_path, tmp_path, text, wo
     file = tmp_path / "look.toml"
     file.write_text(text)
     flags = ("--settings", file, "--keyframes-adaptation", "0.25")
-    result = run("render", "s.xml", "--path", camera_path, "--out", "run", *flags)
+    result = run("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", *flags)
     assert result.exit_code == 2
     for word in words:
         assert word in result.stderr

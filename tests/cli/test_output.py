@@ -8,12 +8,25 @@ import pytest
 from made_up_runs import made_up_plan, made_up_summary
 
 
-def test_render_prints_both_tables_and_names_its_files(run, jobs, camera_path):
-    jobs.answer = {**made_up_summary(), "plots": ["runs/demo/plots/walkthrough.png"], "dropped_samples": 3}
-    output = run("render", "s.xml", "--path", camera_path, "--out", "runs/demo").stdout
-    for words in ("Table 1", "34.1", "Table 2", "antialias", "3 samples", "video.mp4", "walkthrough.png"):
+def test_render_prints_both_tables_and_names_its_files(run, jobs, camera_path, tmp_path):
+    jobs.answer = {**made_up_summary(), "dropped_samples": 3}
+    folder = tmp_path / "run"
+    output = run("render", "s.xml", "--path", camera_path, "--out", folder).stdout
+    for words in ("Table 1", "34.1", "Table 2", "antialias", "3 samples"):
         assert words in output
-    assert output.splitlines()[-1].split() == ["run", "runs/demo"]
+    assert output.splitlines()[-3:] == [
+        f"video   {folder}/video.mp4",
+        f"plot    {folder}/plots/walkthrough.png",
+        f"run     {folder}",
+    ]
+    assert (folder / "plots" / "walkthrough.png").exists()
+
+
+def test_render_as_json(run, jobs, camera_path, tmp_path):
+    result = run("render", "s.xml", "--path", camera_path, "--out", tmp_path, "--json", "--quiet")
+    plots = [str(tmp_path / "plots" / "walkthrough.png")]
+    assert json.loads(result.stdout) == {**made_up_summary(), "folder": str(tmp_path), "plots": plots}
+    assert result.stderr == ""
 
 
 def test_plan_prints_a_table_and_draws(run, jobs, camera_path, tmp_path):

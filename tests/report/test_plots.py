@@ -74,10 +74,7 @@ def test_every_panel_has_units_and_a_legend():
 
 
 def test_a_reference_run_has_no_predictions_and_no_marks():
-    summary = {**made_up_summary(method="reference"), "segments": []}
-    for row in summary["per_frame"]:
-        row["keyframe"] = True
-    figure = walkthrough_figure(summary)
+    figure = walkthrough_figure(made_up_summary(method="reference"))
     assert len(figure.axes) == 2
     assert "keyframes" not in lines(figure.axes[0])
 

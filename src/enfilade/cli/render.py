@@ -37,13 +37,23 @@ def command(ctx: click.Context, /, *, folder: Path, as_json: bool, quiet: bool, 
 
     with watch(quiet=quiet) as monitor:
         summary = render(job, folder, monitor)
+    from enfilade.report.plots import plot_run
+
+    plots = plot_run(folder)
     if as_json:
-        click.echo(json.dumps(summary, indent=2))
+        extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
+        click.echo(json.dumps({**summary, **extra}, indent=2))
         return
-    _show(summary, folder)
+    _show(summary)
+    for name, file in (
+        ("video", folder / summary["video"]),
+        *(("plot", plot) for plot in plots),
+        ("run", folder),
+    ):
+        click.echo(f"{name:7} {file}")
 
 
-def _show(summary: dict[str, Any], folder: Path) -> None:
+def _show(summary: dict[str, Any]) -> None:
     from rich.console import Console
 
     from enfilade.report.tables import run_tables
@@ -51,10 +61,5 @@ def _show(summary: dict[str, Any], folder: Path) -> None:
     console = Console()
     for table in run_tables(summary):
         console.print(table)
-    if summary.get("dropped_samples"):
+    if summary["dropped_samples"]:
         click.echo(f"{summary['dropped_samples']} samples were NaN or infinite and were left out.")
-    if summary.get("video"):
-        click.echo(f"video   {summary['video']}")
-    for plot in summary.get("plots", []):
-        click.echo(f"plot    {plot}")
-    click.echo(f"run     {folder}")

@@ -11,7 +11,6 @@ from typing import Any
 from enfilade.errors import RunFolderError
 from enfilade.report.charts import (
     BLUE,
-    GREY,
     INK,
     SOURCE_COLORS,
     VERMILION,
@@ -143,12 +142,10 @@ def _draw_predictions(ax: Any, segments: Sequence[Mapping[str, Any]], threshold:
 
 
 def _draw_traced(ax: Any, frames: Sequence[int], rows: Sequence[Mapping[str, Any]], mean: float) -> None:
-    whole = [100.0 if row["keyframe"] else 0.0 for row in rows]
+    names = {"slow": "slow", "specular": "specular", "hole": "holes", "keyframe": "keyframes"}
     shares: dict[str, tuple[str, Sequence[float]]] = {
-        name: (SOURCE_COLORS[key], [0.0 if row["keyframe"] else float(row[key]) for row in rows])
-        for name, key in (("slow", "slow"), ("specular", "specular"), ("holes", "hole"))
+        name: (SOURCE_COLORS[key], [float(row[key]) for row in rows]) for key, name in names.items()
     }
-    shares["keyframes"] = (GREY, whole)
     stack(ax, frames, shares)
     ax.axhline(mean, color=INK, linestyle="--", linewidth=1.0, label=f"mean {mean:.1f} %")
     ax.set_ylabel("traced, % of pixels")
