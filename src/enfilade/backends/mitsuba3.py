@@ -199,7 +199,8 @@ class _Items:
 
 def _items(scene: Any) -> _Items:
     shapes = scene.shapes()
-    registry = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(s))[0]) for s in shapes]
+    numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes]
+    registry = [int(number[0]) for number in numbers]
     number = np.zeros(max(registry) + 1, np.uint32)
     is_passable = np.zeros(max(registry) + 1, bool)
     names = []
@@ -283,7 +284,7 @@ def _integrator(scene: Any, max_depth: int) -> Any:
 def _lane_sampler() -> Any:
     """A Mitsuba sampler that draws from generators of ours, one a lane."""
 
-    class LaneSampler(mi.Sampler):  # type: ignore[misc]
+    class LaneSampler(mi.Sampler):
         def __init__(self) -> None:
             super().__init__(mi.Properties())
             self.rng = PCG32()

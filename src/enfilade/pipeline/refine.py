@@ -161,19 +161,21 @@ def _differences(
 
 def _shown(workshop: Workshop, color: F32, support: F32) -> F32:
     of = workshop.job.settings.viewing
-    return display_luminance(
+    shown: F32 = display_luminance(
         reconstruct(color, support),
         exposure_ev=of.exposure_ev,
         peak_cd_m2=of.peak_cd_m2,
         black_cd_m2=of.black_cd_m2,
     )
+    return shown
 
 
 def _shown_variance(workshop: Workshop, variance: F32) -> F32:
     """Variance on the screen, (cd/m2)^2: exposure and screen are linear but for the clipping."""
     of = workshop.job.settings.viewing
     slope = 2.0**of.exposure_ev * (of.peak_cd_m2 - of.black_cd_m2)
-    return (variance * slope**2).astype(np.float32)
+    shown: F32 = (variance * slope**2).astype(np.float32)
+    return shown
 
 
 def _percent_visible(jnd: F32, where: Mask) -> float:

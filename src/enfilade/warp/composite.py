@@ -47,7 +47,8 @@ def agrees(warped: Warped, geometry: Geometry, tolerance: float) -> Mask:
     """Pixels at which a warped keyframe shows the surface that the frame itself sees, (H, W)."""
     difference = np.abs(warped.depth - geometry.depth)
     is_same = (warped.item == geometry.item) & (difference <= tolerance * geometry.depth)
-    return ~warped.is_hole & is_same
+    agreed: Mask = ~warped.is_hole & is_same
+    return agreed
 
 
 def _confidence(warped: Warped, geometry: Geometry, tolerance: float) -> F32:

@@ -109,8 +109,8 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     height, width = camera.height, camera.width
     source, splats = keyframe.geometry.camera, landing.splats
     is_hole = keys == EMPTY
-    winner = UInt(keys & 0xFFFF_FFFF)
-    depth = dr.reinterpret_array(Float, UInt(keys >> 32))
+    winner: Any = UInt(keys & 0xFFFF_FFFF)
+    depth: Any = dr.reinterpret_array(Float, UInt(keys >> 32))
 
     # Where in the keyframe does this pixel's centre lie?
     _, column, row = pixel_grid(height, width)

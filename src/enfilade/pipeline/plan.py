@@ -1,0 +1,181 @@
+"""Everything that can be known of a walkthrough before it is shaded, and what it will cost."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from enfilade.monitor import Monitor
+from enfilade.pipeline.cost import Costs
+from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.survey import Survey, initial_segments, survey_path
+from enfilade.pipeline.views import Views
+from enfilade.records import Keyframe, Segment, Shading
+from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.warp import composite, warp_keyframe
+
+HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
+PROBE_PIXELS, PROBE_SPP = 4096, 16  # paths traced to learn what a path costs
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What rendering a walkthrough will take, as far as geometry tells.
+
+    Attributes
+    ----------
+    frames : tuple of int
+        Numbers of the frames.
+    mean_speed_deg_s, slow_percent, specular_percent : tuple of float
+        Of each frame.
+    hole_percent : tuple of float or None
+        Pixels that neither keyframe sees, in the frames where that was looked for.
+    keyframes : tuple of int
+        Numbers of the initial keyframes.
+    segments : tuple of dict
+        ``first``, ``last`` and ``middle`` of each initial segment.
+    forecast : dict
+        ``traced_percent`` of all pixels when every specular surface has to be traced, and
+        ``traced_percent_least`` when none has; the share of each reason; ``paths`` and ``seconds``
+        of tracing for the former. Segments that the metric will split are not foreseen.
+    """
+
+    frames: tuple[int, ...]
+    mean_speed_deg_s: tuple[float, ...]
+    slow_percent: tuple[float, ...]
+    specular_percent: tuple[float, ...]
+    hole_percent: tuple[float | None, ...]
+    keyframes: tuple[int, ...]
+    segments: tuple[dict[str, int], ...]
+    forecast: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain tables, fit for JSON."""
+        return asdict(self)
+
+
+def plan(job: Job, monitor: Monitor) -> Plan:
+    """Look at every frame of a path, place the initial keyframes, and estimate the cost.
+
+    Nothing is shaded but a handful of paths, which tell how long one takes.
+
+    Raises
+    ------
+    SceneError
+    DeviceError
+    """
+    renderer = open_renderer(job.scene, job.settings.trace)
+    views = Views(renderer, job.path, job.viewing, Costs())
+    survey = survey_path(views, job.path, job.settings, monitor)
+    shots = initial_segments(job.path, survey, job.settings)
+    segments = [segment for shot in shots for segment in shot]
+    holes = _expected_holes(job, views, segments, monitor)
+
+    numbers = job.path.numbers
+    keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
+    return Plan(
+        frames=numbers,
+        mean_speed_deg_s=survey.speed_deg_s,
+        slow_percent=survey.slow_percent,
+        specular_percent=survey.specular_percent,
+        hole_percent=tuple(holes.get(frame) for frame in range(len(job.path))),
+        keyframes=tuple(numbers[k] for k in keyframes),
+        segments=tuple(
+            {
+                "first": numbers[s.first],
+                "last": numbers[s.last],
+                "middle": numbers[(s.first + s.last) // 2],
+            }
+            for s in segments
+        ),
+        forecast=_forecast(job, survey, segments, holes, _path_seconds(job, renderer)),
+    )
+
+
+def _expected_holes(job: Job, views: Views, segments: list[Segment], monitor: Monitor) -> dict[int, float]:
+    """Share of holes at a few frames of each segment, percent, by warping the geometry alone."""
+    monitor.stage("holes", len(segments))
+    holes: dict[int, float] = {}
+    for segment in segments:
+        length = segment.last - segment.first
+        probed = {segment.first + round(length * share) for share in HOLE_PROBES}
+        for frame in sorted(probed & set(segment.inbetweens)):
+            holes[frame] = _holes(job, views, segment, frame)
+        monitor.advance()
+    return holes
+
+
+def _holes(job: Job, views: Views, segment: Segment, frame: int) -> float:
+    ends = [_unshaded(views, end) for end in (segment.first, segment.last)]
+    settings = job.settings.warp
+    before, after = (warp_keyframe(k, job.path.cameras[frame], settings) for k in ends)
+    _, is_hole = composite(
+        before,
+        after,
+        views[frame].geometry,
+        progress=segment.progress(frame),
+        settings=settings,
+    )
+    return 100.0 * float(is_hole.mean())
+
+
+def _unshaded(views: Views, frame: int) -> Keyframe:
+    geometry = views[frame].geometry
+    size = geometry.item.shape
+    return Keyframe(frame, geometry, Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)))
+
+
+def _path_seconds(job: Job, renderer: Renderer) -> float:
+    """Wall time of one path, from a few thousand spread over the middle frame."""
+    frame = len(job.path) // 2
+    pixels = np.linspace(0, job.path.width * job.path.height - 1, PROBE_PIXELS, dtype=np.uint32)
+    seconds = 0.0
+    for _ in range(2):  # the first compiles
+        begin = time.perf_counter()
+        renderer.trace(
+            job.path.cameras[frame],
+            pixels,
+            spp=PROBE_SPP,
+            seed=job.settings.trace.seed,
+            frame=job.path.numbers[frame],
+            purpose=Purpose.FILL,
+            pixel_filter=PixelFilter.CENTRE,
+        )
+        seconds = time.perf_counter() - begin
+    return seconds / (PROBE_PIXELS * PROBE_SPP)
+
+
+def _forecast(
+    job: Job,
+    survey: Survey,
+    segments: list[Segment],
+    holes: dict[int, float],
+    path_seconds: float,
+) -> dict[str, Any]:
+    count, keyframes = len(job.path), {s.first for s in segments} | {s.last for s in segments}
+    shares = dict.fromkeys(("slow", "specular", "holes", "keyframes"), 0.0)
+    shares["keyframes"] = 100.0 * len(keyframes) / count
+    for segment in segments:
+        known = [holes[f] for f in segment.inbetweens if f in holes]
+        hole = sum(known) / len(known) if known else 0.0
+        for frame in segment.inbetweens:
+            if job.path.original(frame) != frame:
+                continue  # a copy
+            slow = survey.slow_percent[frame]
+            rest = 1.0 - slow / 100.0  # taken as spread evenly over the image
+            shares["slow"] += slow / count
+            shares["specular"] += survey.specular_percent[frame] * rest / count
+            shares["holes"] += hole * rest / count
+    traced = min(sum(shares.values()), 100.0)
+    pixels = count * job.path.width * job.path.height
+    paths = round(traced / 100.0 * pixels * job.settings.trace.spp)
+    return {
+        "traced_percent": traced,
+        "traced_percent_least": min(traced, sum(shares.values()) - shares["specular"]),
+        "shares_percent": shares,
+        "paths": paths,
+        "seconds": paths * path_seconds,
+    }
