@@ -71,13 +71,18 @@ def made_up_plan(count=60):
         "mean_speed_deg_s": speed,
         "slow_percent": [max(0.0, 60.0 - 40.0 * v) for v in speed],
         "specular_percent": [8.0] * count,
-        "hole_percent": [1.0, 2.0, 1.5],
+        "hole_percent": [2.0 if frame in (11, 31, 50) else None for frame in range(1, count + 1)],
         "keyframes": [1, 21, 41, 60],
-        "segments": [{"first": 1, "last": 21}, {"first": 21, "last": 41}, {"first": 41, "last": 60}],
+        "segments": [
+            {"first": 1, "middle": 11, "last": 21},
+            {"first": 21, "middle": 31, "last": 41},
+            {"first": 41, "middle": 50, "last": 60},
+        ],
         "forecast": {
             "traced_percent": 31.5,
+            "traced_percent_least": 24.0,
+            "shares_percent": {"slow": 15.0, "specular": 7.5, "holes": 1.5, "keyframes": 7.5},
             "paths": 123_456_789,
             "seconds": 512.25,
-            "by_source": {"slow": 15.0, "specular": 7.5, "hole": 1.5, "keyframes": 7.5},
         },
     }

@@ -109,15 +109,20 @@ def test_a_run_without_a_readable_summary(tmp_path, text):
         plot_run(tmp_path)
 
 
-def test_plan_with_holes_at_segment_middles(tmp_path):
+def test_plan_with_holes_of_a_few_frames(tmp_path):
     plan = made_up_plan()
     top, bottom = plan_figure(plan).axes
     assert lines(top)["keyframes"][:, 0].tolist() == plan["keyframes"]
-    assert lines(bottom)["holes (estimate)"].tolist() == [[11, 1.0], [31, 2.0], [50, 1.5]]
+    assert lines(bottom)["holes (estimate)"].tolist() == [[11, 2.0], [31, 2.0], [50, 2.0]]
     np.testing.assert_allclose(lines(bottom)["slow"][:, 1], plan["slow_percent"])
     assert plot_plan(plan, tmp_path / "new" / "plan.png").exists()
 
 
 def test_plan_with_holes_per_frame():
-    plan = {**made_up_plan(), "hole_percent": [1.0] * 59 + [None]}
-    assert len(lines(plan_figure(plan).axes[1])["holes (estimate)"]) == 59
+    plan = {**made_up_plan(), "hole_percent": [1.0] * 60}
+    assert len(lines(plan_figure(plan).axes[1])["holes (estimate)"]) == 60
+
+
+def test_plan_without_any_holes_looked_for():
+    plan = {**made_up_plan(), "hole_percent": [None] * 60}
+    assert "holes (estimate)" not in lines(plan_figure(plan).axes[1])

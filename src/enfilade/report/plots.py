@@ -97,13 +97,11 @@ def plan_figure(plan: Mapping[str, Any]) -> Figure:
     for name, key in shares.items():
         line = {"slow": "-", "specular": "--"}[name]
         bottom.plot(frames, plan[key], line, color=SOURCE_COLORS[name], linewidth=1.5, label=name)
-    holes = plan.get("hole_percent") or []
-    at = frames if len(holes) == len(frames) else [_middle(s) for s in plan["segments"]]
-    if len(holes) == len(at):
-        known = [(f, h) for f, h in zip(at, holes, strict=True) if h is not None]
+    holes = [(f, h) for f, h in zip(frames, plan["hole_percent"], strict=True) if h is not None]
+    if holes:
         line = "-." if len(holes) == len(frames) else "D"
         style = {"color": SOURCE_COLORS["hole"], "linewidth": 1.5, "markersize": 4}
-        bottom.plot([f for f, _ in known], [h for _, h in known], line, label="holes (estimate)", **style)
+        bottom.plot(*zip(*holes, strict=True), line, label="holes (estimate)", **style)
     bottom.set_ylabel("pixels, %")
     bottom.set_ylim(bottom=0.0)
     legend(bottom)
@@ -154,9 +152,7 @@ def _draw_traced(ax: Any, frames: Sequence[int], rows: Sequence[Mapping[str, Any
 
 
 def _middle(segment: Mapping[str, Any]) -> int:
-    if "middle" in segment:
-        return int(segment["middle"])
-    return (int(segment["first"]) + int(segment["last"])) // 2
+    return int(segment["middle"])
 
 
 def _is_known(value: object) -> bool:

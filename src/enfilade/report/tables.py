@@ -87,13 +87,15 @@ def _walk_table(plan: Mapping[str, Any]) -> Table:
 
 
 def _forecast_table(forecast: Mapping[str, Any]) -> Table:
-    table = _table("Forecast", "", "value")
-    for key, value in forecast.items():
-        if isinstance(value, Mapping):
-            for source, share in value.items():
-                table.add_row(f"{_title(key)}: {_title(source)}", _figure(source, share))
-        else:
-            table.add_row(_title(key), _figure(key, value))
+    table = _table("Forecast", "", "")
+    table.add_row("pixels traced, percent", percent(forecast["traced_percent"]))
+    for reason, share in forecast["shares_percent"].items():
+        table.add_row(f"  {reason}", percent(share))
+    if "traced_percent_least" in forecast:
+        table.add_row("  if no specular surface has to be", percent(forecast["traced_percent_least"]))
+    table.add_row("paths", f"{forecast['paths']:,}")
+    table.add_row("time of tracing", seconds(forecast["seconds"]))
+    table.caption = "Splits of segments are not foreseen."
     return table
 
 
@@ -144,22 +146,9 @@ def seconds(value: float) -> str:
     return f"{value:.2f} s" if value >= 0.1 else f"{1000.0 * value:.1f} ms"
 
 
-def _title(key: str) -> str:
-    name, _, unit = key.rpartition("_")
-    return f"{name.replace('_', ' ')}, percent" if unit == "percent" else key.replace("_", " ")
-
-
 def _difference(row: Mapping[str, Any], visible: float, score: float) -> list[str]:
     psnr = "identical" if row["psnr_db"] is None else f"{row['psnr_db']:.2f}"
     return [percent(visible), f"{score:.3f}", psnr, f"{row['velocity_deg_s']:.2f}"]
-
-
-def _figure(key: str, value: Any) -> str:
-    if key in ("seconds", "total_s"):
-        return seconds(float(value))
-    if isinstance(value, float):
-        return percent(value) if abs(value) < 1000.0 else f"{value:,.0f}"
-    return f"{value:,}" if isinstance(value, int) else str(value)
 
 
 def _listed(numbers: list[int], most: int = 12) -> str:
