@@ -21,13 +21,16 @@ def test_lines_are_rate_limited_and_the_last_one_always_comes():
     clock, lines = Clock(), []
     monitor = LineMonitor(lines.append, clock, every_s=5.0)
     monitor.stage("keyframes", 10)
-    for _ in range(10):
+    for _ in range(8):
         clock.now += 1.0
         monitor.advance()
+    monitor.advance(2)
+    monitor.close()
+    monitor.close()
     assert lines == [
         "keyframes: 10 to do",
         "keyframes: 5/10, 0:05 passed, about 0:05 left",
-        "keyframes: 10/10, took 0:10",
+        "keyframes: 10/10, took 0:08",
     ]
 
 
@@ -37,7 +40,8 @@ def test_a_stage_that_grows_counts_the_new_units():
     monitor.stage("refine", 1)
     monitor.extend(2)
     monitor.advance(3)
-    assert lines[-1] == "refine: 3/3, took 0:00"
+    monitor.stage("fill", 1)
+    assert lines[-2:] == ["refine: 3/3, took 0:00", "fill: 1 to do"]
 
 
 def test_a_stage_that_begins_again_goes_on():
@@ -47,6 +51,7 @@ def test_a_stage_that_begins_again_goes_on():
     monitor.advance(2)
     monitor.stage("fill", 3)
     monitor.advance(3)
+    monitor.close()
     assert lines[-1].startswith("fill: 5/5")
 
 

@@ -40,6 +40,14 @@ def test_predictions_before_and_after_splitting():
     assert set(drawn["split above 10 %"][:, 1]) == {10.0}
 
 
+def test_segments_without_a_middle_are_left_out():
+    summary = made_up_summary()
+    kept = len(lines(walkthrough_figure(summary).axes[1])["pursuit, before"])
+    empty = {"first": 1, "last": 2, "middle": None, "depth": 0, "is_split": False, "percent_visible": 0.0}
+    summary["segments"].append(empty)
+    assert len(lines(walkthrough_figure(summary).axes[1])["pursuit, before"]) == kept
+
+
 def test_the_threshold_is_that_of_the_run():
     drawn = lines(walkthrough_figure({**made_up_summary(), "split_percent": 12.5}).axes[1])
     assert set(drawn["split above 12.5 %"][:, 1]) == {12.5}

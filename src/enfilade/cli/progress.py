@@ -68,8 +68,9 @@ class BarMonitor:
 class _Count:
     total: int
     started_s: float
+    shown_s: float
     done: int = 0
-    shown_s: float = 0.0
+    shown: int = 0
 
 
 class LineMonitor:
@@ -98,26 +99,34 @@ class LineMonitor:
         self._now = ""
 
     def stage(self, name: str, total: int) -> None:
-        """Write that a stage begins."""
+        """Write how the last stage ended, and that one begins."""
+        self.close()
         self._now = name
         if name in self._stages:
             self.extend(total)
             return
         now = self._clock()
-        self._stages[name] = _Count(total, now, shown_s=now)
+        self._stages[name] = _Count(total, now, now)
         self._write(f"{name}: {total} to do")
 
     def advance(self, count: int = 1) -> None:
-        """Write how far the stage is, when the last line is old enough or the stage is done."""
+        """Write how far the stage is, when the last line is old enough."""
         stage = self._stages.get(self._now)
         if stage is None:
             return
         stage.done += count
-        now = self._clock()
-        if stage.done < stage.total and now - stage.shown_s < self._every_s:
-            return
-        stage.shown_s = now
-        self._write(f"{self._now}: {stage.done}/{stage.total}, {_times(stage, now)}")
+        if self._clock() - stage.shown_s >= self._every_s:
+            self._show(stage)
+
+    def close(self) -> None:
+        """Write how far the present stage came, where no line has said so yet."""
+        stage = self._stages.get(self._now)
+        if stage is not None and stage.shown < stage.done:
+            self._show(stage)
+
+    def _show(self, stage: _Count) -> None:
+        stage.shown_s, stage.shown = self._clock(), stage.done
+        self._write(f"{self._now}: {stage.done}/{stage.total}, {_times(stage, stage.shown_s)}")
 
     def extend(self, count: int) -> None:
         """Count the added units."""
@@ -152,7 +161,11 @@ def watch(*, quiet: bool) -> Iterator[Monitor]:
         return
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield LineMonitor(lambda line: click.echo(line, err=True))
+        lines = LineMonitor(lambda line: click.echo(line, err=True))
+        try:
+            yield lines
+        finally:
+            lines.close()
         return
     columns = (
         TextColumn("{task.description:<12}"),

@@ -120,14 +120,15 @@ def _draw_velocity(
 
 
 def _draw_predictions(ax: Any, segments: Sequence[Mapping[str, Any]], threshold: float) -> None:
-    before = [s for s in segments if s["depth"] == 0]
-    after = [s for s in segments if not s["is_split"]]
+    judged = [s for s in segments if s["middle"] is not None]  # others have nothing between their keyframes
+    before = [s for s in judged if s["depth"] == 0]
+    after = [s for s in judged if not s["is_split"]]
     for key, eye, color, line in (
         ("percent_visible", "pursuit", VERMILION, "-"),
         ("percent_visible_no_pursuit", "no pursuit", BLUE, "--"),
     ):
         for chosen, when, face in ((before, "before", "white"), (after, "after splitting", color)):
-            points = sorted((_middle(s), float(s[key])) for s in chosen if _is_known(s.get(key)))
+            points = sorted((int(s["middle"]), float(s[key])) for s in chosen if _is_known(s.get(key)))
             if points:
                 x, y = zip(*points, strict=True)
                 style = {"color": color, "markerfacecolor": face, "linewidth": 0.9, "markersize": 5}
@@ -149,10 +150,6 @@ def _draw_traced(ax: Any, frames: Sequence[int], rows: Sequence[Mapping[str, Any
     ax.set_ylabel("traced, % of pixels")
     ax.set_ylim(0.0, 100.0)
     legend(ax, columns=5)
-
-
-def _middle(segment: Mapping[str, Any]) -> int:
-    return int(segment["middle"])
 
 
 def _is_known(value: object) -> bool:
