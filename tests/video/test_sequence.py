@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import av
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -155,6 +156,31 @@ def test_foreign_layers(tmp_path):
     assert means(open_sequence(tmp_path / "grey.exr")) == [0.5]
     with pytest.raises(ImageError, match="no channels R G B; it has the layers Z"):
         open_sequence(tmp_path / "depth.exr")
+
+
+def test_other_primaries_are_refused(tmp_path):
+    plane = np.ones((4, 6), np.float32)
+    aces = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+    rec709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+    for name, values in (("aces", aces), ("rec709", rec709)):
+        header = {"type": OpenEXR.scanlineimage, "chromaticities": values}
+        with OpenEXR.File(header, dict.fromkeys("RGB", plane)) as image:
+            image.write(str(tmp_path / f"{name}.exr"))
+    assert means(open_sequence(tmp_path / "rec709.exr")) == [1]
+    with pytest.raises(ImageError, match=r"aces\.exr says that its primaries"):
+        open_sequence(tmp_path / "aces.exr")
+
+
+def test_frames_are_read_when_they_are_asked_for(tmp_path):
+    for k in range(3):
+        exr(tmp_path / f"{k}.exr", k)
+    sequence = open_sequence(tmp_path)
+    for k in (1, 2):
+        (tmp_path / f"{k}.exr").write_bytes(b"")
+    frames = iter(sequence)
+    assert next(frames).mean() == 0
+    with pytest.raises(ImageError, match=r"1\.exr"):
+        next(frames)
 
 
 @pytest.mark.parametrize("kind", ["exr", "png", "deep.png", "jpg"])

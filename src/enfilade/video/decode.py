@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -28,6 +29,7 @@ HDR_TRANSFERS = {16: "PQ (SMPTE ST 2084)", 17: "SMPTE ST 428-1", 18: "HLG (ARIB 
 LOG_TRANSFERS = {9: "logarithmic (100:1)", 10: "logarithmic (316:1)"}
 REC709_LIKE = frozenset({1, 2, 5, 6, 7})  # primaries: BT.709, unknown, and the close ones of BT.601
 MATRICES = {1: BT709, 4: BT601, 5: BT601, 6: BT601}  # ITU-T H.273, table 4
+MAX_PIXELS = 1 << 28  # of a frame; checked before the first is decoded
 HD_LINES = 576  # above, a video that doesn't say its matrix has BT.709's, as players take it
 FULL = 2  # FFmpeg's AVColorRange
 
@@ -36,7 +38,8 @@ class VideoFile:
     """The frames of a video file, decoded one by one.
 
     Every standard-range transfer (sRGB, BT.709, BT.601, gamma, unknown) is decoded with sRGB's: what a
-    desktop screen shows.
+    desktop screen shows. Damage inside frames is concealed by FFmpeg's decoders, and isn't noticed here; a
+    file that is cut off is.
 
     Parameters
     ----------
@@ -64,16 +67,20 @@ class VideoFile:
                 raise ImageError(f"{file} has no picture in it")
             stream = container.streams.video[0]
             context = stream.codec_context
+            if context is None:
+                raise ImageError(
+                    f"{file} has a codec that is not known here; convert it to H.264, AV1 or FFV1"
+                )
             self.width, self.height = int(stream.width), int(stream.height)
             rate: Fraction | None = stream.average_rate
             self.fps = float(rate) if rate else None
-            self._count = int(stream.frames) or sum(
-                1 for packet in container.demux(stream) if packet.size and not packet.is_corrupt
-            )
+            self._count = int(stream.frames) or _counted(file, container, stream)
             self._is_linear = context.color_trc == LINEAR
             _check_colors(file, int(context.color_trc), int(context.color_primaries))
-        if not self._count:
-            raise ImageError(f"{file} has no frames; write or copy it again")
+        if self.width * self.height > MAX_PIXELS:
+            raise ImageError(f"{file} has {self.width}x{self.height} pixels; at most {MAX_PIXELS} are read")
+        if not 0 < self._count <= file.stat().st_size:  # a frame has a byte at least
+            raise ImageError(f"{file} announces {self._count} frames: it is damaged; write or copy it again")
 
     def __len__(self) -> int:
         return self._count
@@ -134,6 +141,24 @@ def deep_png(file: Path) -> F32:
         deep = frame.reformat(format="rgba64le").to_ndarray()
         values: F32 = deep.astype(np.float32) / np.float32(65535.0)
     return values
+
+
+def _counted(file: Path, container: Any, stream: Any) -> int:
+    # Matroska doesn't say how many frames it has, but FFmpeg writes how long each stream is
+    count, last = 0, 0.0
+    for packet in container.demux(stream):
+        if packet.size and packet.pts is not None:
+            count, last = count + 1, max(last, float(packet.pts * stream.time_base))
+    stated = re.fullmatch(r"(\d+):(\d\d):(\d\d\.\d+)", stream.metadata.get("DURATION", "").strip("\0 "))
+    if stated and stream.average_rate:
+        hours, minutes, seconds = (float(part) for part in stated.groups())
+        length = 3600.0 * hours + 60.0 * minutes + seconds
+        if last + 1.5 / float(stream.average_rate) < length:
+            raise ImageError(
+                f"{file} is {length:g} s long, but its last frame is at {last:g} s: it is cut off; "
+                "write or copy it again"
+            )
+    return count
 
 
 def _encoded_rgb(file: Path, frame: Any) -> F32:
@@ -199,10 +224,10 @@ def _check_colors(file: Path, transfer: int, primaries: int) -> None:
 def _failures(file: Path) -> Iterator[None]:
     try:
         yield
-    except (av.FFmpegError, OSError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+    except (av.FFmpegError, OSError, MemoryError) as error:
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ImageError(f"can't decode {file}: {reason}; write or copy it again") from error
 
 
 def _opened(file: Path) -> Any:
-    return av.open(str(file), format=DEMUXERS[file.suffix.lower()])
+    return av.open(str(file), format=DEMUXERS[file.suffix.lower()], metadata_errors="replace")
