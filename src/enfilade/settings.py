@@ -140,7 +140,7 @@ class MetricSettings(Section):
     """The animation quality metric (§3)."""
 
     metering: Metering = option(
-        Metering.BOTH, "Eye movements assumed when judging: smooth pursuit, none, or the worse."
+        Metering.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
     mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)
 
@@ -175,9 +175,11 @@ class AntialiasSettings(Section):
     specular_frames: int = option(3, "Temporal support on specular surfaces, frames.", least=1, most=63)
     support_still_px: float = option(3.0, "Spatial support at rest, pixels.", least=1.0, most=31.0)
     support_fast_px: float = option(
-        9.0, "Spatial support at the fast velocity, pixels.", least=1.0, most=31.0
+        9.0, "Spatial support at the fast velocity, pixels of 1/28 degree.", least=1.0, most=31.0
     )
-    support_beyond_px: float = option(11.0, "Spatial support beyond it, pixels.", least=1.0, most=31.0)
+    support_beyond_px: float = option(
+        11.0, "Spatial support beyond it, pixels of 1/28 degree.", least=1.0, most=31.0
+    )
     fast_deg_s: float = option(16.0, "The fast velocity, deg/s.", least=0.1)
     separate_items: bool = option(False, "Leave out samples of another surface along the flow (§5.3).")
 

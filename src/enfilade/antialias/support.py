@@ -9,6 +9,7 @@ import numpy as np
 from enfilade.records import F32, Geometry
 from enfilade.settings import AntialiasSettings
 
+PAPER_PIXELS_PER_DEGREE = 27.928  # 640x480 on a diagonal of 0.25 m, seen from 0.5 m (§5.2)
 COVERED_PX = 0.5  # flow after which the samples along it cover the pixel (§5.2)
 
 
@@ -28,11 +29,16 @@ class TemporalLimits:
     least: F32
 
 
-def spatial_support_px(speed_deg_s: F32, settings: AntialiasSettings) -> F32:
-    """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11."""
+def spatial_support_px(speed_deg_s: F32, pixels_per_degree: float, settings: AntialiasSettings) -> F32:
+    """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11.
+
+    These are the paper's pixels, of which 28 make a degree. The three pixels at rest antialias, and
+    stay three on any screen; what velocity adds is blur that the eye does not see, an angle.
+    """
     rise = settings.support_fast_px - settings.support_still_px
-    linear = settings.support_still_px + rise * speed_deg_s / settings.fast_deg_s
-    support = np.where(speed_deg_s > settings.fast_deg_s, settings.support_beyond_px, linear)
+    beyond = settings.support_beyond_px - settings.support_still_px
+    added = np.where(speed_deg_s > settings.fast_deg_s, beyond, rise * speed_deg_s / settings.fast_deg_s)
+    support = settings.support_still_px + added * (pixels_per_degree / PAPER_PIXELS_PER_DEGREE)
     return support.astype(np.float32)
 
 

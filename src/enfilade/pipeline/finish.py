@@ -11,7 +11,6 @@ from enfilade.antialias import (
     Slice,
     filter_along_flow,
     reconstruct,
-    spatial_support_px,
     temporal_limits,
 )
 from enfilade.codec import read_exr, write_result
@@ -92,7 +91,7 @@ def _raw(workshop: Workshop, frame: int) -> _Raw:
     view = workshop.views[frame]
     with workshop.costs.of("files"):
         raw = read_raw(workshop, frame)
-    support = spatial_support_px(view.speed_deg_s, workshop.job.settings.antialias)
+    support = workshop.spatial_support_px(view)
     with workshop.costs.of("antialias"):
         color = reconstruct(raw.color, support)
     return _Raw(Slice(color, view.geometry, view.flow), raw.source)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.antialias import reconstruct, spatial_support_px
+from enfilade.antialias import reconstruct
 from enfilade.masks import item_pixels, slow_pixels, visible_items
 from enfilade.metric import Pursuit
 from enfilade.pipeline.views import View
@@ -139,7 +139,7 @@ def _differences(
     Both are filtered as the viewer will see them, and a difference that their noise explains does
     not count.
     """
-    support = spatial_support_px(view.speed_deg_s, workshop.job.settings.antialias)
+    support = workshop.spatial_support_px(view)
     shown = [
         _shown(workshop, np.where(one.is_hole[..., None], other.color, one.color), support)
         for one, other in ((before, after), (after, before))

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.antialias import spatial_support_px
 from enfilade.codec import read_shading, write_shading
 from enfilade.masks import slow_pixels
 from enfilade.metric import Aqm
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
-from enfilade.pipeline.views import Views
-from enfilade.records import Keyframe, Mask, Shading
+from enfilade.pipeline.views import View, Views
+from enfilade.records import F32, Keyframe, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Renderer
 from enfilade.store import Run
 
@@ -45,6 +46,11 @@ class Workshop:
     def number(self, frame: int) -> int:
         """Number by which the user knows a frame."""
         return self.job.path.numbers[frame]
+
+    def spatial_support_px(self, view: View) -> F32:
+        """Width of the spatial filter for what a frame shows, (H, W) pixels."""
+        density = self.job.viewing.pixels_per_degree
+        return spatial_support_px(view.speed_deg_s, density, self.job.settings.antialias)
 
     def trace(self, frame: int, where: Mask, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
         """Path trace some pixels of a frame, as a list in the order of the lanes."""
