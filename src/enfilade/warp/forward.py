@@ -138,7 +138,7 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
         expected = disparity + dr.dot(gradient, step)
         jump = dr.abs(dr.gather(Float, landing.disparity, lane) - expected)
         is_same = (dr.gather(UInt, items, lane) == item) & (jump <= tolerance * disparity)
-        weight = dr.select(is_same, bilinear, 0.0)
+        weight = dr.select(is_same & ~is_hole, bilinear, 0.0)  # in a hole the position is a NaN
         total += weight
         color += weight * dr.gather(Array3f, colors, lane)
         variance += weight * dr.gather(Float, variances, lane)
