@@ -182,17 +182,19 @@ class MitsubaRenderer:
         return seen, distance
 
     def _lets_pass(self, seen: Any) -> Any:
-        is_passable = dr.gather(Bool, self._items.is_passable, _registry(seen), seen.is_valid())
-        through = seen.bsdf().eval_null_transmission(seen, is_passable)
+        material = seen.bsdf()
+        number: Any = dr.reinterpret_array(mi.UInt32, material)
+        is_passable = dr.gather(Bool, self._items.is_passable, number, seen.is_valid())
+        through = material.eval_null_transmission(seen, is_passable)
         return is_passable & (mi.luminance(through) > 0.5)
 
 
 @dataclass(frozen=True)
 class _Items:
-    """What is known of each of Mitsuba's shapes, by its number in Mitsuba's registry."""
+    """What is known of Mitsuba's shapes and materials, by their numbers in Mitsuba's registry."""
 
-    number: Any  # UInt
-    is_passable: Any  # Bool
+    number: Any  # UInt, of a shape
+    is_passable: Any  # Bool, of a material
     any_passable: bool
     names: tuple[str, ...]
 
@@ -202,14 +204,22 @@ def _items(scene: Any) -> _Items:
     numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes]
     registry = [int(number[0]) for number in numbers]
     number = np.zeros(max(registry) + 1, np.uint32)
-    is_passable = np.zeros(max(registry) + 1, bool)
     names = []
     for item, (index, shape) in enumerate(zip(registry, shapes, strict=True), start=1):
-        material = shape.bsdf()
         number[index] = item
-        is_passable[index] = material is not None and material.class_name() in LOOKED_THROUGH
         names.append(shape.id() or f"{shape.class_name()} {item}")
+    is_passable = _passable_materials(scene)
     return _Items(UInt(number), Bool(is_passable), bool(is_passable.any()), tuple(names))
+
+
+def _passable_materials(scene: Any) -> npt.NDArray[np.bool_]:
+    """Materials that may let a ray pass, those of instanced shapes included."""
+    materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
+    numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
+    registry = [int(number[0]) for number in numbers]
+    is_passable = np.zeros(max(registry, default=0) + 1, bool)
+    is_passable[registry] = [material.class_name() in LOOKED_THROUGH for material in materials]
+    return is_passable
 
 
 def _registry(seen: Any) -> Any:
