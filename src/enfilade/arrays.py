@@ -46,12 +46,15 @@ __all__ = [
 ]
 
 
+ALIGNMENT = 64  # bytes, of Dr.Jit's memory
+
+
 def lanes(values: npt.NDArray[Any]) -> Any:
-    """Flat lanes of a NumPy image, lane ``y * width + x``.
+    """Flat lanes of a NumPy image, lane ``y * width + x``, or of a list.
 
     Parameters
     ----------
-    values : (H, W) or (H, W, 2) or (H, W, 3)
+    values : (H, W) or (H, W, 2) or (H, W, 3) or (N,)
         float32, int32, uint32, uint8 (widened to uint32) or bool. Other sizes are not taken.
 
     Returns
@@ -67,15 +70,31 @@ def lanes(values: npt.NDArray[Any]) -> Any:
         case "u", 4:
             scalar = UInt
         case "u", 1:
-            return UInt(np.ascontiguousarray(values, np.uint32).ravel())
+            return UInt(_aligned(values.astype(np.uint32)))
         case "b", _:
             scalar = Bool
         case _:
             raise TypeError(f"no Dr.Jit type for arrays of {values.dtype}")
-    if values.ndim == 2:
-        return scalar(np.ascontiguousarray(values).ravel())
+    if values.ndim < 3:
+        return scalar(_aligned(values))
     vector = {2: Array2f, 3: Array3f}[values.shape[2]]
-    return vector(*(scalar(np.ascontiguousarray(c)) for c in values.reshape(-1, values.shape[2]).T))
+    return vector(*(scalar(_aligned(c)) for c in values.reshape(-1, values.shape[2]).T))
+
+
+def _aligned(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Flat values at an address as Dr.Jit's own memory has it; copied where they stand elsewhere.
+
+    Kernels differ by the alignment of what they read: NumPy's memory, aligned now and then, would have
+    the same kernel compiled anew in the middle of a run.
+    """
+    flat = np.ascontiguousarray(values).ravel()
+    if flat.ctypes.data % ALIGNMENT == 0:
+        return flat
+    room = np.empty(flat.nbytes + ALIGNMENT, np.uint8)
+    start = -room.ctypes.data % ALIGNMENT
+    aligned: npt.NDArray[Any] = room[start : start + flat.nbytes].view(flat.dtype)
+    aligned[:] = flat
+    return aligned
 
 
 def image(values: Any, height: int, width: int) -> npt.NDArray[Any]:

@@ -16,7 +16,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Float, UInt, matrix3, opaque, vector3
+from enfilade.arrays import Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.backends.analytic_scene import (
     AnalyticScene,
     Checker,
@@ -120,7 +120,7 @@ class AnalyticRenderer:
         """Sum `width` paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
         lane = dr.arange(UInt, len(pixels) * width)
         slot = lane // opaque(width)
-        pixel = dr.gather(UInt, UInt(np.ascontiguousarray(pixels)), slot)
+        pixel = dr.gather(UInt, lanes(pixels), slot)
         rng = streams(pixel, lane - slot * opaque(width) + opaque(first), **random)
 
         # Where the paths begin.

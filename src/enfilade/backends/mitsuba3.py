@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, matrix3, opaque, vector3
+from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.backends.scenefile import fingerprint
 from enfilade.camera import Camera
 from enfilade.device import active
@@ -146,7 +146,7 @@ class MitsubaRenderer:
         """Sum `width` paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
         lane = dr.arange(UInt, len(pixels) * width)
         slot = lane // opaque(width)
-        pixel = dr.gather(UInt, UInt(pixels), slot)
+        pixel = dr.gather(UInt, lanes(pixels), slot)
         path = lane - slot * opaque(width) + opaque(first)
 
         rng = streams(pixel, path, **random)
