@@ -15,6 +15,7 @@ from enfilade.pipeline.survey import Survey, initial_segments, survey_path
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import Segment
 from enfilade.store import Run
+from enfilade.video import check_encodable
 
 SURVEY_FILE = "survey.json"
 
@@ -44,6 +45,12 @@ def render(job: Job, folder: Path, monitor: Monitor) -> dict[str, Any]:
         The scene, or a folder that holds another run.
     DeviceError
     """
+    check_encodable(
+        job.settings.video,
+        width=job.path.width,
+        height=job.path.height,
+        exposure_ev=job.settings.viewing.exposure_ev,
+    )
     renderer = open_renderer(job.scene, job.settings.trace)
     with Run.open(folder, job.identity(renderer)) as run:
         for note in run.notes:

@@ -86,6 +86,20 @@ def encode_video(
             raise whole.unwritable(file, f"{codec.encoder}: {error}") from error
 
 
+def check_encodable(settings: VideoSettings, *, width: int, height: int, exposure_ev: float) -> None:
+    """Raise now what :func:`encode_video` would raise after a night of rendering.
+
+    Raises
+    ------
+    SettingsError
+        An unknown codec, view or quality, or a size that the codec can't encode.
+    """
+    codec = codec_named(settings.codec)
+    codec.pixels_for(width, height)
+    codec.options_for(settings.quality)
+    open_view(settings, exposure_ev)
+
+
 def exact_fps(fps: float | Fraction) -> Fraction:
     """Frames per second as the fraction that is meant: 23.976 and 23.98 are 24000/1001.
 
