@@ -136,7 +136,7 @@ def _draw_predictions(ax: Any, segments: Sequence[Mapping[str, Any]], threshold:
                 ax.plot(x, y, line, marker="s" if face == "white" else "o", label=label, **style)
     ax.axhline(threshold, color=INK, linestyle=":", linewidth=1.2, label=f"split above {threshold:g} %")
     ax.set_ylabel("visible, % of pixels")
-    ax.set_ylim(bottom=0.0)
+    ax.set_ylim(0.0, max(ax.get_ylim()[1], 1.2 * threshold))
     legend(ax, columns=5)
 
 
