@@ -9,6 +9,7 @@ import mitsuba as mi
 import pytest
 from scene_views import View, read_path, view
 
+from enfilade.device import activate
 from enfilade.scenes import SCENES, SceneFiles, write_scene
 
 
@@ -20,7 +21,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, SceneFiles]:
 
 @pytest.fixture(scope="session")
 def loaded(small: dict[str, SceneFiles]) -> dict[str, Any]:
-    mi.set_variant("llvm_ad_rgb")
+    mi.set_variant(activate("auto").variant)
     return {name: mi.load_file(str(files.scene)) for name, files in small.items()}
 
 

@@ -20,11 +20,6 @@ from enfilade.scenes.solids import (
 from enfilade.scenes.sweeps import tube
 
 
-def bare(mesh: Mesh) -> Mesh:
-    """Return the mesh without texture coordinates."""
-    return Mesh(mesh.positions, mesh.faces)
-
-
 def column(height: float, radius: float, segments: int) -> tuple[Mesh, Mesh]:
     """Return a column's shaft, which swells slightly, and its base and capital."""
     low, high = 1.1 * radius, height - 1.3 * radius
@@ -32,8 +27,7 @@ def column(height: float, radius: float, segments: int) -> tuple[Mesh, Mesh]:
     shaft = lathe(
         [(radius * (1 - 0.14 * float(t) ** 1.7), low + (high - low) * float(t)) for t in rise], 2 * segments
     )
-    assert shaft.uvs is not None  # noqa: S101 - turned pieces always have them
-    shaft = Mesh(shaft.positions, shaft.faces, shaft.uvs * np.array([1.0, 2.0]))
+    shaft = shaft.tiled(1.0, 2.0)
     base: list[Point2] = [
         (0.0, 0.45),
         (1.42, 0.45),
@@ -63,7 +57,7 @@ def column(height: float, radius: float, segments: int) -> tuple[Mesh, Mesh]:
     bell = lathe([(r * radius, height + z * radius) for r, z in head], 2 * segments)
     plinth = block((3.1 * radius, 3.1 * radius, 0.46 * radius), 0.012)
     abacus = block((2.9 * radius, 2.9 * radius, 0.43 * radius), 0.012)
-    return shaft, join([bare(foot), bare(bell), plinth, abacus.at(0, 0, height - 0.43 * radius)])
+    return shaft, join([foot.bare(), bell.bare(), plinth, abacus.at(0, 0, height - 0.43 * radius)])
 
 
 def stair(start: float, low_y: float, high_y: float, run: float, rise: float, steps: int) -> Mesh:
@@ -144,7 +138,7 @@ def coffers(low: Point2, high: Point2, z: float, bays: tuple[int, int]) -> Mesh:
     for axis in (0, 1):
         other = 1 - axis
         for at in np.linspace(low[axis], high[axis], bays[axis] + 1):
-            for half, bottom, top in ((0.16, 0.10, 0.75), (0.24, 0.42, 0.5), (0.11, 0.0, 0.12)):
+            for half, bottom, top in ((0.14, 0.08, 0.40), (0.20, 0.24, 0.30), (0.10, 0.0, 0.10)):
                 start, end = [0.0, 0.0, z + bottom], [0.0, 0.0, z + top]
                 start[axis], end[axis] = float(at) - half, float(at) + half
                 start[other], end[other] = low[other], high[other]

@@ -48,7 +48,7 @@ def turned_leg(height: float, radius: float, segments: int) -> Mesh:
     """Return a lathe-turned leg with a square head."""
     turned = lathe([(r * radius / 0.78, z * height) for r, z in TURNING], segments)
     head = block((1.8 * radius, 1.8 * radius, 0.14 * height)).at(0, 0, 0.86 * height)
-    return join([Mesh(turned.positions, turned.faces), head])
+    return join([turned.bare(), head])
 
 
 def table(length: float, width: float, height: float, segments: int) -> Mesh:
@@ -108,7 +108,7 @@ def chair(segments: int) -> Mesh:
         for s in (-1, 1)
     ]
     loose = [*front, *back, *finials, seat, *rungs, *bars]
-    return join(Mesh(m.positions, m.faces) for m in loose)
+    return join(m.bare() for m in loose)
 
 
 def sofa(width: float, segments: int) -> tuple[Mesh, Mesh]:
@@ -131,13 +131,13 @@ def sofa(width: float, segments: int) -> tuple[Mesh, Mesh]:
         x = -inner / 2 + inner * (k + 0.5) / 3
         seat = cushion((inner / 3 - 0.004, 0.66, 0.17), 3 * segments, 0.22).at(x, -0.09, 0.31)
         rest = cushion((inner / 3 - 0.004, 0.44, 0.20), 3 * segments, 0.25).turned(78, "x")
-        pieces += [Mesh(m.positions, m.faces) for m in (seat, rest.at(x, 0.27, 0.67))]
+        pieces += [m.bare() for m in (seat, rest.at(x, 0.27, 0.67))]
     feet = [
         lathe([(0.0, 0.0), (0.018, 0.0), (0.03, 0.13), (0.0, 0.13)], segments).at(x, y)
         for x in (-half + 0.1, half - 0.1)
         for y in (-depth / 2 + 0.1, depth / 2 - 0.1)
     ]
-    return join(Mesh(m.positions, m.faces) for m in pieces), join(feet)
+    return join(m.bare() for m in pieces), join(feet)
 
 
 def bookcase(size: Vector, shelves: int) -> Mesh:
@@ -202,7 +202,7 @@ def sideboard(width: float, segments: int) -> tuple[Mesh, Mesh]:
         for x in (-width / 2 + 0.07, width / 2 - 0.07)
         for y in (-d / 2 + 0.07, d / 2 - 0.07)
     ]
-    return join(body), join([*[Mesh(k.positions, k.faces) for k in knobs], *feet])
+    return join(body), join([*[k.bare() for k in knobs], *feet])
 
 
 def round_table(radius: float, height: float, segments: int) -> Mesh:
@@ -231,4 +231,4 @@ def round_table(radius: float, height: float, segments: int) -> Mesh:
                 segments,
             )
         )
-    return join(Mesh(m.positions, m.faces) for m in (top, *legs))
+    return join(m.bare() for m in (top, *legs))

@@ -83,7 +83,7 @@ def pendant(drop: float, segments: int) -> tuple[Mesh, Mesh, Mesh]:
     )
     cord = tube([(0, 0, 0.29), (0, 0, drop / 2), (0, 0, drop - 0.03)], 0.006, 8)
     cup = lathe([(0.0, drop - 0.05), (0.03, drop - 0.05), (0.055, drop - 0.02), (0.06, drop)], 2 * segments)
-    fittings = join(Mesh(m.positions, m.faces) for m in (cap, cord, cup))
+    fittings = join(m.bare() for m in (cap, cord, cup))
     return shade, fittings, sphere(0.055, 2 * segments).at(0, 0, 0.075)
 
 
@@ -111,7 +111,7 @@ def floor_lamp(segments: int) -> tuple[Mesh, Mesh]:
         radius = (0.23 - 0.07 * v) * (1 + 0.012 * np.cos(2 * np.pi * 40 * u))
         return radius * np.cos(2 * np.pi * u), radius * np.sin(2 * np.pi * u), 1.32 + 0.30 * v
 
-    return Mesh(stand.positions, stand.faces), surface(drum, 8 * segments, 2)
+    return stand.bare(), surface(drum, 8 * segments, 2)
 
 
 def foliage(leaves: int, height: float, spread: float, seed: int, width: float = 0.055) -> Mesh:

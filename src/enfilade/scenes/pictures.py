@@ -12,10 +12,10 @@ from enfilade.scenes.textures import Floats, Image8, blend, cloud, display, enco
 def landscape(size: int) -> Image8:
     """Return a painted landscape: hills in layers below a warm sky."""
     u, v = grid(size)
-    image = blend("#7fa3b8", "#f0d3a4", v * 1.6)
+    image = blend("#8fb4cc", "#f6dcb0", v * 1.6)
     sun = np.hypot(u - 0.68, v - 0.36)
     image = blend(image, "#fff0c8", np.clip(1.3 - sun / 0.07, 0, 1))
-    hills = ("#93a8a0", "#6f8f83", "#4f7464", "#38574a", "#2a3f38")
+    hills = ("#a9bdb4", "#86a692", "#7f9a62", "#a8a35a", "#6f8450")
     for k, colour in enumerate(hills):
         crest = 0.45 + 0.11 * k - 0.16 * noise(u, np.full_like(v, 0.37), (3 + k, 4), 40 + k)
         image = blend(image, colour, np.clip((v - crest) / 0.006, 0, 1))

@@ -51,6 +51,22 @@ class Mesh:
         turned[:, j] = sine * self.positions[:, i] + cosine * self.positions[:, j]
         return replace(self, positions=turned)
 
+    def bare(self) -> Mesh:
+        """Return the mesh without texture coordinates."""
+        return replace(self, uvs=None)
+
+    def tiled(self, across: float, along: float, shift: Point2 = (0.0, 0.0)) -> Mesh:
+        """Return the mesh with its texture repeated, then shifted by parts of one repeat.
+
+        Raises
+        ------
+        ValueError
+            The mesh has no texture coordinates.
+        """
+        if self.uvs is None:
+            raise ValueError("the mesh has no texture coordinates to tile")
+        return replace(self, uvs=self.uvs * np.array([across, along]) + np.array(shift))
+
     def flipped(self) -> Mesh:
         """Return the mesh with inside and outside exchanged."""
         return replace(self, faces=self.faces[:, ::-1])

@@ -111,11 +111,14 @@ class SceneWriter:
         emitter.append(rgb("radiance", linear(colour) * strength))
         self._emitters.append(emitter)
 
-    def sun(self, direction: tuple[float, float, float], colour: Colour, strength: float) -> None:
+    def sun(
+        self, direction: tuple[float, float, float], colour: Colour, strength: float, *, share: float = 1.0
+    ) -> None:
         """Add parallel light that travels along `direction`, irradiance `strength`."""
         emitter = ET.Element("emitter", type="directional", id="sun")
         x, y, z = direction
         ET.SubElement(emitter, "vector", name="direction", x=repr(x), y=repr(y), z=repr(z))
+        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(share))
         emitter.append(rgb("irradiance", linear(colour) * strength))
         self._emitters.append(emitter)
 
