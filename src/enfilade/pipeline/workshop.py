@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from enfilade.renderer import PixelFilter, Purpose, Renderer
 from enfilade.store import Run
 
 KEPT = 3  # keyframes kept in memory
+FFT_WORKERS = 2  # threads of the metric's Fourier transforms
 
 
 class Workshop:
@@ -30,7 +32,6 @@ class Workshop:
     job, renderer, run, monitor
     views : Views
     costs : Costs
-    aqm : Aqm
     """
 
     def __init__(self, job: Job, renderer: Renderer, run: Run, monitor: Monitor) -> None:
@@ -40,8 +41,12 @@ class Workshop:
         self.monitor = monitor
         self.costs = Costs()
         self.views = Views(renderer, job.path, job.viewing, self.costs)
-        self.aqm = Aqm(job.viewing, mask_slope=job.settings.metric.mask_slope, workers=2)
         self._keyframes: OrderedDict[int, Keyframe] = OrderedDict()
+
+    @cached_property
+    def aqm(self) -> Aqm:
+        """The metric, with its filters made once."""
+        return Aqm(self.job.viewing, mask_slope=self.job.settings.metric.mask_slope, workers=FFT_WORKERS)
 
     def number(self, frame: int) -> int:
         """Number by which the user knows a frame."""
