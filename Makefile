@@ -9,12 +9,15 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup llvm demo test check format lock clean
+.PHONY: help setup python llvm demo test check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
 
-setup: llvm $(VENV)/.ready
+setup: python llvm $(VENV)/.ready
+
+python:
+	@test -e $(VENV)/.ready || sh setup/python.sh >/dev/null
 
 llvm:
 	@sh setup/llvm.sh
