@@ -16,7 +16,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array3f, Float, UInt
 from enfilade.backends.analytic_scene import (
     AnalyticScene,
     Checker,
@@ -29,17 +29,14 @@ from enfilade.backends.analytic_scene import (
     read_scene,
     scene_text,
 )
+from enfilade.backends.estimate import estimate
 from enfilade.camera import Camera
-from enfilade.pixels.random import streams
-from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
 
-PASS = 64  # paths of a pixel summed in one go; fixed, so that no chunking changes a rounding
 CHECKER_SHIFT = 0.381966  # of a period: planes at round coordinates do not lie on a cube's face
 OFFSET = 1e-4  # of a position's size: where bounced rays begin, clear of float32 rounding
 BOUNCED = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 
 
 class AnalyticRenderer:
@@ -91,61 +88,22 @@ class AnalyticRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
-        random = {"seed": seed, "frame": frame, "purpose": int(purpose)}
-        sums = np.zeros((5, len(pixels)))  # r, g, b, squared luminance, number of finite paths
-        for first in range(0, spp, PASS):
-            width = min(PASS, spp - first)
-            step = max(self._chunk // width, 1)
-            for start in range(0, len(pixels), step):
-                part = slice(start, start + step)
-                sums[:, part] += self._trace_pass(camera, pixels[part], first, width, random, pixel_filter)
-        count = np.maximum(sums[4], 1.0)
-        mean = sums[:3] / count
-        spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
-        return Shading(
-            color=np.ascontiguousarray(mean.T, np.float32),
-            variance=(spread / np.maximum(count - 1.0, 1.0)).astype(np.float32),
-            dropped=int(spp * len(pixels) - sums[4].sum()),
+        return estimate(
+            camera,
+            pixels,
+            self._noisy,
+            spp=spp,
+            chunk=self._chunk,
+            pixel_filter=pixel_filter,
+            random={"seed": seed, "frame": frame, "purpose": int(purpose)},
         )
 
-    def _trace_pass(
-        self,
-        camera: Camera,
-        pixels: npt.NDArray[np.uint32],
-        first: int,
-        width: int,
-        random: dict[str, int],
-        pixel_filter: PixelFilter,
-    ) -> npt.NDArray[np.float32]:
-        """Sum `width` paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
-        lane = dr.arange(UInt, len(pixels) * width)
-        slot = lane // opaque(width)
-        pixel = dr.gather(UInt, lanes(pixels), slot)
-        rng = streams(pixel, lane - slot * opaque(width) + opaque(first), **random)
-
-        # Where the paths begin.
-        row = pixel // opaque(camera.width)
-        at = Array2f(pixel - row * opaque(camera.width), row) + 0.5
-        match pixel_filter:
-            case PixelFilter.BOX:
-                at += box_offsets(rng)
-            case PixelFilter.GAUSSIAN:
-                at += gaussian_offsets(rng, sigma=0.5, radius=1.5)
-        direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-
-        # What they bring, and the noise put upon it.
-        radiance = self._radiance(vector3(camera.eye), direction)
+    def _noisy(self, rays: Rays, rng: Any) -> Any:
+        """Radiance along rays, and the noise put upon it."""
+        radiance = self._radiance(rays.origin, rays.direction)
         radiance *= 1 + self._scene.noise * (-dr.log(1 - rng.next_float32()) - 1)
         is_lost = rng.next_float32() < self._scene.nan_share
-        radiance = dr.select(is_lost, Array3f(dr.nan), radiance)
-
-        # Finite paths alone are counted.
-        luminance = dr.dot(radiance, _constant(LUMINANCE))
-        is_valid = dr.isfinite(luminance)
-        values = [*radiance, luminance * luminance, Float(1)]
-        values = [dr.select(is_valid, v, 0) for v in values]
-        dr.eval(values)
-        return np.stack([np.array(dr.block_sum(v, width)) for v in values])
+        return dr.select(is_lost, Array3f(dr.nan), radiance)
 
     def _radiance(self, origin: Any, direction: Any) -> Any:
         hit = self._find(origin, direction)

@@ -15,20 +15,16 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt
+from enfilade.backends.estimate import estimate
 from enfilade.backends.scenefile import fingerprint
 from enfilade.camera import Camera
 from enfilade.device import active
 from enfilade.errors import SceneError
-from enfilade.pixels.random import streams
-from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
 from enfilade.settings import TraceSettings
 
-PASS = 64  # paths of a pixel summed in one go; fixed, so that no setting changes a rounding
-GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5
-REC709 = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear Rec.709
 DIFFUSE_LOBES = ("DiffuseReflection", "DiffuseTransmission")
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
@@ -118,51 +114,21 @@ class MitsubaRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
-        count = len(pixels)
-        total = np.zeros((3, count))
-        squares = np.zeros(count)
-        valid = np.zeros(count)
-        random = {"seed": seed, "frame": frame, "purpose": int(purpose)}
-        for first in range(0, spp, PASS):
-            width = min(PASS, spp - first)
-            step = max(self._chunk // width, 1)
-            for start in range(0, count, step):
-                part = slice(start, start + step)
-                sums = self._trace_pass(camera, pixels[part], first, width, random, pixel_filter)
-                total[:, part] += sums[:3]
-                squares[part] += sums[3]
-                valid[part] += sums[4]
-        return _mean(total, squares, valid, spp)
+        return estimate(
+            camera,
+            pixels,
+            self._radiance,
+            spp=spp,
+            chunk=self._chunk,
+            pixel_filter=pixel_filter,
+            random={"seed": seed, "frame": frame, "purpose": int(purpose)},
+        )
 
-    def _trace_pass(
-        self,
-        camera: Camera,
-        pixels: npt.NDArray[np.uint32],
-        first: int,
-        width: int,
-        random: dict[str, int],
-        pixel_filter: PixelFilter,
-    ) -> npt.NDArray[np.float32]:
-        """Sum `width` paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
-        lane = dr.arange(UInt, len(pixels) * width)
-        slot = lane // opaque(width)
-        pixel = dr.gather(UInt, lanes(pixels), slot)
-        path = lane - slot * opaque(width) + opaque(first)
-
-        rng = streams(pixel, path, **random)
-        row = pixel // opaque(camera.width)
-        at = Array2f(pixel - row * opaque(camera.width), row) + 0.5 + _offsets(rng, pixel_filter)
-        direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-        ray = mi.Ray3f(mi.Point3f(vector3(camera.eye)), dr.normalize(mi.Vector3f(direction)))
+    def _radiance(self, rays: Rays, rng: Any) -> Any:
+        ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         self._sampler.rng = rng
         radiance, _, _ = self._integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
-        luminance = mi.luminance(radiance)
-        is_valid = dr.isfinite(radiance.x + radiance.y + radiance.z)
-        values = [radiance.x, radiance.y, radiance.z, luminance * luminance, Float(1)]
-        values = [dr.select(is_valid, v, 0) for v in values]
-        # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
-        dr.eval(values)
-        return np.stack([np.array(dr.block_sum(v, width)) for v in values])
+        return radiance
 
     def _visible(self, ray: Any) -> tuple[Any, Any]:
         """First interaction whose surface does not let the ray pass, and its distance."""
@@ -253,34 +219,6 @@ def _surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
     surface = dr.select(mirrors & ~is_broad, UInt(SurfaceClass.MIRROR), surface)
     surface = dr.select(bends | is_thin_glass, UInt(SurfaceClass.TRANSPARENT), surface)
     return dr.select(is_hit, surface, UInt(SurfaceClass.NONE))
-
-
-def _offsets(rng: Any, pixel_filter: PixelFilter) -> Any:
-    match pixel_filter:
-        case PixelFilter.CENTRE:
-            return Array2f(0)
-        case PixelFilter.BOX:
-            return box_offsets(rng)
-        case PixelFilter.GAUSSIAN:
-            return gaussian_offsets(rng, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
-
-
-def _mean(
-    total: npt.NDArray[np.float64],
-    squares: npt.NDArray[np.float64],
-    valid: npt.NDArray[np.float64],
-    spp: int,
-) -> Shading:
-    """Mean colour of the valid samples of each pixel, and the variance of its luminance."""
-    count = np.maximum(valid, 1.0)
-    mean = total / count
-    luminance = REC709 @ mean
-    spread = np.maximum(squares / count - luminance**2, 0.0)
-    return Shading(
-        color=np.ascontiguousarray(mean.T, np.float32),
-        variance=(spread / np.maximum(count - 1.0, 1.0)).astype(np.float32),
-        dropped=int(spp * len(valid) - valid.sum()),
-    )
 
 
 def _integrator(scene: Any, max_depth: int) -> Any:
