@@ -1,7 +1,7 @@
 # make demo    set up, render a small walkthrough into runs/demo
 # make test    set up, run the tests
 # make check   set up, run format, lint, type and import-floor checks
-# make setup   only set up: .venv with locked versions, and LLVM by apt where it is missing
+# make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
 # make lock    write requirements.lock anew from pyproject.toml
 # make clean   remove what the above have made; runs/ stays
 
@@ -9,18 +9,18 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python llvm demo test check format lock clean
+.PHONY: help setup python libraries demo test check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
 
-setup: python llvm $(VENV)/.ready
+setup: python libraries $(VENV)/.ready
 
 python:
 	@test -e $(VENV)/.ready || sh setup/python.sh >/dev/null
 
-llvm:
-	@sh setup/llvm.sh
+libraries:
+	@sh setup/libraries.sh
 
 $(VENV)/.ready: requirements.lock pyproject.toml setup/venv.sh setup/python.sh
 	@sh setup/venv.sh $(VENV)

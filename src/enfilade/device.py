@@ -6,12 +6,13 @@ The choice is made once, before the first kernel: Dr.Jit binds its array types a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from enfilade.errors import DeviceError
 
 LLVM_MINIMUM = 16  # 14 and 15 abort inside the compiler on some of Mitsuba's kernels
 INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 16 on will do)"
+INSTALL_LIBRARIES = "the library that it misses is most likely had by: sudo apt-get install libatomic1"
 
 Choice = Literal["auto", "cpu", "gpu"]
 
@@ -46,16 +47,31 @@ def activate(choice: Choice = "auto") -> Device:
     Raises
     ------
     DeviceError
-        LLVM is missing or too old, or a GPU was asked for and there is none.
+        Dr.Jit can't be loaded, LLVM is missing or too old, or a GPU was asked for and there is none.
     """
-    import drjit as dr
-
+    dr = load()
     has_gpu = choice != "cpu" and bool(dr.has_backend(dr.JitBackend.CUDA))
     if choice == "gpu" and not has_gpu:
         raise DeviceError("no usable NVIDIA GPU on this machine; run with --device cpu or auto")
     device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version())) if has_gpu else _llvm()
     dr.set_backend(device.backend)
     return device
+
+
+def load() -> Any:
+    """Dr.Jit's module.
+
+    Raises
+    ------
+    DeviceError
+        It can't be loaded: a system library is missing.
+    """
+    try:
+        import drjit
+    except (ImportError, NameError) as error:  # Dr.Jit 1.5 stumbles over its own ImportError: a NameError
+        reason = error.__context__ if isinstance(error, NameError) else error
+        raise DeviceError(f"Dr.Jit can't be loaded ({reason}); {INSTALL_LIBRARIES}") from error
+    return drjit
 
 
 def active() -> Device:

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import sys
 
 import pytest
 
@@ -41,6 +42,14 @@ def test_a_missing_package_is_named_with_its_remedy(run, monkeypatch):
     assert "mitsuba" in checks["mitsuba"].remedy
     extra = checks["opencolorio (extra ocio)"]
     assert (extra.is_required, extra.remedy) == (False, "pip install 'enfilade[ocio]'")
+
+
+def test_a_missing_system_library_is_named(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "drjit", None)
+    result = run("doctor")
+    assert result.exit_code == 1
+    assert "Missing: system libraries." in result.stdout
+    assert "libatomic1" in result.stdout
 
 
 def test_what_is_optional_does_not_fail(run, monkeypatch):

@@ -1,6 +1,7 @@
 """Exit codes and messages: 1 for failures, 2 for wrong input, 130 when interrupted."""
 
 import json
+import sys
 
 import pytest
 
@@ -34,6 +35,14 @@ def test_errors_of_a_run(render, jobs, error, code, words):
     assert result.stdout == ""
     assert result.stderr.count("Error: ") == 1
     assert words in result.stderr
+
+
+def test_a_library_that_dr_jit_misses_is_a_failure_with_a_remedy(render, jobs, monkeypatch):
+    monkeypatch.setitem(sys.modules, "drjit", None)
+    result = render()
+    assert result.exit_code == 1
+    assert "sudo apt-get install" in result.stderr
+    assert jobs.seen == []
 
 
 def test_debug_shows_the_traceback(render, jobs):

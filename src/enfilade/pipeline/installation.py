@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from enfilade import __version__
-from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, Choice, activate
+from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, Choice, activate, load
 from enfilade.errors import DeviceError
 
 _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)(.*?)(?:;.*extra\s*==\s*['\"]([^'\"]+)['\"].*)?$")
@@ -64,7 +64,7 @@ def examine(choice: Choice = "auto") -> list[Check]:
         *_packages(),
     ]
     if all(c.is_ok for c in checks if c.name in ("drjit", "mitsuba")):
-        checks += [_llvm(), _gpu(), _variant(choice)]
+        checks += _devices(choice)
     if all(c.is_ok for c in checks if c.name == "av"):
         checks += _codecs()
     return checks
@@ -84,9 +84,18 @@ def _packages() -> Iterator[Check]:
         yield Check(f"{name} (extra {extra})" if extra else name, found, extra is None, remedy)
 
 
-def _llvm() -> Check:
-    import drjit as dr
+def _devices(choice: Choice) -> Iterator[Check]:
+    try:
+        dr = load()
+    except DeviceError as error:
+        yield Check("system libraries", "", True, str(error))
+        return
+    yield _llvm(dr)
+    yield _gpu(dr)
+    yield _variant(choice)
 
+
+def _llvm(dr: Any) -> Check:
     name = f"LLVM {LLVM_MINIMUM} or newer"
     is_needed = not dr.has_backend(dr.JitBackend.CUDA)
     if not dr.has_backend(dr.JitBackend.LLVM):
@@ -96,9 +105,7 @@ def _llvm() -> Check:
     return Check(name, found, is_needed, "" if version[0] >= LLVM_MINIMUM else INSTALL_LLVM)
 
 
-def _gpu() -> Check:
-    import drjit as dr
-
+def _gpu(dr: Any) -> Check:
     if not dr.has_backend(dr.JitBackend.CUDA):
         return Check("NVIDIA GPU", "", False, "only --device gpu needs one, with its driver")
     version = ".".join(map(str, dr.detail.cuda_version()))
