@@ -23,10 +23,11 @@ from enfilade.camera import Camera, planar_warp
 from enfilade.pixels.gather import bilinear_taps
 from enfilade.pixels.reproject import reproject, warp_jacobian
 from enfilade.pixels.splat import EMPTY, INFINITE, Splats, splat_nearest
-from enfilade.records import F32, Geometry, Keyframe, Warped
+from enfilade.records import F32, U32, Geometry, Keyframe, Warped
 from enfilade.settings import WarpSettings
 
 CONTINUOUS = 0.1  # relative change of disparity between neighbours that is still one surface
+EVEN = 0.1  # relative difference of two such changes in a row that make one slope
 
 
 def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) -> Warped:
@@ -63,19 +64,28 @@ def disparity_gradient(geometry: Geometry) -> F32:
     """
     disparity, item = geometry.disparity, geometry.item
     gradient = np.zeros((*disparity.shape, 2), np.float32)
-    for component, axis in ((0, 1), (1, 0)):
-        step = np.diff(disparity, axis=axis)
-        size = np.minimum(np.delete(disparity, -1, axis=axis), np.delete(disparity, 0, axis=axis))
-        is_same = np.diff(item.astype(np.int64), axis=axis) == 0
-        step = np.where(is_same & (np.abs(step) <= CONTINUOUS * size), step, np.inf)
-        border = [(0, 0), (0, 0)]
-        border[axis] = (1, 0)
-        behind = np.pad(step, border, constant_values=np.inf)
-        border[axis] = (0, 1)
-        ahead = np.pad(step, border, constant_values=np.inf)
-        smaller = np.where(np.abs(behind) < np.abs(ahead), behind, ahead)
-        gradient[..., component] = np.where(np.isfinite(smaller), smaller, 0.0)
+    gradient[..., 0] = _smaller_step(disparity, item)
+    gradient[..., 1] = _smaller_step(disparity.T, item.T).T
     return gradient
+
+
+def _smaller_step(disparity: F32, item: U32) -> F32:
+    """Change of the disparity to the left or right neighbour, 0 where neither lies on the same surface."""
+    step = np.diff(disparity, axis=1)
+    is_same = np.diff(item.astype(np.int64), axis=1) == 0
+
+    # A small step, or one of an even slope: towards the horizon of a plane every step is large.
+    is_small = np.abs(step) <= CONTINUOUS * np.minimum(disparity[:, 1:], disparity[:, :-1])
+    size = np.abs(step)
+    is_even = is_same[:, 1:] & is_same[:, :-1]
+    is_even &= np.abs(np.diff(step, axis=1)) <= EVEN * np.minimum(size[:, 1:], size[:, :-1])
+    is_sloped = np.pad(is_even, ((0, 0), (1, 0))) | np.pad(is_even, ((0, 0), (0, 1)))
+    step = np.where(is_same & (is_small | is_sloped[:, : step.shape[1]]), step, np.inf)
+
+    behind = np.pad(step, ((0, 0), (1, 0)), constant_values=np.inf)
+    ahead = np.pad(step, ((0, 0), (0, 1)), constant_values=np.inf)
+    smaller = np.where(np.abs(behind) < np.abs(ahead), behind, ahead)
+    return np.where(np.isfinite(smaller), smaller, 0.0).astype(np.float32)
 
 
 @dataclass(frozen=True)
