@@ -32,6 +32,8 @@ def painted(splats, order, width, height, reach):
         # Draw into the part of the image around the splat alone.
         left, top = int(max(x - reach - 1, 0)), int(max(y - reach - 1, 0))
         right, bottom = int(min(x + reach + 2, width)), int(min(y + reach + 2, height))
+        if right <= left or bottom <= top:
+            continue
         for column, row, _, _ in parallelogram(x - left, y - top, by_x, by_y, right - left, bottom - top):
             winner[top + row, left + column] = lane
     return winner

@@ -13,14 +13,10 @@ def parallelogram(x, y, by_x, by_y, width, height):
     jacobian = np.array([[by_x[0], by_y[0]], [by_x[1], by_y[1]]], float)
     if np.linalg.det(jacobian) <= 1e-6:
         return []
-    inverse = np.linalg.inv(jacobian)
-    covered = []
-    for row in range(height):
-        for column in range(width):
-            s, t = inverse @ (column + 0.5 - x, row + 0.5 - y)
-            if abs(s) <= HALF and abs(t) <= HALF:
-                covered.append((column, row, s, t))
-    return covered
+    row, column = np.mgrid[:height, :width].reshape(2, -1)
+    s, t = np.linalg.inv(jacobian) @ (column + 0.5 - x, row + 0.5 - y)
+    is_covered = (np.abs(s) <= HALF) & (np.abs(t) <= HALF)
+    return list(zip(*(v[is_covered].tolist() for v in (column, row, s, t)), strict=True))
 
 
 def is_within_reach(by_x, by_y, reach):
