@@ -33,13 +33,14 @@ def spatial_support_px(speed_deg_s: F32, pixels_per_degree: float, settings: Ant
     """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11.
 
     These are the paper's pixels, of which 28 make a degree. The three pixels at rest antialias, and
-    stay three on any screen; what velocity adds is blur that the eye does not see, an angle.
+    stay three on any screen; what velocity adds is blur that the eye does not see, an angle. Settings
+    that take some away leave one pixel at least.
     """
     rise = settings.support_fast_px - settings.support_still_px
     beyond = settings.support_beyond_px - settings.support_still_px
     added = np.where(speed_deg_s > settings.fast_deg_s, beyond, rise * speed_deg_s / settings.fast_deg_s)
     support = settings.support_still_px + added * (pixels_per_degree / PAPER_PIXELS_PER_DEGREE)
-    return support.astype(np.float32)
+    return np.maximum(support, 1.0).astype(np.float32)
 
 
 def temporal_limits(speed_deg_s: F32, geometry: Geometry, settings: AntialiasSettings) -> TemporalLimits:
