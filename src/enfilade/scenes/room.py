@@ -14,8 +14,8 @@ from enfilade.scenes.walk import Walk
 from enfilade.scenes.writer import SceneWriter
 
 MATTE = {
-    "plaster": "#f1ece1",
-    "joinery": "#eee8da",
+    "plaster": "#e6e0d4",
+    "joinery": "#e2dccd",
     "walnut-edge": "#5b3d29",
     "soot": "#2b2724",
     "curtain": "#b9573f",

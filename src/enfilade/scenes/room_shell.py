@@ -26,6 +26,8 @@ from enfilade.scenes.solids import extrude_parts, join, span, sphere
 from enfilade.scenes.sweeps import moulding, tube
 from enfilade.scenes.writer import SceneWriter
 
+LANTERN_RIM = [(0.4 * out, 0.35 * z) for out, z in joinery.CORNICE]  # low: it must not shade the walls
+
 
 def add_shell(writer: SceneWriter) -> None:
     """Add floor, ceiling, walls and their mouldings."""
@@ -79,19 +81,19 @@ def add_lantern(writer: SceneWriter) -> None:
         span((x0 - 0.1, y1, HEIGHT), (x1 + 0.1, y1 + 0.1, HEIGHT + 0.3)),
     ]
     bars = [
-        span((x - 0.025, y0, HEIGHT + 0.07), (x + 0.025, y1, HEIGHT + 0.12))
+        span((x - 0.025, y0, HEIGHT - 0.02), (x + 0.025, y1, HEIGHT + 0.03))
         for x in np.linspace(x0, x1, 6)[1:-1]
     ]
     bars += [
-        span((x0, y - 0.025, HEIGHT + 0.07), (x1, y + 0.025, HEIGHT + 0.12))
+        span((x0, y - 0.025, HEIGHT - 0.02), (x1, y + 0.025, HEIGHT + 0.03))
         for y in np.linspace(y0, y1, 4)[1:-1]
     ]
     line = [(x0, y0), (x0, y1), (x1, y1), (x1, y0)]
-    rim = moulding(joinery.CORNICE, line, closed=True).at(0, 0, HEIGHT + 0.01)
+    rim = moulding(LANTERN_RIM, line, closed=True).at(0, 0, HEIGHT)
     writer.mesh("lantern", join([*walls, *bars, rim]), "plaster")
     sky = flat(x1 - x0, y1 - y0).turned(180, "x")
-    writer.mesh("lantern-sky", sky.at((x0 + x1) / 2, (y0 + y1) / 2, HEIGHT + 0.17), "plaster")
-    writer.light("#f4f8ff", 6.5, share=5.0)
+    writer.mesh("lantern-sky", sky.at((x0 + x1) / 2, (y0 + y1) / 2, HEIGHT + 0.05), "plaster")
+    writer.light("#f4f8ff", 7.2, share=5.0)
 
 
 def add_windows(writer: SceneWriter, preset: Preset) -> None:

@@ -77,7 +77,7 @@ def chequer(size: int, colours: tuple[Colour, Colour], cells: int, seed: int, jo
     u, v = grid(size)
     i, j = (u * cells).astype(int), (v * cells).astype(int)
     shade = np.random.default_rng(seed).normal(0.0, 0.028, (cells, cells))[j, i]
-    marble = cloud(u, v, 8, seed, 5) - 0.5
+    marble = cloud(u, v, 8, seed) - 0.5
     vein = np.clip(1 - 14 * np.abs(cloud(u + 0.31 * i, v + 0.17 * j, 5, seed + 7, 4) - 0.5), 0, 1)
     image = blend(colours[0], colours[1], ((i + j) % 2).astype(float))
     image = image + (shade + 0.13 * marble)[..., None]

@@ -45,7 +45,7 @@ class SceneWriter:
         Mitsuba puts v = 0 at a file's first row, so it is stored upside down: v points up.
         """
         relative = f"textures/{name}.png"
-        Image.fromarray(image[::-1]).save(self.folder / relative, optimize=False)
+        Image.fromarray(image[::-1]).save(self.folder / relative, compress_level=3)
         return relative
 
     def radiance(self, name: str, image: npt.NDArray[np.float32]) -> str:
