@@ -107,6 +107,6 @@ def _mean(sums: npt.NDArray[np.float64], spp: int) -> Shading:
     spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
     return Shading(
         color=np.ascontiguousarray(mean.T, np.float32),
-        variance=(spread / np.maximum(count - 1.0, 1.0)).astype(np.float32),
+        variance=np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0).astype(np.float32),
         dropped=int(spp * sums.shape[1] - sums[4].sum()),
     )
