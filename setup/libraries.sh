@@ -69,7 +69,7 @@ echo "setup: installing $packages"
 # Word splitting is meant: one argument a package.
 # shellcheck disable=SC2086
 install() {
-    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $packages >/dev/null
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends $packages >/dev/null
 }
 install || { $as_root apt-get update -qq && install; } || {
     echo "setup: apt-get could not install $packages; its reason stands above" >&2
