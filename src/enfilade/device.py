@@ -96,7 +96,7 @@ def _llvm() -> Device:
     import drjit as dr
 
     if not dr.has_backend(dr.JitBackend.LLVM):
-        raise DeviceError(f"no LLVM library that Dr.Jit can use was found on this machine; {INSTALL_LLVM}")
+        raise DeviceError(f"LLVM's library was not found on this machine, or is far too old; {INSTALL_LLVM}")
     version = tuple(dr.detail.llvm_version())
     if version[0] < LLVM_MINIMUM:
         found = ".".join(map(str, version))
