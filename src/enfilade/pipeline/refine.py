@@ -113,6 +113,10 @@ def judge(workshop: Workshop, segment: Segment) -> Verdict:
     items = visible_items(jnd, is_judged, view.geometry, settings.masks)
     is_slow = slow_pixels(view.speed_deg_s, settings.masks)
     rest = is_judged & ~is_slow & ~item_pixels(view.geometry.item, items)
+    if (is_judged & ~rest).any() and rest.mean() >= JUDGED_SHARE:
+        # Without it: the metric's filters spread a difference over what lies beside it.
+        with workshop.costs.of("metric"):
+            jnd, jnd_no_pursuit = _differences(workshop, view, before, after, rest)
     percent, percent_no_pursuit = (_percent_visible(j, rest) for j in (jnd, jnd_no_pursuit))
     return Verdict(
         middle=middle,
