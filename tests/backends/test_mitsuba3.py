@@ -445,3 +445,18 @@ def test_the_fingerprint_follows_the_scene_and_what_it_names(tmp_path):
     assert opened(write(tmp_path, shape)).describe().fingerprint == first
     mesh.write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
     assert opened(write(tmp_path, shape)).describe().fingerprint != first
+
+
+def test_the_cost_is_in_proportion_to_the_list(corner, monkeypatch):
+    renderer, camera = corner
+    radiance, paths = renderer._radiance, []
+
+    def counted(rays, rng):
+        paths.append(dr.width(rays.direction))
+        return radiance(rays, rng)
+
+    monkeypatch.setattr(renderer, "_radiance", counted)
+    for count, spp in ((768, 70), (38, 70), (1, 1), (0, 64)):
+        paths.clear()
+        traced(renderer, camera, everything(camera)[:count], spp=spp)
+        assert sum(paths) == count * spp

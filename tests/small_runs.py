@@ -1,0 +1,67 @@
+"""Small walkthroughs of analytic scenes, rendered from end to end."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.backends.analytic_scene import AnalyticScene, scene_text
+from enfilade.codec import read_exr
+from enfilade.monitor import Silence
+from enfilade.pipeline.job import Job
+from enfilade.pipeline.walkthrough import render
+from enfilade.records import CameraPath
+from enfilade.settings import Settings
+from enfilade.store import Run
+
+# A screen of 96 x 72 px, 3 cm wide, seen from half a metre: the paper's 28 pixels a degree, so that a
+# pixel a frame is 1.07 deg/s. Keyframes every 6 frames, never split unless a test is about that.
+TABLES: dict[str, dict[str, Any]] = {
+    "viewing": {"diagonal_m": 0.0375},
+    "keyframes": {"spacing": 6},
+    "trace": {"spp": 4},
+    "masks": {"split_percent": 100.0},
+}
+
+
+def job_of(
+    folder: Path, scene: AnalyticScene, path: CameraPath, *, method: str = "paper", **tables: dict[str, Any]
+) -> Job:
+    file = folder / "scene.analytic.json"
+    file.write_text(scene_text(scene))
+    merged = {name: TABLES.get(name, {}) | tables.get(name, {}) for name in {*TABLES, *tables}}
+    return Job(file, path, Settings.from_tables(merged), method)
+
+
+def rendered(folder: Path, job: Job, name: str = "run", monitor: Any = None) -> tuple[dict[str, Any], Path]:
+    """Summary and run folder."""
+    return render(job, folder / name, monitor or Silence()), folder / name
+
+
+def frame_bytes(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in sorted((folder / "frames").glob("*.exr"))}
+
+
+def colors(folder: Path) -> np.ndarray:
+    """All frames, (N, H, W, 3) float64."""
+    files = sorted((folder / "frames").glob("*.exr"))
+    return np.stack([read_exr(file)["RGB"].astype(float) for file in files])
+
+
+def units(folder: Path) -> dict[str, dict[str, Any]]:
+    """What the ledger says of each unit, but for what it cost."""
+    lines = Run.existing(folder).lines()
+    return {line["unit"]: {k: v for k, v in line.items() if k != "cost"} for line in lines}
+
+
+def part_of(path: CameraPath, frames: range) -> CameraPath:
+    return CameraPath(
+        path.cameras[frames.start : frames.stop], path.numbers[frames.start : frames.stop], path.fps
+    )
+
+
+def with_cut(path: CameraPath, frame: int) -> CameraPath:
+    return dataclasses.replace(path, cuts=frozenset({frame}))
