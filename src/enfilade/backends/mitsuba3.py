@@ -6,6 +6,7 @@ since changing its size or crop compiles anew and its Gaussian filter adds in no
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -247,5 +248,5 @@ def _lane_sampler() -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """Mitsuba's message without the prefix that says where in its own code it was raised."""
-    return str(error).strip().splitlines()[-1].strip()
+    """Mitsuba's message without the places in its own code where it was raised."""
+    return re.sub(r"\[\w+\.(?:cpp|h):\d+\] ", "", str(error).strip().splitlines()[-1]).strip()
