@@ -1,0 +1,1 @@
+"""The metric against people: published measurements, and what the metric says of the same stimuli."""

@@ -1,0 +1,44 @@
+"""Screens of laboratories, which are described by pixels per degree."""
+
+from __future__ import annotations
+
+import math
+
+from enfilade.viewing import Viewing
+
+__all__ = ["screen"]
+
+DISTANCE_M = 1.0  # any: only the angle of a pixel counts
+
+
+def screen(
+    size_px: int, pixels_per_degree: float, *, fps: float = 60.0, peak_cd_m2: float = 100.0
+) -> Viewing:
+    """Viewing conditions of a square image, from the angle that a pixel covers.
+
+    Parameters
+    ----------
+    size_px : int
+        Side of the image, pixels.
+    pixels_per_degree : float
+        At the centre of the screen.
+    fps : float
+        Images per second.
+    peak_cd_m2 : float
+        Luminance of white, cd/m2; black is 0.
+
+    Returns
+    -------
+    Viewing
+        With `pixels_per_degree` as given.
+    """
+    pitch_m = DISTANCE_M * math.tan(math.radians(1.0)) / pixels_per_degree
+    return Viewing(
+        size_px,
+        size_px,
+        diagonal_m=pitch_m * math.hypot(size_px, size_px),
+        distance_m=DISTANCE_M,
+        fps=fps,
+        peak_cd_m2=peak_cd_m2,
+        black_cd_m2=0.0,
+    )
