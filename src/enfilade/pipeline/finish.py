@@ -64,18 +64,20 @@ def write_video(workshop: Workshop) -> str:
     job = workshop.job
     file = workshop.run.folder / f"video{video_suffix(job.settings.video.codec)}"
     workshop.monitor.stage("video", len(job.path))
-    if not workshop.run.done("video"):
-        with workshop.costs.of("video"):
-            encode_video(
-                file,
-                _finished(workshop),
-                fps=job.path.fps,
-                width=job.path.width,
-                height=job.path.height,
-                settings=job.settings.video,
-                exposure_ev=job.settings.viewing.exposure_ev,
-            )
-        workshop.finish("video", [file])
+    if workshop.run.done("video"):
+        workshop.monitor.advance(len(job.path))
+        return file.name
+    with workshop.costs.of("video"):
+        encode_video(
+            file,
+            _finished(workshop),
+            fps=job.path.fps,
+            width=job.path.width,
+            height=job.path.height,
+            settings=job.settings.video,
+            exposure_ev=job.settings.viewing.exposure_ev,
+        )
+    workshop.finish("video", [file])
     return file.name
 
 
