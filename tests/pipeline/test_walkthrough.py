@@ -350,3 +350,19 @@ def test_no_kernel_is_compiled_from_frame_to_frame(tmp_path):
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert len(kernels) > 100
     assert not [k for k in kernels if not k["cache_hit"]]
+
+
+def test_where_the_camera_rests_the_image_is_antialiased(tmp_path):
+    # The frame that a rest repeats is looked at for long: its paths are spread over the pixels.
+    walk = room_walk(24)
+    where = [0, 1, 2, 3, 4, 5, 6, *[7] * 11, 8, 9, 10, 11]
+    path = CameraPath(tuple(walk.cameras[i] for i in where), tuple(range(1, len(where) + 1)), 30.0)
+    job = job_of(tmp_path, room(), path, trace={"spp": 16})
+    summary, folder = rendered(tmp_path, job)
+    traced = [row["traced"] for row in summary["per_frame"]]
+    assert traced[7] == 100.0
+    assert traced[8:18] == [0.0] * 10
+    reference = job_of(tmp_path, room(), path, method="reference", trace={"spp": 64})
+    truth = colors(rendered(tmp_path, reference, "reference")[1])
+    scores = [psnr(a, b) for a, b in zip(colors(folder), truth, strict=True)]
+    assert min(scores[9:16]) > max(scores[2:5]) + 3

@@ -25,7 +25,7 @@ class View:
     geometry : Geometry
     flow : Flow
     speed_deg_s : (H, W) float32
-        Velocity of each pixel's pattern (§3.3).
+        Velocity of each pixel's pattern (§3.3); 0 also where a rest of the camera begins and ends.
     velocity_deg_s : (H, W, 2) float32
         The same with its direction.
     """
@@ -60,10 +60,14 @@ class Views:
 
     def _find(self, frame: int) -> View:
         geometry = find_geometry(self._renderer, self._path.cameras[frame])
-        flow = image_flow(geometry, *self._path.neighbours(frame))
+        neighbours = self._path.neighbours(frame)
+        flow = image_flow(geometry, *neighbours)
+        speed = flow.speed
+        if any(camera and camera.is_same_view(geometry.camera) for camera in neighbours):
+            speed = np.zeros_like(speed)  # it is looked at as long as the camera rests
         return View(
             geometry=geometry,
             flow=flow,
-            speed_deg_s=self._viewing.velocity_deg_s(flow.speed),
+            speed_deg_s=self._viewing.velocity_deg_s(speed),
             velocity_deg_s=np.ascontiguousarray(self._viewing.velocity_deg_s(flow.motion)),
         )
