@@ -150,7 +150,7 @@ def test_the_walk_to_be_interrupted_has_something_to_lose(whole):
     assert any(line.get("sources", {}).get("hole", 0) for line in lines.values())
 
 
-@pytest.mark.parametrize("after", [0, 5, 13, 15, 18, 22, 31, 37, 45])
+@pytest.mark.parametrize("after", [0, 5, 13, 18, 31, 45])
 def test_killed_anywhere_it_ends_with_the_same_frames(whole, tmp_path, after):
     job = resumed_job(tmp_path)
     with pytest.raises(KeyboardInterrupt):
@@ -186,7 +186,7 @@ def test_a_lost_frame_is_made_again(whole, tmp_path):
 
 
 def test_the_chunk_changes_no_byte(whole, tmp_path):
-    job = resumed_job(tmp_path, trace={"spp": 16, "chunk": 1024})
+    job = resumed_job(tmp_path, trace={"spp": 16, "chunk": 4096})
     assert frame_bytes(rendered(tmp_path, job)[1]) == frame_bytes(whole)
 
 
@@ -315,7 +315,7 @@ def test_noise_of_a_single_path_splits_no_segment(tmp_path):
     assert not any(s["is_split"] for s in segments)
 
 
-@pytest.mark.parametrize("before", [1, 2, 4, 9, 15, 25, 37])
+@pytest.mark.parametrize("before", [1, 2, 9, 37])
 def test_killed_before_the_ledger_knows_of_a_file(whole, tmp_path, monkeypatch, before):
     job = resumed_job(tmp_path)
     finish, calls = Workshop.finish, itertools.count(1)
