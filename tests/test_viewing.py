@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enfilade.errors import InputError
-from enfilade.viewing import Viewing
+from enfilade.viewing import DISPLAYS, Viewing, display_named
 
 
 def test_paper_conditions():
@@ -71,3 +71,19 @@ def test_out_of_range_is_refused_by_name(field, number):
     numbers = {"width_px": 640, "height_px": 480, field: number}
     with pytest.raises(InputError, match=field):
         Viewing(**numbers)
+
+
+@pytest.mark.parametrize("display", DISPLAYS, ids=lambda d: d.name)
+def test_displays_show_pixel_for_pixel(display):
+    whole = display.viewing(display.width_px, display.height_px, 60.0)
+    part = display.viewing(100, 50, 60.0)
+    assert part.pixels_per_degree == pytest.approx(whole.pixels_per_degree)
+    assert (part.width_px, part.height_px, part.fps) == (100, 50, 60.0)
+    assert 25.0 < whole.pixels_per_degree < 120.0  # from the paper's screen to a phone held close
+    assert whole.black_cd_m2 < whole.peak_cd_m2 / 400
+
+
+def test_displays_by_name():
+    assert display_named("paper").viewing(640, 480, 30.0) == Viewing(640, 480)
+    with pytest.raises(InputError, match=r"unknown display 'tv'; known are: paper, .*tv-55-4k"):
+        display_named("tv")
