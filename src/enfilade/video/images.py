@@ -57,6 +57,7 @@ class ImageFiles:
     def __init__(self, files: list[Path], fps: float | None = None) -> None:
         self.files = files
         self.fps = fps
+        self._held: tuple[Path, dict[str, Any]] | None = None  # of the frame last read, once layers are used
         if files[0].suffix.lower() == ".exr":
             _check_primaries(files[0])
         self.height, self.width = _linear(files[0]).shape[:2]
@@ -67,7 +68,7 @@ class ImageFiles:
     def __iter__(self) -> Iterator[F32]:
         """Images as (H, W, 3) float32 linear Rec.709, in order; a second iteration begins anew."""
         for file in self.files:
-            linear = _linear(file)
+            linear = self._read(file)
             height, width = linear.shape[:2]
             if (height, width) != (self.height, self.width):
                 raise ImageError(
@@ -83,22 +84,31 @@ class ImageFiles:
     def layers(self, index: int) -> dict[str, Any]:
         """All layers of an OpenEXR frame, see :func:`~enfilade.codec.read_exr`.
 
+        Those of the frame that the iteration has just given are not read again.
+
         Raises
         ------
         ImageError
             It is no OpenEXR file, or damaged.
         """
-        return read_exr(self.files[index])
+        if self._held is None or self._held[0] != self.files[index]:
+            self._held = self.files[index], read_exr(self.files[index])
+        return self._held[1]
+
+    def _read(self, file: Path) -> F32:
+        if self._held is None:
+            return _linear(file)
+        self._held = file, read_exr(file)
+        return _from_exr(file, self._held[1])
 
 
 def _linear(file: Path) -> F32:
     if file.suffix.lower() == ".exr":
-        return _from_exr(file)
+        return _from_exr(file, read_exr(file))
     return srgb_decode(_opaque(file, deep_png(file)) if _is_deep_png(file) else _from_pillow(file))
 
 
-def _from_exr(file: Path) -> F32:
-    layers = read_exr(file)
+def _from_exr(file: Path, layers: dict[str, Any]) -> F32:
     combined = [n for n in layers if n.lower().endswith("combined") and layers[n].ndim == 3]
     name = "RGB" if "RGB" in layers else combined[0] if len(combined) == 1 else None
     if name is not None and layers[name].dtype != np.uint32:
