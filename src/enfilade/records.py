@@ -45,6 +45,39 @@ class Source(IntEnum):
     HOLE = 4
 
 
+@dataclass(frozen=True)
+class Segment:
+    """Two keyframes and the frames between them, as indices on the path (§4.3).
+
+    Attributes
+    ----------
+    first, last : int
+        The keyframes.
+    depth : int
+        How often an initial segment was split to make this one.
+    """
+
+    first: int
+    last: int
+    depth: int = 0
+
+    @property
+    def inbetweens(self) -> range:
+        """Frames that are neither keyframe."""
+        return range(self.first + 1, self.last)
+
+    def progress(self, frame: int) -> float:
+        """Where a frame lies between the keyframes, 0..1."""
+        return (frame - self.first) / (self.last - self.first)
+
+    def split(self, frame: int) -> tuple[Segment, Segment]:
+        """Two halves that share a frame."""
+        return (
+            Segment(self.first, frame, self.depth + 1),
+            Segment(frame, self.last, self.depth + 1),
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class CameraPath:
     """The cameras of a walkthrough.
@@ -96,6 +129,11 @@ class CameraPath:
                 break
             frame -= 1
         return frame
+
+    def middle(self, segment: Segment) -> int | None:
+        """The in-between that stands for a segment (§4.3): the middle one of those that move."""
+        moving = [frame for frame in segment.inbetweens if self.original(frame) == frame]
+        return moving[(len(moving) - 1) // 2] if moving else None
 
     def shots(self) -> list[range]:
         """Runs of frames without a cut between them."""
@@ -256,39 +294,6 @@ class Warped:
         _check(self.depth, size, np.float32, "depth")
         _check(self.item, size, np.uint32, "item")
         _check(self.magnification, size, np.float32, "magnification")
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Two keyframes and the frames between them, as indices on the path (§4.3).
-
-    Attributes
-    ----------
-    first, last : int
-        The keyframes.
-    depth : int
-        How often an initial segment was split to make this one.
-    """
-
-    first: int
-    last: int
-    depth: int = 0
-
-    @property
-    def inbetweens(self) -> range:
-        """Frames that are neither keyframe."""
-        return range(self.first + 1, self.last)
-
-    def progress(self, frame: int) -> float:
-        """Where a frame lies between the keyframes, 0..1."""
-        return (frame - self.first) / (self.last - self.first)
-
-    def split(self, frame: int) -> tuple[Segment, Segment]:
-        """Two halves that share a frame."""
-        return (
-            Segment(self.first, frame, self.depth + 1),
-            Segment(frame, self.last, self.depth + 1),
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import pytest
 
 from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
 from enfilade.codec import read_exr
-from enfilade.errors import RunFolderError
+from enfilade.errors import RunFolderError, SettingsError
 from enfilade.monitor import Silence
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.workshop import Workshop
@@ -308,11 +308,29 @@ def test_a_surface_that_changes_with_the_view_unannounced_splits(tmp_path):
     assert max(depths) >= 1
 
 
-@pytest.mark.xfail(strict=True, reason="a single path says nothing of its variance: every segment is split")
-def test_noise_of_a_single_path_splits_no_segment(tmp_path):
-    path = slide(13, step=0.06, size=(96, 72))
-    segments = segments_of(tmp_path, wall(noise=1.0), path, trace={"spp": 1})
-    assert not any(s["is_split"] for s in segments)
+def test_a_single_path_is_refused(tmp_path):
+    # It says nothing of its variance: the metric would take all noise for differences.
+    with pytest.raises(SettingsError, match="--spp 2 or more"):
+        rendered(tmp_path, job_of(tmp_path, wall(), slide(3), trace={"spp": 1}))
+
+
+def test_splitting_ends_where_it_does_not_help(tmp_path):
+    # Checks sampled at pixel centres, 4 px/deg, no noise: both warps alias differently however near they are.
+    masks = {"split_percent": 10.0}
+    segments = segments_of(tmp_path, room(), room_walk(33), trace={"spp": 2}, masks=masks)
+    assert segments[0]["is_split"]
+    whole = {(s["first"], s["last"]): s["percent_visible"] for s in segments}
+    for s in segments:
+        if s["is_split"] and s["depth"]:
+            parents = [
+                v
+                for (a, b), v in whole.items()
+                if a <= s["first"] and s["last"] <= b and v > s["percent_visible"]
+            ]
+            assert parents
+    kept = [s for s in segments if not s["is_split"]]
+    assert any(s["percent_visible"] > 10.0 for s in kept)
+    assert len(kept) < 16
 
 
 @pytest.mark.parametrize("before", [1, 2, 9, 37])

@@ -92,8 +92,9 @@ def _summed(radiance: Any, width: int) -> npt.NDArray[np.float32]:
     """Sums over the finite paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
     radiance = Array3f(radiance)
     luminance = dr.dot(radiance, Array3f(*LUMINANCE))
-    is_valid = dr.isfinite(luminance)
-    values = [*radiance, luminance * luminance, Float(1)]
+    squared = luminance * luminance
+    is_valid = dr.isfinite(squared)  # what overflows when squared is no radiance either
+    values = [*radiance, squared, Float(1)]
     values = [dr.select(is_valid, v, 0) for v in values]
     # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
     dr.eval(values)

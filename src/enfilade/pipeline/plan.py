@@ -83,16 +83,19 @@ def plan(job: Job, monitor: Monitor) -> Plan:
         specular_percent=survey.specular_percent,
         hole_percent=tuple(holes.get(frame) for frame in range(len(job.path))),
         keyframes=tuple(numbers[k] for k in keyframes),
-        segments=tuple(
-            {
-                "first": numbers[s.first],
-                "last": numbers[s.last],
-                "middle": numbers[(s.first + s.last) // 2],
-            }
-            for s in segments
-        ),
+        segments=tuple(_numbered(job, segment) for segment in segments),
         forecast=_forecast(job, survey, segments, holes, _path_seconds(job, renderer)),
     )
+
+
+def _numbered(job: Job, segment: Segment) -> dict[str, int]:
+    middle = job.path.middle(segment)
+    frames = {
+        "first": segment.first,
+        "last": segment.last,
+        "middle": segment.first if middle is None else middle,
+    }
+    return {name: job.path.numbers[frame] for name, frame in frames.items()}
 
 
 def _expected_holes(job: Job, views: Views, segments: list[Segment], monitor: Monitor) -> dict[int, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,8 @@ from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Mask, Segment, Warped
 from enfilade.warp import agrees, warp_keyframe
 
-JUDGED_SHARE = 0.01  # of the image: fewer unmasked pixels than this say nothing about a segment
+JUDGED_SHARE = 0.05  # of the image: fewer unmasked pixels than this say nothing about a segment
+GAIN = 0.9  # a half must show less than this part of its whole's differences to be split again
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Verdict:
     percent_visible, percent_visible_no_pursuit : float
         Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
     is_split : bool
+        More of them than the settings allow, and splitting still helps.
     """
 
     middle: int | None
@@ -50,21 +52,33 @@ class Verdict:
         return Verdict(**{**table, "items": tuple(table["items"])})
 
 
-def refine(workshop: Workshop, segment: Segment) -> list[tuple[Segment, Verdict]]:
+def refine(
+    workshop: Workshop, segment: Segment, whole: Verdict | None = None
+) -> list[tuple[Segment, Verdict]]:
     """Split a segment until what is reused in it can't be told from what is traced.
+
+    Or until splitting helps no more: differences that do not shrink with the segment, such as the
+    aliasing of keyframes sampled at pixel centres, are not those of reuse.
+
+    Parameters
+    ----------
+    workshop
+    segment
+    whole
+        Verdict on the segment of which this is a half.
 
     Returns
     -------
     list of (Segment, Verdict)
         The segments that remain, in order.
     """
-    verdict = _recorded(workshop, segment) or _judge_and_record(workshop, segment)
+    verdict = _recorded(workshop, segment) or _judge_and_record(workshop, segment, whole)
     workshop.monitor.advance()
     if not verdict.is_split or verdict.middle is None:
         return [(segment, verdict)]
     halves = segment.split(verdict.middle)
     workshop.monitor.extend(len(halves))
-    return [kept for half in halves for kept in refine(workshop, half)]
+    return [kept for half in halves for kept in refine(workshop, half, verdict)]
 
 
 def segment_unit(workshop: Workshop, segment: Segment) -> str:
@@ -77,10 +91,12 @@ def _recorded(workshop: Workshop, segment: Segment) -> Verdict | None:
     return Verdict.from_dict(line["verdict"]) if line else None
 
 
-def _judge_and_record(workshop: Workshop, segment: Segment) -> Verdict:
+def _judge_and_record(workshop: Workshop, segment: Segment, whole: Verdict | None) -> Verdict:
     workshop.keyframe(segment.first)
     workshop.keyframe(segment.last)
     verdict = judge(workshop, segment)
+    if whole is not None and verdict.percent_visible >= GAIN * whole.percent_visible:
+        verdict = replace(verdict, is_split=False)
     workshop.finish(
         segment_unit(workshop, segment),
         [],
@@ -95,11 +111,10 @@ def _judge_and_record(workshop: Workshop, segment: Segment) -> Verdict:
 
 def judge(workshop: Workshop, segment: Segment) -> Verdict:
     """Warp both keyframes to the middle, and let the metric look for differences (§4.3, 2-5)."""
-    path, settings = workshop.job.path, workshop.job.settings
-    moving = [frame for frame in segment.inbetweens if path.original(frame) == frame]
-    if not moving:
+    settings = workshop.job.settings
+    middle = workshop.job.path.middle(segment)
+    if middle is None:
         return Verdict(None)
-    middle = moving[(len(moving) - 1) // 2]
     view = workshop.views[middle]
     before, after = warped_pair(workshop, segment, middle)
 

@@ -48,13 +48,17 @@ class Survey:
 def survey_path(views: Views, path: CameraPath, settings: Settings, monitor: Monitor) -> Survey:
     """Look at every frame."""
     monitor.stage("plan", len(path))
+    diagonal = float(np.hypot(path.width, path.height))
+    fastest = views.viewing.velocity_deg_s(diagonal)
     rows = []
     for frame in range(len(path)):
         view = views[frame]
+        # What comes too near to the eye moves by any number of pixels: it leaves the image, no more.
+        speed = np.minimum(view.flow.speed, diagonal)
         rows.append(
             (
-                float(view.flow.speed.mean()),
-                float(view.speed_deg_s.mean()),
+                float(speed.mean()),
+                float(np.minimum(view.speed_deg_s, fastest).mean()),
                 100.0 * float(slow_pixels(view.speed_deg_s, settings.masks).mean()),
                 100.0 * float(view.geometry.is_specular.mean()),
             )

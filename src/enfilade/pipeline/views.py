@@ -42,7 +42,7 @@ class Views:
     def __init__(self, renderer: Renderer, path: CameraPath, viewing: Viewing, costs: Costs) -> None:
         self._renderer = renderer
         self._path = path
-        self._viewing = viewing
+        self.viewing = viewing
         self._costs = costs
         self._kept: OrderedDict[int, View] = OrderedDict()
 
@@ -68,6 +68,6 @@ class Views:
         return View(
             geometry=geometry,
             flow=flow,
-            speed_deg_s=self._viewing.velocity_deg_s(speed),
-            velocity_deg_s=np.ascontiguousarray(self._viewing.velocity_deg_s(flow.motion)),
+            speed_deg_s=self.viewing.velocity_deg_s(speed),
+            velocity_deg_s=np.ascontiguousarray(self.viewing.velocity_deg_s(flow.motion)),
         )

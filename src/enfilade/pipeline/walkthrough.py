@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from enfilade.errors import SettingsError
 from enfilade.monitor import Monitor
 from enfilade.pipeline.finish import antialias_shot, trace_reference, write_video
 from enfilade.pipeline.inbetween import make_copy, make_inbetween, make_keyframe
@@ -17,7 +18,7 @@ from enfilade.records import Segment
 from enfilade.store import Run
 from enfilade.video import check_encodable
 
-SURVEY_FILE = "survey.json"
+LEAST_SPP = 2  # of the paper's method
 
 
 def render(job: Job, folder: Path, monitor: Monitor) -> dict[str, Any]:
@@ -42,15 +43,10 @@ def render(job: Job, folder: Path, monitor: Monitor) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The scene, or a folder that holds another run.
+        The scene, the settings, or a folder that holds another run.
     DeviceError
     """
-    check_encodable(
-        job.settings.video,
-        width=job.path.width,
-        height=job.path.height,
-        exposure_ev=job.settings.viewing.exposure_ev,
-    )
+    _check(job)
     renderer = open_renderer(job.scene, job.settings.trace)
     with Run.open(folder, job.identity(renderer)) as run:
         for note in run.notes:
@@ -68,6 +64,21 @@ def render(job: Job, folder: Path, monitor: Monitor) -> dict[str, Any]:
         summary = summarize(workshop, survey, video)
         run.write_json("summary.json", summary)
     return summary
+
+
+def _check(job: Job) -> None:
+    """Refuse now what would fail, or mislead, after a night of rendering."""
+    check_encodable(
+        job.settings.video,
+        width=job.path.width,
+        height=job.path.height,
+        exposure_ev=job.settings.viewing.exposure_ev,
+    )
+    if job.method == "paper" and job.settings.trace.spp < LEAST_SPP:
+        raise SettingsError(
+            f"--method paper needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "
+            "what is noise and what is a difference"
+        )
 
 
 def _surveyed(workshop: Workshop) -> Survey:
