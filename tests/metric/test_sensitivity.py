@@ -13,7 +13,7 @@ LADDER = bands(PPD)
 
 @pytest.fixture(scope="module")
 def table():
-    return SensitivityTable(spatiovelocity_sensitivity, LADDER, PPD)
+    return SensitivityTable(lambda rho, v, _: spatiovelocity_sensitivity(rho, v), LADDER, PPD)
 
 
 def test_table_is_the_formula(table):

@@ -16,11 +16,28 @@ from enfilade.metric.pooling import (
     root,
 )
 from enfilade.metric.pyramid import double, halve, halved_shape
+from enfilade.metric.spatial import gathered
 
-__all__ = ["Comparison", "Pool"]
+__all__ = ["Comparison", "Part", "Pool", "PoolingRule"]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one kind of errors contributes to a comparison.
+
+    Attributes
+    ----------
+    score : float
+        As `Comparison.score`, of this part alone, JND.
+    band_jnd : tuple of float
+        As `Comparison.band_jnd`, of this part alone, JND.
+    """
+
+    score: float
+    band_jnd: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +47,8 @@ class Comparison:
     Attributes
     ----------
     jnd : (H, W) float32
-        Differences pooled over the channels, in just noticeable differences; 0 where not valid.
+        Differences pooled over the channels (and, with spatial pooling, over what an eye gathers
+        that looks there), in just noticeable differences; 0 where not valid.
     probability : (H, W) float32
         1 - 0.25^jnd, the probability that the difference is seen there; 0 where not valid.
     valid : (H, W) bool
@@ -39,12 +57,16 @@ class Comparison:
         Share of the valid pixels above 1 JND, percent; 0 when none is valid.
     band_jnd : tuple of float
         Per radial band, finest first and base last: J of the band's channels pooled over
-        orientations and, as a mean, over the valid area, (mean sum_l J_kl^3.5)^(1/3.5), in JND.
+        orientations and, as a mean, over the valid area, (mean sum_l J_kl^b)^(1/b), in JND; b is
+        the exponent with which channels are pooled, 3.5 in the paper.
     score : float
-        One number for the image, JND: the map pooled over the valid pixels with the exponent of
-        the channels, (mean J^3.5)^(1/3.5). It lies between the mean and the largest JND, nearer to
-        the largest: small strong errors weigh more than faint large ones. The bands add up to it,
+        One number for the image, JND: the map pooled over the valid pixels, (mean J^3.5)^(1/3.5).
+        It lies between the mean and the largest JND, nearer to the largest: small strong errors
+        weigh more than faint large ones. In the paper's mode the bands add up to it,
         score^3.5 = sum_k band_jnd_k^3.5, but for interpolation (a few percent).
+    steady, transient : Part
+        What errors that stay contribute and what their change since the last frame does. Without
+        a change all is steady. The two add up channel by channel, as bands do.
     """
 
     jnd: Float32Array
@@ -53,6 +75,27 @@ class Comparison:
     percent_visible: float
     band_jnd: tuple[float, ...]
     score: float
+    steady: Part
+    transient: Part
+
+
+@dataclass(frozen=True)
+class PoolingRule:
+    """How channels and places become one map.
+
+    Attributes
+    ----------
+    exponent : float
+        b, with which the J of channels are summed.
+    spatial_exponent : float or None
+        With which J is gathered over space (`metric.spatial`); None: each pixel by itself.
+    pixels_per_degree : float
+        Of the viewing conditions.
+    """
+
+    exponent: float
+    spatial_exponent: float | None
+    pixels_per_degree: float
 
 
 class Pool:
@@ -64,46 +107,89 @@ class Pool:
         Bands of the Cortex transform.
     valid : (H, W) bool
         Pixels to judge.
+    rule : PoolingRule
+        Exponents.
     """
 
-    def __init__(self, bands: tuple[Band, ...], valid: BoolArray) -> None:
+    def __init__(self, bands: tuple[Band, ...], valid: BoolArray, rule: PoolingRule) -> None:
         self._valid = valid
-        self._sums: dict[int, Float32Array] = {}
+        self._rule = rule
         self._areas: dict[int, Float32Array] = {1: valid.astype(np.float32)}
-        self._band_sums = [0.0] * len(bands)
         reduction = 1
         while reduction < bands[-1].reduction:
             self._areas[2 * reduction] = halve(self._areas[reduction])
             reduction *= 2
-        for step, area in self._areas.items():
-            self._sums[step] = np.zeros_like(area)
+        self._weights = {step: float(area.sum(dtype=np.float64)) for step, area in self._areas.items()}
+        self._sums: dict[bool, dict[int, Float32Array]] = {False: {}, True: {}}
+        self._band_sums = {kind: [0.0] * len(bands) for kind in self._sums}
 
-    def add(self, band: Band, power: Float32Array) -> None:
-        """Add one channel's J^3.5, a map at the band's size."""
-        self._sums[band.reduction] += power
-        area = self._areas[band.reduction]
-        weight = float(area.sum(dtype=np.float64))
-        pooled = float(np.vdot(area, power))
-        self._band_sums[band.level - 1] += pooled / weight if weight else 0.0
+    def add(self, band: Band, power: Float32Array, *, is_transient: bool = False) -> None:
+        """Add one channel's J^b, a map at the band's size, which is kept."""
+        sums = self._sums[is_transient]
+        if band.reduction in sums:
+            sums[band.reduction] += power
+        else:
+            sums[band.reduction] = power
+        weight = self._weights[band.reduction]
+        pooled = float(np.vdot(self._areas[band.reduction], power))
+        self._band_sums[is_transient][band.level - 1] += pooled / weight if weight else 0.0
 
-    def comparison(self) -> Comparison:
-        """Finish: coarse sums interpolated to full size, roots, probabilities, figures."""
-        valid = self._valid
-        reduction = max(self._sums)
-        total = self._sums[reduction]
+    def _map(self, sums: dict[int, Float32Array]) -> Float32Array:
+        """J from the sums of channels: coarse ones interpolated to full size, root, gathered."""
+        valid, rule = self._valid, self._rule
+        if not sums:
+            return np.zeros(valid.shape, dtype=np.float32)
+        reduction = max(sums)
+        total = sums[reduction]
         while reduction > 1:
             reduction //= 2
             total = double(total, halved_shape(valid.shape, reduction))
-            total += self._sums[reduction]
-        total *= valid
-        jnd = root(total)
-        judged = max(int(np.count_nonzero(valid)), 1)
-        inverse = 1.0 / POOLING_EXPONENT
+            if reduction in sums:
+                total += sums[reduction]
+        total = total * valid
+        if rule.spatial_exponent is None:
+            return root(total, rule.exponent)
+        # The root and the spatial exponent in one step.
+        ratio = rule.spatial_exponent / rule.exponent
+        powered = total if ratio == 1.0 else total ** np.float32(ratio)
+        gathered_map = gathered(powered, rule.pixels_per_degree, rule.spatial_exponent)
+        gathered_map *= valid
+        return gathered_map
+
+    def _score(self, jnd: Float32Array) -> float:
+        judged = max(int(np.count_nonzero(self._valid)), 1)
+        total = float((jnd ** np.float32(POOLING_EXPONENT)).sum(dtype=np.float64))
+        return float((total / judged) ** (1.0 / POOLING_EXPONENT))
+
+    def _band_jnd(self, *kinds: bool) -> tuple[float, ...]:
+        sums = zip(*(self._band_sums[kind] for kind in kinds), strict=True)
+        return tuple(sum(of_kinds) ** (1.0 / self._rule.exponent) for of_kinds in sums)
+
+    def comparison(self) -> Comparison:
+        """Finish: maps, probabilities, figures."""
+        steady_map = self._map(self._sums[False])
+        steady = transient = 0.0
+        steady = self._score(steady_map)
+        jnd, score = steady_map, steady
+        if self._sums[True]:
+            transient = self._score(self._map(self._sums[True]))
+            jnd = self._map(_added(*self._sums.values()))
+            score = self._score(jnd)
         return Comparison(
             jnd=jnd,
             probability=detection_probability(jnd),
-            valid=valid,
-            percent_visible=percent_visible(jnd, valid),
-            band_jnd=tuple(pooled**inverse for pooled in self._band_sums),
-            score=(float(total.sum(dtype=np.float64)) / judged) ** inverse,
+            valid=self._valid,
+            percent_visible=percent_visible(jnd, self._valid),
+            band_jnd=self._band_jnd(False, True),
+            score=score,
+            steady=Part(steady, self._band_jnd(False)),
+            transient=Part(transient, self._band_jnd(True)),
         )
+
+
+def _added(*sums: dict[int, Float32Array]) -> dict[int, Float32Array]:
+    steps = sorted({step for of_kind in sums for step in of_kind})
+    return {
+        step: np.sum([of_kind[step] for of_kind in sums if step in of_kind], axis=0, dtype=np.float32)
+        for step in steps
+    }

@@ -7,6 +7,7 @@ of the bars) in degrees from x (right) towards y (down).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias, TypeVar
@@ -176,6 +177,8 @@ class CortexTransform:
         Sets the ladder, see `bands`.
     partition : Partition
         What the filters sum to.
+    tilt : callable, optional
+        (rho, band, base band) -> what every frequency of a band is multiplied by besides.
     workers : int
         Threads of the FFT.
     """
@@ -187,6 +190,7 @@ class CortexTransform:
         pixels_per_degree: float,
         *,
         partition: Partition = Partition.POWER,
+        tilt: Callable[[Float32Array, Band, Band], Float32Array] | None = None,
         workers: int = 1,
     ) -> None:
         self.height_px, self.width_px = height_px, width_px
@@ -201,6 +205,9 @@ class CortexTransform:
             / np.float32(band.reduction**2)
             for band in self.bands
         ]
+        if tilt is not None:
+            for band in self.bands:
+                self._radials[band.level - 1] *= tilt(self._crop(rho, band), band, self.bands[-1])
         self._fans = [self._window(_fan(theta, centre), partition) for centre in ORIENTATIONS_DEG]
 
     @staticmethod

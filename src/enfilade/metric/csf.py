@@ -24,7 +24,9 @@ DECAY_OFFSET_DEG_S = 2.0
 DECAY = 45.9
 
 
-def spatiovelocity_sensitivity(frequency_cpd: float, velocity_deg_s: Quantity) -> Quantity:
+def spatiovelocity_sensitivity(
+    frequency_cpd: float | npt.NDArray[np.float64], velocity_deg_s: Quantity
+) -> Quantity:
     """Contrast sensitivity to a grating that moves over the retina (Eq. 4).
 
     S = c0 (6.1 + 7.3 abs(log10(c2 v / 3))^3) c2 v (2 pi c1 rho)^2
@@ -32,7 +34,7 @@ def spatiovelocity_sensitivity(frequency_cpd: float, velocity_deg_s: Quantity) -
 
     Parameters
     ----------
-    frequency_cpd : float
+    frequency_cpd : float or array
         Spatial frequency rho, cycles per degree, 0 or more.
     velocity_deg_s : float or array
         Velocity v on the retina along the grating's frequency vector, degrees per second, above 0.

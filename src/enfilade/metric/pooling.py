@@ -43,20 +43,22 @@ def raised(squared: Float32Array) -> Float32Array:
     return power
 
 
-def root(pooled: Float32Array) -> Float32Array:
-    """J = (sum of J_kl^b)^(1/b), b = 3.5, from the sum.
+def root(pooled: Float32Array, exponent: float = POOLING_EXPONENT) -> Float32Array:
+    """J = (sum of J_kl^b)^(1/b) from the sum.
 
     Parameters
     ----------
     pooled : (...) float32
-        Sum over channels of J_kl^3.5, 0 or more.
+        Sum over channels of J_kl^b, 0 or more.
+    exponent : float
+        b, 3.5 in the paper.
 
     Returns
     -------
     (...) float32
         JND.
     """
-    return pooled ** np.float32(1.0 / POOLING_EXPONENT)
+    return pooled if exponent == 1.0 else pooled ** np.float32(1.0 / exponent)
 
 
 def detection_probability(jnd: Float32Array) -> Float32Array:

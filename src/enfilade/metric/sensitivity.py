@@ -1,4 +1,4 @@
-"""Sensitivity of every channel at every pixel: velocities through the CSF (Fig. 6)."""
+"""Sensitivity of every channel at every pixel: velocity and luminance through the CSF (Fig. 6)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.metric.adaptation import AdaptingLight
 from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
 from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed
 from enfilade.metric.pyramid import halve
@@ -18,48 +19,64 @@ __all__ = ["ChannelSensitivity", "SensitivityTable"]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 IndexArray: TypeAlias = npt.NDArray[np.intp]
+Csf: TypeAlias = Callable[[float, Float64Array, Float64Array], Float64Array]
 
 FASTEST_DEG_S = 2000.0  # faster retinal motion is taken as this: nothing is seen any more
-TABLE_SIZE = 4096  # 0.23 % between speeds
+SPEEDS = 4096  # 0.23 % between speeds
+SPEEDS_BY_LUMINANCE = 512  # 1.9 % between speeds, where luminance matters too
+LUMINANCES = 128  # 13 % between luminances, of which sensitivity depends on a small power
+LUMINANCE_RANGE_CD_M2 = (1e-3, 1e4)
 LEAST_SENSITIVITY = 1e-3  # contrast of 1000: never seen, and float32 powers stay normal
 
 
 class SensitivityTable:
-    """Sensitivity by retinal speed for every band, looked up on a logarithmic scale.
+    """Sensitivity by retinal speed and luminance for every band, looked up on logarithmic scales.
 
     Parameters
     ----------
     csf : callable
-        (frequency_cpd, velocities_deg_s) -> sensitivities, as `csf.spatiovelocity_sensitivity`.
+        (frequency_cpd, velocities_deg_s, luminances_cd_m2) -> sensitivities, broadcast.
     bands : tuple of Band
         Bands of the Cortex transform.
     pixels_per_degree : float
         Turns their centres into cycles per degree.
+    by_luminance : bool
+        Whether the CSF depends on luminance.
     """
 
     def __init__(
-        self,
-        csf: Callable[[float, Float64Array], Float64Array],
-        bands: tuple[Band, ...],
-        pixels_per_degree: float,
+        self, csf: Csf, bands: tuple[Band, ...], pixels_per_degree: float, *, by_luminance: bool = False
     ) -> None:
-        speeds = np.geomspace(EYE_DRIFT_DEG_S, FASTEST_DEG_S, TABLE_SIZE)
-        rows = [csf(band.centre_cpp * pixels_per_degree, speeds) for band in bands]
+        self._size = SPEEDS_BY_LUMINANCE if by_luminance else SPEEDS
+        self._luminances = LUMINANCES if by_luminance else 1
+        speeds = np.geomspace(EYE_DRIFT_DEG_S, FASTEST_DEG_S, self._size)
+        luminances = np.geomspace(*LUMINANCE_RANGE_CD_M2, self._luminances)[:, None]
+        rows = [csf(band.centre_cpp * pixels_per_degree, speeds, luminances) for band in bands]
         self._rows: list[Float32Array] = [
-            np.maximum(row, LEAST_SENSITIVITY).astype(np.float32) for row in rows
+            np.maximum(row, LEAST_SENSITIVITY).astype(np.float32).ravel() for row in rows
         ]
-        self._steps_per_e = (TABLE_SIZE - 1) / math.log(FASTEST_DEG_S / EYE_DRIFT_DEG_S)
+        self._steps_per_e = (self._size - 1) / math.log(FASTEST_DEG_S / EYE_DRIFT_DEG_S)
 
     def index(self, speed_deg_s: Float32Array) -> IndexArray:
         """Nearest entries for retinal speeds in deg/s, which are 0.15 or more."""
         steps = np.log(speed_deg_s * np.float32(1.0 / EYE_DRIFT_DEG_S))
         steps *= np.float32(self._steps_per_e)
         steps += np.float32(0.5)
-        np.clip(steps, 0, TABLE_SIZE - 1, out=steps)
+        np.clip(steps, 0, self._size - 1, out=steps)
         return np.asarray(steps, dtype=np.intp)
 
+    def luminance_offset(self, luminance_cd_m2: Float32Array) -> IndexArray:
+        """What to add to `index` for luminances in cd/m2, above 0."""
+        if self._luminances == 1:
+            return np.zeros((), dtype=np.intp)
+        darkest, brightest = LUMINANCE_RANGE_CD_M2
+        steps = np.log(luminance_cd_m2 * np.float32(1.0 / darkest))
+        steps = steps * np.float32((self._luminances - 1) / math.log(brightest / darkest))
+        steps = np.clip(steps + np.float32(0.5), 0, self._luminances - 1)
+        return np.asarray(steps, dtype=np.intp) * self._size
+
     def row(self, band: Band) -> Float32Array:
-        """Sensitivities of a band by entry."""
+        """Sensitivities of a band by entry; the first is that of a still eye."""
         return self._rows[band.level - 1]
 
 
@@ -78,6 +95,8 @@ class ChannelSensitivity:
         sensitivity counts. Empty when nothing moves.
     orientation : int or None
         Index into ORIENTATIONS_DEG; None for the base band.
+    light : AdaptingLight, optional
+        What the eye is adapted to; needed where the CSF depends on luminance.
     """
 
     def __init__(
@@ -85,8 +104,10 @@ class ChannelSensitivity:
         table: SensitivityTable,
         velocities: Sequence[Float32Array],
         orientation: int | None,
+        light: AdaptingLight | None = None,
     ) -> None:
         self._table = table
+        self._light = light
         self._reduction = 1
         theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
         self._speeds = [channel_speed(velocity, theta) for velocity in velocities]
@@ -111,13 +132,24 @@ class ChannelSensitivity:
         Returns
         -------
         () or (h, w) float32
-            A single number when nothing moves, else a map at the band's reduced size.
+            A single number when nothing moves and the light is even, else a map at the band's
+            reduced size.
         """
         row = self._table.row(band)
+        offset = self._offset(band)
         if not self._speeds:
-            return np.asarray(row[0])
+            return np.asarray(row[offset])
         self._coarsen(band.reduction)
-        first, *others = (row.take(index) for index in self._indices)
+        first, *others = (row.take(index + offset) for index in self._indices)
         for other in others:
             np.maximum(first, other, out=first)
         return first
+
+    def still(self, band: Band) -> Float32Array:
+        """Sensitivity of an eye that rests, shaped as `map`."""
+        return np.asarray(self._table.row(band)[self._offset(band)])
+
+    def _offset(self, band: Band) -> IndexArray:
+        if self._light is None:
+            return np.zeros((), dtype=np.intp)
+        return self._light.offset(self._table.luminance_offset, band.reduction)

@@ -1,0 +1,144 @@
+"""The observer that some options describe: which CSF at each band, which exponents, which masking."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.metric.adaptation import AdaptingLight
+from enfilade.metric.castle import castle_sensitivity
+from enfilade.metric.cortex import Band
+from enfilade.metric.csf import spatiovelocity_sensitivity
+from enfilade.metric.eye import EYE_DRIFT_DEG_S
+from enfilade.metric.masking import masked_difference_squared
+from enfilade.metric.options import MetricOptions
+from enfilade.metric.pooling import POOLING_EXPONENT, raised
+from enfilade.metric.spatial import REFERENCE_AREA_DEG2, SPATIAL_EXPONENT, patch_gain
+from enfilade.metric.transducer import TRANSDUCER_EXPONENT, transduced_difference
+from enfilade.metric.transient import flicker_sensitivity
+from enfilade.viewing import Viewing
+
+__all__ = ["Observer"]
+
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+Float64Array: TypeAlias = npt.NDArray[np.float64]
+
+ENERGY = 2.0  # no unit: exponent with which channels sum without ripple
+MIDDLE_GREY = 0.18  # of the screen's peak: where the CSF's course within bands is taken
+
+
+class Observer:
+    """Sensitivity, masking and pooling under some options.
+
+    Parameters
+    ----------
+    viewing : Viewing
+        Screen and distance.
+    options : MetricOptions
+        Departures from the paper.
+    mask_slope : float
+        Slope of threshold elevation, where that is the masking.
+
+    Attributes
+    ----------
+    channel_exponent : float
+        Exponent with which the J of channels are summed.
+    spatial_exponent : float
+        Exponent with which J is gathered over the aperture.
+    gain : float
+        What spatial pooling asks of the sensitivities (`spatial.patch_gain`), else 1.
+    """
+
+    def __init__(self, viewing: Viewing, options: MetricOptions, mask_slope: float) -> None:
+        self._viewing = viewing
+        self._options = options
+        self._mask_slope = mask_slope
+        # Exponents are of contrast; the transducer has raised it already.
+        power = TRANSDUCER_EXPONENT if options.transducer else 1.0
+        self.channel_exponent = (ENERGY if options.ripple_free else POOLING_EXPONENT) / power
+        self.spatial_exponent = SPATIAL_EXPONENT / power
+        self.gain = patch_gain(self._unmasked, self.spatial_exponent) if options.spatial_pooling else 1.0
+
+    def _unmasked(self, contrast_jnd: Float32Array) -> Float32Array:
+        if self._options.transducer:
+            return transduced_difference(np.zeros_like(contrast_jnd), contrast_jnd)
+        return np.abs(contrast_jnd)
+
+    @property
+    def knows_luminance(self) -> bool:
+        """Whether sensitivity depends on luminance."""
+        return self._options.csf == "castle"
+
+    def csf(
+        self, frequency_cpd: float, velocity_deg_s: Float64Array, luminance_cd_m2: Float64Array
+    ) -> Float64Array:
+        """Sensitivity to what moves over the retina, `gain` included; arrays broadcast."""
+        if self.knows_luminance:
+            hertz = velocity_deg_s * frequency_cpd
+            sensitivity = castle_sensitivity(frequency_cpd, hertz, luminance_cd_m2, REFERENCE_AREA_DEG2)
+        else:
+            sensitivity = spatiovelocity_sensitivity(frequency_cpd, velocity_deg_s)
+        return np.asarray(self.gain * sensitivity, dtype=np.float64)
+
+    def tilt(self, rho_cpp: Float32Array, band: Band, base: Band) -> Float32Array:
+        """The CSF within a band, relative to that of its centre, for a still image.
+
+        Parameters
+        ----------
+        rho_cpp : (...) float32
+            Radial frequency, cycles per pixel.
+        band, base : Band
+            The band, and the lowest one, below half of whose centre the CSF is taken as level.
+        """
+        density = self._viewing.pixels_per_degree
+        rho = np.maximum(rho_cpp, 0.5 * base.centre_cpp).astype(np.float64) * density
+        centre = np.asarray(band.centre_cpp * density)
+        if self.knows_luminance:
+            grey = MIDDLE_GREY * self._viewing.peak_cd_m2
+            here, there = (
+                castle_sensitivity(f, EYE_DRIFT_DEG_S * f, grey, REFERENCE_AREA_DEG2) for f in (rho, centre)
+            )
+        else:
+            still = np.asarray(EYE_DRIFT_DEG_S)
+            here, there = (
+                np.asarray(spatiovelocity_sensitivity(f, still), dtype=np.float64) for f in (rho, centre)
+            )
+        return np.asarray(here / there, dtype=np.float32)
+
+    def flicker_weight(self, band: Band, light: AdaptingLight) -> Float32Array:
+        """From the change of the error, cd/m2, to units of its threshold, at the band's size."""
+        luminance = light.at(band.reduction)
+        knots = np.geomspace(1e-3, 1e4, 64)
+        frequency = band.centre_cpp * self._viewing.pixels_per_degree
+        seen = flicker_sensitivity(frequency, self._viewing.fps, knots, REFERENCE_AREA_DEG2)
+        sensitivity = np.exp(np.interp(np.log(luminance), np.log(knots), np.log(seen)))
+        return np.asarray(0.5 * self.gain * sensitivity / luminance, dtype=np.float32)
+
+    def masker(self, reference: Float32Array, difference: Float32Array) -> Float32Array:
+        """What masks the difference of a channel, from contrasts of either sign.
+
+        The reference with its sign for a transducer; for threshold elevation mutual masking: the
+        smaller contrast of the two images.
+        """
+        if self._options.transducer:
+            return reference
+        masker: Float32Array = np.abs(reference + difference)
+        np.minimum(masker, np.abs(reference), out=masker)
+        return masker
+
+    def power(self, masker_jnd: Float32Array, difference_jnd: Float32Array) -> Float32Array:
+        """J^channel_exponent of one channel, after masking.
+
+        Parameters
+        ----------
+        masker_jnd, difference_jnd : (...) float32
+            From `masker`, and the difference with its sign, in units of the threshold; the
+            difference is overwritten.
+        """
+        if self._options.transducer:
+            jnd = transduced_difference(masker_jnd, difference_jnd)
+            return jnd if self.channel_exponent == 1.0 else jnd ** np.float32(self.channel_exponent)
+        squared = masked_difference_squared(difference_jnd, masker_jnd, self._mask_slope)
+        return squared if self._options.ripple_free else raised(squared)
