@@ -2,49 +2,135 @@
 
 import json
 
+import av
 import numpy as np
 import pytest
 from PIL import Image
 
+from enfilade.cli.compare import DEPARTURES, FLOWS
+from enfilade.metric import MetricOptions
+from enfilade.pipeline.compare import FlowChoice
+from enfilade.viewing import DISPLAYS
+
+KEYS = {  # docs/compare.md
+    "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "worst_frame",
+    "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2", "mode",
+    "departures", "flow", "bands_cpd", "per_frame",
+}  # fmt: skip
+FRAME_KEYS = {
+    "name", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "steady_bands_jnd",
+    "transient_bands_jnd", "velocity_deg_s",
+}  # fmt: skip
+FRAMES = 6
+
 
 @pytest.fixture
 def folders(tmp_path):
+    """Still frames; every other one of the test is noisy in its left half."""
     rng = np.random.default_rng(1)
-    for name, noise in (("test", 60), ("reference", 0)):
+    for name, noise in (("test", 10), ("reference", 0)):
         (tmp_path / name).mkdir()
-        for i in range(10):
+        for i in range(FRAMES):
             image = np.full((40, 60, 3), 120, np.int64)
-            image += rng.integers(0, noise * (i % 2) + 1, image.shape)
+            most = noise * (i % 2)
+            image[:, :30] += rng.integers(-most, most + 1, (40, 30, 1))
             Image.fromarray(image.astype(np.uint8)).save(tmp_path / name / f"{i}.png")
     return tmp_path / "test", tmp_path / "reference"
 
 
-def test_a_table_and_heat_maps(run, folders, tmp_path):
-    result = run("compare", *folders, "--heatmap", tmp_path / "maps")
+def test_a_table_and_heat_maps_in_a_folder(run, folders, tmp_path):
+    result = run("compare", *folders, "--mode", "paper", "--display", "paper", "--heatmap", tmp_path / "maps")
     assert result.exit_code == 0, result.output
-    assert "10 frames, 60x40" in result.stdout
-    assert "identical" in result.stdout
-    assert "stood still" in result.stderr
-    maps = sorted((tmp_path / "maps").iterdir())
-    assert [m.name for m in maps] == [f"{i}.png" for i in range(10)]
-    with Image.open(maps[1]) as noisy, Image.open(maps[0]) as equal:
-        assert noisy.size == (60, 40)
-        assert np.asarray(noisy.convert("L")).max() > np.asarray(equal.convert("L")).max()
+    assert f"{FRAMES} frames, 60x40, 27.9 pixels per degree" in result.stdout
+    assert "obvious at first sight" in result.stdout
+    assert "estimated from the reference" in result.stderr
+    assert sorted(m.name for m in (tmp_path / "maps").iterdir()) == [f"{i}.png" for i in range(FRAMES)]
+    with Image.open(tmp_path / "maps" / "1.png") as picture:
+        noisy = np.asarray(picture.convert("RGB"), np.int64)
+    assert noisy.shape[1] == 480  # enlarged eight times: the legend is legible
+    colored = np.ptp(noisy[: 40 * 8], axis=2) > 60
+    assert colored[:, : 25 * 8].mean() > 0.9
+    assert colored[:, 55 * 8 :].mean() < 0.1
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
+def test_heat_maps_as_a_video(run, folders, tmp_path, suffix):
+    file = tmp_path / f"heat{suffix}"
+    result = run(
+        "compare", *folders, "--fps", "25", "--heatmap", file, "--graph", tmp_path / "new" / "graph.png"
+    )
+    assert result.exit_code == 0, result.output
+    with av.open(str(file)) as container:
+        stream = container.streams.video[0]
+        assert sum(1 for _ in container.decode(stream)) == FRAMES
+        assert stream.average_rate == 25
+    with Image.open(tmp_path / "new" / "graph.png") as graph:
+        assert graph.width > 800
 
 
 def test_as_json(run, folders):
-    found = json.loads(run("compare", *folders, "--json", "--fps", "24").stdout)
-    assert (found["frames"], found["size"], found["fps"], found["has_flow"]) == (10, [60, 40], 24.0, False)
-    assert found["per_frame"][0]["percent_visible"] == 0.0
+    result = run("compare", *folders, "--json", "--fps", "24", "--flow", "none", "--display", "phone")
+    found = json.loads(result.stdout)
+    assert set(found) == KEYS
+    assert all(set(frame) == FRAME_KEYS for frame in found["per_frame"])
+    assert (found["frames"], found["size"], found["fps"], found["flow"]) == (FRAMES, [60, 40], 24.0, "none")
+    assert found["mode"] == "modern"
+    assert found["departures"] == list(DEPARTURES)
+    assert found["peak_cd_m2"] == 450.0
+    assert found["per_frame"][0]["score_jnd"] == 0.0
     assert found["per_frame"][1]["percent_visible"] > 0.0
+    assert len(found["per_frame"][1]["steady_bands_jnd"]) == len(found["bands_cpd"])
+    assert found["score_jnd"] > found["transient_jnd"] > 0.0
+
+
+def test_the_paper_and_departures_by_name(run, folders):
+    def mode(*options):
+        found = json.loads(run("compare", *folders, "--json", "--quiet", *options).stdout)
+        return found["mode"], found["departures"]
+
+    assert mode("--mode", "paper") == ("paper", [])
+    assert mode("--mode", "paper", "--with", "csf", "--with", "transient") == ("custom", ["csf", "transient"])
+    kept = [name for name in DEPARTURES if name != "transient"]
+    assert mode("--without", "transient") == ("custom", kept)
+    result = run("compare", *folders, "--without", "colour")
+    assert result.exit_code == 2
+    assert "unknown departure 'colour'; known are: csf" in result.stderr
+
+
+def test_what_help_lists_is_what_there_is(run):
+    # --help loads no NumPy, so it can't ask
+    assert MetricOptions.departures() == DEPARTURES
+    assert tuple(choice.value for choice in FlowChoice) == FLOWS
+    output = " ".join(run("compare", "--help").output.split())
+    listed = run("compare", "--display", "list")
+    assert listed.exit_code == 0
+    for display in DISPLAYS:
+        assert display.name in output
+        assert display.name in listed.stdout
+        assert display.text in listed.stdout
+
+
+def test_numbers_win_over_a_display(run, folders, tmp_path):
+    def seen(*options):
+        found = json.loads(run("compare", *folders, "--json", "--quiet", "--flow", "none", *options).stdout)
+        return found["pixels_per_degree"], found["peak_cd_m2"]
+
+    whole = seen("--display", "desktop-24-fhd")
+    assert seen("--display", "desktop-24-fhd", "--viewing-distance-m", "1.2") == pytest.approx(
+        (2.0 * whole[0], whole[1])
+    )
+    (tmp_path / "a.toml").write_text("[viewing]\npeak_cd_m2 = 80\n")
+    options = ("--display", "desktop-24-fhd", "--settings", tmp_path / "a.toml")
+    assert seen(*options) == pytest.approx((whole[0], 80.0))
+    assert seen(*options, "--viewing-peak-cd-m2", "90") == pytest.approx((whole[0], 90.0))
 
 
 def test_viewing_conditions_count(run, folders):
     near, far = (
-        json.loads(run("compare", *folders, "--json", "--viewing-distance-m", d).stdout)
+        json.loads(run("compare", *folders, "--json", "--viewing-distance-m", d).stdout)["score_jnd"]
         for d in ("0.5", "50")
     )
-    assert far["score_jnd"]["mean"] < 0.9 * near["score_jnd"]["mean"]
+    assert far < 0.9 * near
 
 
 @pytest.mark.parametrize("what", ["gone", "empty"])
@@ -53,3 +139,30 @@ def test_nothing_to_compare_is_wrong_input(run, folders, tmp_path, what):
     result = run("compare", tmp_path / what, folders[1])
     assert result.exit_code == 2
     assert what in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--display", "imax"), "unknown display 'imax'; known are: paper"),
+        (("--heatmap", "heat.gif"), "give a folder, or a file .mp4"),
+        (("--graph", "graph.pdf"), "it is written as .png"),
+        (("--fps", "0"), "fps"),
+    ],
+)
+def test_wrong_options_are_refused_before_anything_is_judged(run, folders, options, message):
+    result = run("compare", *folders, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert "to do" not in result.stderr
+
+
+@pytest.mark.parametrize("target", ["heat.mp4", "maps"])
+def test_nothing_unfinished_stands_under_a_final_name(run, folders, tmp_path, target):
+    broken = folders[0] / "3.png"
+    broken.write_bytes(broken.read_bytes()[:60])
+    out = tmp_path / "out"
+    result = run("compare", *folders, "--heatmap", out / target, "--graph", out / "graph.png")
+    assert result.exit_code == 2
+    assert "test/3.png" in result.stderr
+    assert [f for f in out.rglob("*") if f.is_file()] == []

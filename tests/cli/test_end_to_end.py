@@ -46,7 +46,7 @@ def test_render_twice_and_compare(run, inputs, finished):
     found = run("compare", finished / "paper", finished / "reference", "--json")
     assert found.exit_code == 0, found.output
     figures = json.loads(found.stdout)
-    assert (figures["frames"], figures["fps"], figures["has_flow"]) == (FRAMES, 24.0, True)
+    assert (figures["frames"], figures["fps"], figures["flow"]) == (FRAMES, 24.0, "layers")
     assert figures["psnr_db"] > 15.0
 
 

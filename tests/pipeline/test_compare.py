@@ -1,105 +1,86 @@
-"""Sequences are compared frame by frame, with the flow that comes with them."""
+"""Sequences are judged frame by frame, with the flow that comes with them."""
 
 import math
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
-from enfilade.codec import write_exr
-from enfilade.errors import ImageError
-from enfilade.monitor import Silence
-from enfilade.pipeline.compare import compare, psnr_db
-from enfilade.settings import MetricSettings, ViewingSettings
-
-SIZE = (48, 64)
-
-
-class Notes(Silence):
-    def __init__(self):
-        self.said = []
-
-    def say(self, text):
-        self.said.append(text)
+from comparisons import SIZE, Notes, judged, terms, textured
+from enfilade.errors import ImageError, InputError
+from enfilade.metric import MetricOptions
+from enfilade.pipeline.compare import compare, metric_options
+from enfilade.settings import ViewingSettings
+from enfilade.viewing import display_named
 
 
-def textured(shift=0.0, level=0.2):
-    y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
-    grey = level * (1.0 + 0.5 * np.sin(0.8 * (x + shift)) * np.cos(0.6 * y))
-    return np.repeat(grey[..., None], 3, axis=2).astype(np.float32)
-
-
-@pytest.fixture
-def sequence(tmp_path):
-    def write(name, images, flow_px=None):
-        folder = tmp_path / name
-        folder.mkdir()
-        for i, image in enumerate(images, 1):
-            layers = {"RGB": image}
-            if flow_px is not None:
-                forward = np.zeros((*SIZE, 2), np.float32)
-                forward[..., 0] = flow_px
-                layers |= {"forward": forward, "backward": -forward}
-            write_exr(folder / f"{i:04}.exr", layers)
-        return folder
-
-    return write
-
-
-def judged(test, reference, monitor=None, **options):
-    conditions = {"viewing": ViewingSettings(), "metric": MetricSettings(), **options}
-    return compare(test, reference, monitor or Silence(), **conditions)
-
-
-def test_equal_sequences_have_no_difference(sequence):
-    folder = sequence("a", [textured(), textured(2.0)])
-    found = judged(folder, folder)
-    assert [f.percent_visible for f in found.frames] == [0.0, 0.0]
-    assert [f.score for f in found.frames] == [0.0, 0.0]
+@pytest.mark.parametrize("mode", ["paper", "modern"])
+@pytest.mark.parametrize("flow", ["none", "estimate"])
+def test_equal_sequences_have_exactly_no_difference(sequence, mode, flow):
+    folder = sequence("a", [textured(2.0 * i) for i in range(4)])
+    found = judged(folder, folder, mode=mode, flow=flow)
+    assert found.score == 0.0
+    assert [f.percent_visible for f in found.frames] == [0.0] * 4
+    assert not any(any(part.bands) for f in found.frames for part in (f.steady, f.transient))
     assert found.psnr_db == math.inf
-    assert found.to_dict()["psnr_db"] is None
+    as_json = found.to_dict()
+    assert (as_json["psnr_db"], as_json["meaning"]) == (None, "identical")
 
 
-def test_a_visible_difference_is_found_in_its_frame(sequence):
+@pytest.mark.parametrize("mode", ["paper", "modern"])
+def test_a_visible_difference_is_found_in_its_frame(sequence, mode):
     good = [textured(), textured(), textured()]
     bad = [textured(), textured(3.0), textured()]
-    found = judged(sequence("bad", bad), sequence("good", good)).to_dict()
-    assert [f["percent_visible"] > 50.0 for f in found["per_frame"]] == [False, True, False]
+    found = judged(sequence("bad", bad), sequence("good", good), mode=mode, flow="none").to_dict()
+    assert found["per_frame"][0]["score_jnd"] == 0.0
+    assert found["per_frame"][1]["percent_visible"] > 50.0
+    assert found["worst_frame"] == 1
     assert found["percent_visible"]["most"] == found["per_frame"][1]["percent_visible"]
-    assert found["percent_visible"]["mean"] == pytest.approx(found["percent_visible"]["most"] / 3.0)
+    assert 0.0 < found["score_jnd"] < found["per_frame"][1]["score_jnd"]
+
+
+def test_flicker_counts_as_transient_and_blur_as_steady(sequence):
+    rng = np.random.default_rng(5)
+    still = textured()
+    blurred = np.stack([gaussian_filter(still[..., c], 2.0) for c in range(3)], axis=-1)
+    noisy = [np.clip(still + rng.normal(0.0, 0.05, (*SIZE, 1)), 0, 1).astype(np.float32) for _ in range(4)]
+    reference = sequence("reference", [still] * 4)
+    blur = judged(sequence("blur", [blurred] * 4), reference, flow="none").to_dict()
+    noise = judged(sequence("noise", noisy), reference, flow="none").to_dict()
+    assert blur["transient_jnd"] < 0.01 * blur["steady_jnd"]
+    assert noise["transient_jnd"] > 0.2 * noise["steady_jnd"]
 
 
 def test_psnr_is_that_of_the_encoded_images(sequence):
     white, black = np.ones((*SIZE, 3), np.float32), np.zeros((*SIZE, 3), np.float32)
-    found = judged(sequence("white", [white, white]), sequence("black", [black, white]))
+    found = judged(sequence("white", [white, white]), sequence("black", [black, white]), flow="none")
     assert found.psnr_db == pytest.approx(10.0 * math.log10(2.0))  # one of two frames is wrong by 1
-    assert psnr_db(0.01) == pytest.approx(20.0)
 
 
-def test_without_flow_everything_stands_still_and_that_is_said(sequence):
-    notes = Notes()
-    folder = sequence("a", [textured()])
-    found = judged(folder, folder, notes)
-    assert not found.has_flow
-    assert found.frames[0].velocity_deg_s == 0.0
-    assert len(notes.said) == 1
-    assert "stood still" in notes.said[0]
+@pytest.mark.parametrize("fault", ["blur", "noise", "object"])
+def test_swapping_changes_little(sequence, fault):
+    rng = np.random.default_rng(8)
+    good = [textured(0.7 * i) for i in range(3)]
+    bad = [image.copy() for image in good]
+    for image in bad:
+        if fault == "blur":
+            image[12:36, 16:48] = gaussian_filter(image[12:36, 16:48], (2, 2, 0))
+        elif fault == "noise":
+            image[...] = np.clip(image + rng.normal(0.0, 0.02, (*SIZE, 1)), 0.0, 1.0)
+        else:
+            image[20:28, 30:38] *= 0.6
+    one, other = sequence("bad", bad), sequence("good", good)
+    screen = display_named("paper")
+    there, back = (judged(*pair, display=screen).score for pair in ((one, other), (other, one)))
+    assert there > 0.2
+    assert back == pytest.approx(there, rel=0.1)  # docs/compare.md
 
 
-def test_flow_comes_from_the_layers(sequence):
-    notes = Notes()
-    test = sequence("test", [textured(1.0)])
-    found = judged(test, sequence("reference", [textured()], flow_px=2.0), notes)
-    assert found.has_flow
-    assert notes.said == []
-    assert found.frames[0].velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(2.0), rel=1e-5)
-
-
-def test_a_frame_at_the_end_of_a_shot_moves_as_fast_as_the_others(tmp_path):
+def test_a_frame_at_the_end_of_a_shot_moves_as_fast_as_the_others(sequence):
     forward = np.full((*SIZE, 2), 2.0, np.float32)
-    layers = {"RGB": textured(), "forward": forward, "backward": np.zeros_like(forward)}
-    write_exr(tmp_path / "1.exr", layers)
-    found = judged(tmp_path / "1.exr", tmp_path / "1.exr")
+    folder = sequence("a", [textured()], layers={"forward": forward, "backward": np.zeros_like(forward)})
+    found = judged(folder, folder)
     expected = found.viewing.velocity_deg_s(math.hypot(2.0, 2.0))
     assert found.frames[0].velocity_deg_s == pytest.approx(expected, rel=1e-5)
 
@@ -108,10 +89,8 @@ def test_fast_motion_hides_what_is_seen_at_rest_by_a_resting_eye(sequence):
     reference = sequence("still", [textured()])
     moving = sequence("moving", [textured()], flow_px=40.0)
     test = sequence("test", [textured(0.2)])
-    resting = {"metric": MetricSettings.from_table({"metering": "none"})}
-    assert (
-        judged(test, moving, **resting).frames[0].score < judged(test, reference, **resting).frames[0].score
-    )
+    scores = [judged(test, r, metering="none").score for r in (moving, reference)]
+    assert scores[0] < scores[1]
 
 
 def test_exposure_is_for_scene_linear_frames_alone(sequence, tmp_path):
@@ -123,26 +102,50 @@ def test_exposure_is_for_scene_linear_frames_alone(sequence, tmp_path):
     assert found.psnr_db > 45.0
 
 
-def test_maps_are_handed_over(sequence):
-    kept = {}
-    folder = sequence("a", [textured(), textured()])
-    judged(folder, sequence("b", [textured(3.0), textured()]), keep_map=kept.__setitem__)
-    first, second = kept.values()
-    assert first.shape == SIZE
-    assert first.max() > 0.9
-    assert second.max() == 0.0
+def test_maps_are_shown_as_they_come(sequence):
+    kept = []
+    folder, other = sequence("a", [textured(), textured()]), sequence("b", [textured(3.0), textured()])
+
+    def show(frames, viewing):
+        assert (viewing.width_px, viewing.height_px) == SIZE[::-1]
+        kept.extend(frames)
+
+    compare(folder, other, terms(flow="none"), Notes(), show=show)
+    first, second = kept
+    assert (first.index, second.index) == (0, 1)
+    assert first.jnd.shape == first.grey.shape == SIZE
+    assert first.jnd.max() > 1.0
+    assert second.difference.steady.score == 0.0
 
 
-def test_fps_is_given_or_the_default(sequence):
+def test_a_display_shows_pixel_for_pixel(sequence):
     folder = sequence("a", [textured()])
-    assert judged(folder, folder).viewing.fps == 30.0
-    assert judged(folder, folder, fps=60.0).viewing.fps == 60.0
+    display = display_named("desktop-24-fhd")
+    found = judged(folder, folder, display=display)
+    whole = display.viewing(1920, 1080, 30.0)
+    assert found.viewing.pixels_per_degree == pytest.approx(whole.pixels_per_degree)
+    assert found.viewing.peak_cd_m2 == 200.0
 
 
-def test_sequences_that_differ_in_length_or_size(sequence, tmp_path):
-    one, two = sequence("one", [textured()]), sequence("two", [textured(), textured()])
-    with pytest.raises(ImageError, match="1 frames and the reference 2"):
-        judged(one, two)
-    Image.fromarray(np.zeros((10, 20, 3), np.uint8)).save(tmp_path / "small.png")
-    with pytest.raises(ImageError, match="20x10 and the reference's 64x48"):
-        judged(tmp_path / "small.png", one)
+def test_what_the_metric_refuses_names_the_frame(sequence, monkeypatch):
+    folder = sequence("a", [textured()])
+
+    def refuse(*_arguments, **_options):
+        raise InputError("metric: no")
+
+    monkeypatch.setattr("enfilade.pipeline.compare.judge.SequenceAqm.judge", refuse)
+    with pytest.raises(ImageError, match=r"0001\.exr can't be judged: metric: no"):
+        judged(folder, folder)
+
+
+def test_departures_by_name():
+    assert metric_options("modern") == MetricOptions.modern()
+    assert metric_options("paper") == MetricOptions.paper()
+    one = metric_options("paper", include=["csf", "transient"])
+    assert (one.csf, one.transient, one.ripple_free) == ("castle", True, False)
+    assert metric_options("modern", leave_out=["transient"]) == MetricOptions.modern().without("transient")
+    for options in ({"include": ["cfs"]}, {"leave_out": ["cfs"]}):
+        with pytest.raises(InputError, match=r"unknown departure 'cfs'; known are: csf, .*transient"):
+            metric_options("paper", **options)
+    with pytest.raises(InputError, match="unknown mode 'new'"):
+        metric_options("new")

@@ -3,17 +3,49 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from enfilade.cli.flags import SettingsCommand, settings_of, settings_options
+from enfilade.cli.flags import SettingsCommand, given_in, settings_of, settings_options
 from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import json_option, quiet_option
+from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
-    from enfilade.pipeline.compare import KeepMap
+    from enfilade.pipeline.compare import JudgedFrame, Terms
+    from enfilade.pipeline.compare.judge import Show
+    from enfilade.report.heatmap import HeatmapPainter
+    from enfilade.viewing import Display, Viewing
+
+FLOWS = ("auto", "layers", "estimate", "none")
+DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would load NumPy
+    "csf",
+    "luminance_adaptive",
+    "csf_within_bands",
+    "ripple_free",
+    "transducer",
+    "spatial_pooling",
+    "transient",
+)
+IMAGES = frozenset({".exr", ".png", ".jpg", ".jpeg"})  # frames of which a heat map takes the name
+
+
+def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
+    if value == "list" and not ctx.resilient_parsing:
+        from enfilade.viewing import DISPLAYS
+
+        for d in DISPLAYS:
+            density = d.viewing(d.width_px, d.height_px, 30.0).pixels_per_degree
+            click.echo(
+                f"{d.name:<16}{d.width_px:>5}x{d.height_px:<5}{d.diagonal_m:>6g} m from {d.distance_m:>4g} m,"
+                f"{density:>6.1f} px/deg, {d.peak_cd_m2:>3g} and {d.black_cd_m2:g} cd/m2  {d.text}"
+            )
+        ctx.exit()
+    return value
 
 
 @click.command(
@@ -21,13 +53,45 @@ if TYPE_CHECKING:
 )
 @click.argument("test")
 @click.argument("reference")
+@click.option(
+    "--display",
+    metavar="NAME",
+    callback=_list_displays,
+    is_eager=True,
+    help="A screen on which images stand pixel for pixel: paper, desktop-24-fhd, desktop-27-4k, laptop-14, "
+    "phone, tv-55-4k, cinema; list shows them. Numbers of [viewing] win over its own.  "
+    "[default: the numbers of [viewing], on a screen that the image fills]",
+)
 @click.option("--fps", type=float, help="Frames per second that are shown.  [default: the sequences', or 30]")
 @click.option(
-    "--heatmap",
-    "folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Write each frame's map of detection probability into this folder, as PNG.",
+    "--mode",
+    type=click.Choice(("modern", "paper")),
+    default="modern",
+    show_default=True,
+    help="The metric as published, or with all departures.",
 )
+@click.option(
+    "--with",
+    "include",
+    metavar="NAME",
+    multiple=True,
+    help=f"Add a departure to the mode: {', '.join(DEPARTURES)}.",
+)
+@click.option("--without", "leave_out", metavar="NAME", multiple=True, help="Take a departure away.")
+@click.option(
+    "--flow",
+    type=click.Choice(FLOWS),
+    default="auto",
+    show_default=True,
+    help="Image flow: from layers of OpenEXR frames, estimated, or none; auto estimates where there are no "
+    "layers.",
+)
+@click.option(
+    "--heatmap",
+    type=click.Path(path_type=Path),
+    help="Write heat maps: a video (.mp4, .mkv, .mov), or a folder of PNGs.",
+)
+@click.option("--graph", type=click.Path(path_type=Path, dir_okay=False), help="Draw the time graph (.png).")
 @json_option
 @quiet_option
 @debug_option
@@ -39,47 +103,114 @@ def command(
     *,
     test: str,
     reference: str,
-    fps: float | None,
-    folder: Path | None,
+    heatmap: Path | None,
+    graph: Path | None,
     as_json: bool,
     quiet: bool,
+    **choices: Any,
 ) -> None:
     """Judge TEST against REFERENCE with the animation quality metric.
 
     Each is a run folder, a folder of images (OpenEXR, PNG, JPEG), a pattern such as frames/%04d.exr, or a
     video.
+
+    The score is in just noticeable differences (JND): up to 0.25 nobody notices anything, at 1 three
+    viewers of four find it when they look for it, from 3 on it is obvious.
     """
-    settings = settings_of(ctx)
+    show = None if heatmap is None else _painted(heatmap)
+    if graph is not None and graph.suffix.lower() != ".png":
+        raise SettingsError(f"--graph {graph}: it is written as .png")
+    terms = _terms(ctx, **choices)
     from enfilade.cli.progress import watch
     from enfilade.pipeline.compare import compare
 
     with watch(quiet=quiet) as monitor:
-        found = compare(
-            test,
-            reference,
-            monitor,
-            viewing=settings.viewing,
-            metric=settings.metric,
-            fps=fps,
-            keep_map=None if folder is None else _writer(folder),
-        ).to_dict()
+        found = compare(test, reference, terms, monitor, show=show).to_dict()
+    if graph is not None:
+        from enfilade.report.timegraph import plot_comparison
+
+        plot_comparison(found, graph)
     if as_json:
         click.echo(json.dumps(found, indent=2))
         return
-    _show(found)
-    if folder is not None:
-        click.echo(f"maps    {folder}")
+    _print(found, {"heat map": heatmap, "graph": graph})
 
 
-def _writer(folder: Path) -> KeepMap:
-    from enfilade.report.charts import save_map
+def _terms(
+    ctx: click.Context,
+    *,
+    display: str | None,
+    fps: float | None,
+    mode: str,
+    include: tuple[str, ...],
+    leave_out: tuple[str, ...],
+    flow: str,
+) -> Terms:
+    settings = settings_of(ctx)
+    from enfilade.pipeline.compare import FlowChoice, Terms, metric_options
 
-    return lambda name, values: save_map(values, folder / f"{Path(name).stem}.png")
+    return Terms(
+        viewing=settings.viewing,
+        metric=settings.metric,
+        display=None if display is None else _display(ctx, display),
+        options=metric_options(mode, include=include, leave_out=leave_out),
+        flow=FlowChoice(flow),
+        fps=fps,
+    )
 
 
-def _show(found: dict[str, Any]) -> None:
+def _display(ctx: click.Context, name: str) -> Display:
+    from enfilade.viewing import display_named
+
+    viewing = settings_of(ctx).viewing
+    numbers = given_in(ctx, "viewing") - {"exposure_ev"}
+    return replace(display_named(name), **{number: getattr(viewing, number) for number in numbers})
+
+
+def _painted(target: Path) -> Show:
+    from enfilade.report.heatmap import (
+        VIDEO_CODECS,
+        HeatmapPainter,
+        write_heatmap_images,
+        write_heatmap_video,
+    )
+
+    is_folder = target.is_dir() or not target.suffix
+    if not is_folder and target.suffix.lower() not in VIDEO_CODECS:
+        raise SettingsError(f"--heatmap {target}: give a folder, or a file {', '.join(VIDEO_CODECS)}")
+
+    def show(frames: Iterator[JudgedFrame], viewing: Viewing) -> None:
+        painter = HeatmapPainter(viewing.width_px, viewing.height_px)
+        size = painter.width, painter.height
+        if is_folder:
+            write_heatmap_images(target, ((_name(f), _picture(painter, f)) for f in frames))
+        else:
+            pictures = (_picture(painter, f) for f in frames)
+            write_heatmap_video(target, pictures, size=size, fps=viewing.fps)
+
+    return show
+
+
+def _name(frame: JudgedFrame) -> str:
+    file = Path(frame.difference.name)
+    return file.stem if file.suffix.lower() in IMAGES else f"{frame.index:06d}"
+
+
+def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
+    of = frame.difference
+    caption = (
+        f"frame {frame.index}    {of.score:.2f} JND (steady {of.steady.score:.2f}, transient "
+        f"{of.transient.score:.2f})    {of.percent_visible:.1f} % above 1 JND"
+    )
+    return painter.paint(frame.jnd, frame.grey, caption)
+
+
+def _print(found: dict[str, Any], files: dict[str, Path | None]) -> None:
     from rich.console import Console
 
     from enfilade.report.tables import comparison_table
 
     Console().print(comparison_table(found))
+    for name, file in files.items():
+        if file is not None:
+            click.echo(f"{name:<9} {file}")

@@ -103,6 +103,20 @@ def settings_of(ctx: click.Context) -> Settings:
     return Settings.from_tables(tables)
 
 
+def given_in(ctx: click.Context, section: str) -> set[str]:
+    """Names of a section's settings that the file or a flag of this command sets.
+
+    Raises
+    ------
+    SettingsError
+        The file can't be read.
+    """
+    given = ctx.meta.get(_META, {})
+    table = read_tables(given["file"]).get(section, {}) if "file" in given else {}
+    flags = {name for of, name in given.get("flags", {}) if of == section}
+    return flags | set(table if isinstance(table, dict) else ())
+
+
 def _attach(command: Any, option: click.Option) -> None:
     if isinstance(command, click.Command):
         command.params.append(option)

@@ -12,12 +12,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.ticker import MaxNLocator
 
+from enfilade.codec import whole_file
+
 __all__ = [
     "BLUE",
+    "GREEN",
     "GREY",
     "INK",
     "SOURCE_COLORS",
@@ -27,8 +31,9 @@ __all__ = [
     "legend",
     "mark_keyframes",
     "new_figure",
+    "pixels",
     "save",
-    "save_map",
+    "save_picture",
     "stack",
 ]
 
@@ -110,20 +115,28 @@ def legend(ax: Any, columns: int = 4) -> None:
 
 
 def save(figure: Figure, file: Path) -> Path:
-    """Write a PNG, its folder made if absent."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, format="png", metadata={"Software": "enfilade"})
+    """Write a PNG, whole or not at all, its folder made if absent."""
+    with whole_file(file) as beside:
+        figure.savefig(beside, format="png", metadata={"Software": "enfilade"})
     return file
 
 
-def save_map(values: npt.NDArray[np.float32], file: Path) -> Path:
-    """Write a map of values in 0..1 as a PNG of its own size: black is 0, pale yellow is 1.
+def pixels(figure: Figure) -> npt.NDArray[np.uint8]:
+    """Draw a figure into an array, (H, W, 3) uint8."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba(), np.uint8)[..., :3]
+
+
+def save_picture(values: npt.NDArray[np.uint8], file: Path) -> Path:
+    """Write an image as a PNG, whole or not at all.
 
     Parameters
     ----------
-    values : (H, W) float32
+    values : (H, W, 3) uint8
+        Encoded for an sRGB screen.
     file
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    imsave(file, values, vmin=0.0, vmax=1.0, cmap="magma", format="png", metadata={"Software": "enfilade"})
+    with whole_file(file) as beside:
+        imsave(beside, values, format="png", metadata={"Software": "enfilade"})
     return file

@@ -108,19 +108,21 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
         ``SequenceDifference.to_dict()``.
     """
     width, height = found["size"]
-    table = _table("", "frame", "visible, %", "score, JND", "PSNR, dB", "velocity, deg/s")
+    table = _table("", "frame", "JND", "steady", "transient", "visible, %", "PSNR, dB", "deg/s")
     rows = found["per_frame"]
-    for row in sorted(rows, key=lambda r: -r["percent_visible"])[:WORST_FRAMES]:
-        table.add_row(row["name"], *_difference(row, row["percent_visible"], row["score_jnd"]))
+    for row in sorted(rows, key=lambda r: -r["score_jnd"])[:WORST_FRAMES]:
+        table.add_row(_short(row["name"]), *_difference(row, row["percent_visible"]))
     if len(rows) > WORST_FRAMES:
         table.caption = f"the {WORST_FRAMES} frames with most; --json lists all"
     table.add_section()
     velocity = sum(row["velocity_deg_s"] for row in rows) / len(rows)
-    mean = {"psnr_db": found["psnr_db"], "velocity_deg_s": velocity}
-    table.add_row("mean", *_difference(mean, found["percent_visible"]["mean"], found["score_jnd"]["mean"]))
+    table.add_row(
+        "sequence", *_difference({**found, "velocity_deg_s": velocity}, found["percent_visible"]["mean"])
+    )
     density = f"{found['pixels_per_degree']:.1f} pixels per degree"
     table.title = (
-        f"Visible differences: {len(rows)} frames, {width}x{height}, {density}, {found['fps']:g} fps"
+        f"{found['score_jnd']:.2f} JND: {found['meaning']}\n"
+        f"{len(rows)} frames, {width}x{height}, {density}, {found['fps']:g} fps, mode {found['mode']}"
     )
     return table
 
@@ -146,9 +148,15 @@ def seconds(value: float) -> str:
     return f"{value:.2f} s" if value >= 0.1 else f"{1000.0 * value:.1f} ms"
 
 
-def _difference(row: Mapping[str, Any], visible: float, score: float) -> list[str]:
+def _short(name: str) -> str:
+    # "frame 3 of walk.mp4", or the path of an image
+    return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
+
+
+def _difference(row: Mapping[str, Any], visible: float) -> list[str]:
+    scores = [f"{row[key]:.3f}" for key in ("score_jnd", "steady_jnd", "transient_jnd")]
     psnr = "identical" if row["psnr_db"] is None else f"{row['psnr_db']:.2f}"
-    return [percent(visible), f"{score:.3f}", psnr, f"{row['velocity_deg_s']:.2f}"]
+    return [*scores, percent(visible), psnr, f"{row['velocity_deg_s']:.2f}"]
 
 
 def _listed(numbers: list[int], most: int = 12) -> str:

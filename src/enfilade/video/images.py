@@ -112,7 +112,8 @@ def _from_exr(file: Path, layers: dict[str, Any]) -> F32:
     combined = [n for n in layers if n.lower().endswith("combined") and layers[n].ndim == 3]
     name = "RGB" if "RGB" in layers else combined[0] if len(combined) == 1 else None
     if name is not None and layers[name].dtype != np.uint32:
-        return layers[name].astype(np.float32, copy=False)
+        rgb: F32 = layers[name].astype(np.float32, copy=False)
+        return rgb
     if "Y" in layers and not {"RY", "BY"} & set(layers):
         return np.repeat(layers["Y"].astype(np.float32)[..., None], 3, axis=2)
     raise ImageError(f"{file} has no channels R G B; it has the layers {', '.join(layers)}")

@@ -1,0 +1,19 @@
+"""Judging two sequences: opened side by side, followed along their motion, judged frame by frame (§3)."""
+
+from __future__ import annotations
+
+from enfilade.pipeline.compare.judge import JudgedFrame, Terms, compare, metric_options
+from enfilade.pipeline.compare.motion import FlowChoice
+from enfilade.pipeline.compare.verdict import FrameDifference, SequenceDifference, meaning, psnr_db
+
+__all__ = [
+    "FlowChoice",
+    "FrameDifference",
+    "JudgedFrame",
+    "SequenceDifference",
+    "Terms",
+    "compare",
+    "meaning",
+    "metric_options",
+    "psnr_db",
+]

@@ -1,0 +1,195 @@
+"""How much of a difference a viewer sees between two sequences, frame by frame (§3)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from enfilade.errors import ImageError, InputError
+from enfilade.metric import Comparison, MetricOptions, Pursuit, SequenceAqm
+from enfilade.monitor import Monitor
+from enfilade.pipeline.compare.motion import FlowChoice, Moved, open_motion
+from enfilade.pipeline.compare.pairs import Pair, open_pairs
+from enfilade.pipeline.compare.verdict import Band, FrameDifference, Part, SequenceDifference
+from enfilade.pixels.tone import srgb_encode
+from enfilade.records import F32
+from enfilade.settings import MetricSettings, ViewingSettings
+from enfilade.viewing import Display, Viewing
+
+__all__ = ["JudgedFrame", "Terms", "compare", "metric_options"]
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedFrame:
+    """One frame as it is judged, for heat maps.
+
+    Attributes
+    ----------
+    index : int
+        From 0.
+    difference : FrameDifference
+    jnd : (H, W) float32
+        The map.
+    grey : (H, W) float32
+        The reference, encoded for a screen, 0..1.
+    """
+
+    index: int
+    difference: FrameDifference
+    jnd: F32
+    grey: F32
+
+
+Show = Callable[[Iterator[JudgedFrame], Viewing], object]
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a comparison assumes.
+
+    Attributes
+    ----------
+    viewing, metric
+        Exposure is applied to OpenEXR frames alone: others are as shown.
+    display
+        In place of the screen of `viewing`, which an image fills whatever its size.
+    options
+        Departures from the paper; by default all of them.
+    flow
+        Where image flow comes from.
+    fps
+        Frames per second shown; by default the reference's, the test's, or 30.
+    """
+
+    viewing: ViewingSettings = field(default_factory=ViewingSettings)
+    metric: MetricSettings = field(default_factory=MetricSettings)
+    display: Display | None = None
+    options: MetricOptions = field(default_factory=MetricOptions.modern)
+    flow: FlowChoice = FlowChoice.AUTO
+    fps: float | None = None
+
+    def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
+        """Viewing conditions of an image of a size."""
+        if self.display is not None:
+            return self.display.viewing(*size, fps)
+        return Viewing(
+            *size,
+            diagonal_m=self.viewing.diagonal_m,
+            distance_m=self.viewing.distance_m,
+            fps=fps,
+            peak_cd_m2=self.viewing.peak_cd_m2,
+            black_cd_m2=self.viewing.black_cd_m2,
+        )
+
+
+def compare(
+    test: Path | str,
+    reference: Path | str,
+    terms: Terms,
+    monitor: Monitor,
+    *,
+    show: Show | None = None,
+) -> SequenceDifference:
+    """Judge two image sequences, videos or run folders with the animation quality metric.
+
+    Frames are read and judged one after another, each once: memory does not grow with their number.
+
+    Parameters
+    ----------
+    test, reference
+        Whatever :func:`enfilade.video.open_sequence` reads.
+    terms
+    monitor
+    show
+        Takes the judged frames as they come, and the viewing conditions. It must take all of them.
+
+    Raises
+    ------
+    ImageError
+        A sequence can't be read, the two differ in length, size or frame rate, or pixels are NaN or
+        infinite. The message names the frame.
+    """
+    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.viewing.exposure_ev)
+    conditions = terms.conditions(pairs.size, pairs.fps)
+    motion = open_motion(pairs.test, pairs.reference, terms.flow)
+    monitor.say(motion.text)
+    judge = _Judge(conditions, terms)
+    monitor.stage("compare", len(pairs))
+    found: list[FrameDifference] = []
+
+    def judged() -> Iterator[JudgedFrame]:
+        for pair, moved in motion.follow(pairs.shown(conditions, monitor)):
+            frame = judge.frame(pair, moved)
+            found.append(frame.difference)
+            yield frame
+            monitor.advance()
+
+    if show is None:
+        deque(judged(), maxlen=0)
+    else:
+        show(judged(), conditions)
+    return SequenceDifference(tuple(found), conditions, judge.bands, terms.options, motion.kind)
+
+
+def metric_options(mode: str, *, include: Iterable[str] = (), leave_out: Iterable[str] = ()) -> MetricOptions:
+    """Departures from the paper, by names.
+
+    Parameters
+    ----------
+    mode
+        ``paper`` or ``modern``.
+    include, leave_out
+        Departures to add to those of the mode, and to take away.
+
+    Raises
+    ------
+    InputError
+        An unknown mode or departure; the message lists the known ones.
+    """
+    modern = MetricOptions.modern()
+    if mode not in ("paper", "modern"):
+        raise InputError(f"unknown mode {mode!r} of the metric; choose paper or modern")
+    options = modern if mode == "modern" else MetricOptions.paper()
+    for name in include:
+        modern.without(name)  # which refuses an unknown one
+        options = replace(options, **{name: getattr(modern, name)})
+    for name in leave_out:
+        options = options.without(name)
+    return options
+
+
+class _Judge:
+    def __init__(self, viewing: Viewing, terms: Terms) -> None:
+        self._viewing = viewing
+        self._aqm = SequenceAqm(viewing, options=terms.options, pursuit=Pursuit(terms.metric.metering.value))
+        density = viewing.pixels_per_degree
+        self.bands = tuple(
+            Band(band.low_cpp * density, band.high_cpp * density) for band in self._aqm.aqm.cortex.bands
+        )
+
+    def frame(self, pair: Pair, moved: Moved) -> JudgedFrame:
+        velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
+        try:
+            found = self._aqm.judge(
+                pair.test,
+                pair.reference,
+                velocity=velocity,
+                backward_flow_px=moved.backward,
+                is_cut=moved.is_cut,
+            )
+        except InputError as error:
+            raise ImageError(f"{pair.name} can't be judged: {error}") from error
+        speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
+        difference = _difference(pair, found, speed)
+        return JudgedFrame(pair.index, difference, found.jnd, srgb_encode(pair.reference_relative))
+
+
+def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
+    steady, transient = (Part(part.score, part.band_jnd) for part in (found.steady, found.transient))
+    return FrameDifference(
+        pair.name, found.percent_visible, found.score, steady, transient, pair.squared_error, speed_deg_s
+    )

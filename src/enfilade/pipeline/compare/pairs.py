@@ -1,0 +1,184 @@
+"""Two sequences side by side: what has to be alike, and each pair of frames as the screen shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from enfilade.errors import ImageError
+from enfilade.monitor import Monitor
+from enfilade.pixels.tone import display_luminance, srgb_encode
+from enfilade.records import F32
+from enfilade.video import Sequence, open_sequence
+from enfilade.viewing import Viewing
+
+__all__ = ["Pair", "Pairs", "open_pairs"]
+
+DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
+FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One frame of each sequence, as the screen shows them.
+
+    Attributes
+    ----------
+    index : int
+        From 0.
+    name : str
+        Of the test's frame.
+    test, reference : (H, W) float32
+        Luminance, cd/m2.
+    reference_relative : (H, W) float32
+        Of the reference, 1 = white.
+    squared_error : float
+        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+    """
+
+    index: int
+    name: str
+    test: F32
+    reference: F32
+    reference_relative: F32
+    squared_error: float
+
+
+class Pairs:
+    """Two sequences of one length and size, read frame by frame, each once.
+
+    Parameters
+    ----------
+    test, reference : Sequence
+    fps
+        Frames per second that are shown; None takes the reference's, the test's, or 30.
+    exposure_ev
+        Of OpenEXR frames; others are as shown.
+
+    Attributes
+    ----------
+    test, reference : Sequence
+    fps : float
+
+    Raises
+    ------
+    ImageError
+        They differ in length, size or frame rate.
+    """
+
+    def __init__(self, test: Sequence, reference: Sequence, *, fps: float | None, exposure_ev: float) -> None:
+        _check_alike(test, reference)
+        self.test, self.reference = test, reference
+        self.fps = _common_fps(test, reference) if fps is None else fps
+        self._exposures_ev = [exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
+
+    def __len__(self) -> int:
+        return len(self.test)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.test.width, self.test.height
+
+    def shown(self, viewing: Viewing, monitor: Monitor) -> Iterator[Pair]:
+        """Frames as the screen of `viewing` shows them; each is read when it is asked for.
+
+        Negative values, which no screen shows, are black; that is said once.
+
+        Raises
+        ------
+        ImageError
+            A frame can't be read, or holds a NaN or an infinity.
+        """
+        is_said = False
+        for index, images in enumerate(zip(self.test, self.reference, strict=True)):
+            least = [
+                _checked(image, s.name(index))
+                for image, s in zip(images, (self.test, self.reference), strict=True)
+            ]
+            if min(least) < 0.0 and not is_said:
+                first = (self.test, self.reference)[least.index(min(least))].name(index)
+                monitor.say(f"{first} holds negative values; a screen shows them, and more like them, as 0")
+                is_said = True
+            yield self._pair(index, images, viewing)
+
+    def _pair(self, index: int, images: tuple[F32, F32], viewing: Viewing) -> Pair:
+        # What is equal stays exactly equal: both take the same steps.
+        exposed = [
+            np.clip(image * np.float32(2.0**ev), 0.0, 1.0)
+            for image, ev in zip(images, self._exposures_ev, strict=True)
+        ]
+        relative = [
+            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0) for image in exposed
+        ]
+        span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
+        test, reference = (image * span + black for image in relative)
+        error = _squared_error(*exposed)
+        return Pair(index, self.test.name(index), test, reference, relative[1], error)
+
+
+def open_pairs(test: Path | str, reference: Path | str, *, fps: float | None, exposure_ev: float) -> Pairs:
+    """Open two sequences to be compared.
+
+    Parameters
+    ----------
+    test, reference
+        Whatever :func:`enfilade.video.open_sequence` reads.
+    fps, exposure_ev
+        See :class:`Pairs`.
+
+    Raises
+    ------
+    ImageError
+        One can't be read, or they differ in length, size or frame rate.
+    """
+    return Pairs(open_sequence(test), open_sequence(reference), fps=fps, exposure_ev=exposure_ev)
+
+
+def _squared_error(test: F32, reference: F32) -> float:
+    if np.array_equal(test, reference):
+        return 0.0
+    difference = srgb_encode(test) - srgb_encode(reference)
+    return float(np.vdot(difference, difference)) / difference.size
+
+
+def _checked(image: F32, name: str) -> float:
+    least, most = float(image.min()), float(image.max())
+    if np.isfinite(least) and np.isfinite(most):
+        return least
+    bad = ~np.isfinite(image).all(axis=2)
+    row, column = np.argwhere(bad)[0].tolist()
+    raise ImageError(
+        f"{name} has {np.count_nonzero(bad)} pixels that are NaN or infinite, the first in row {row}, "
+        f"column {column} (from 0); render it again or repair them"
+    )
+
+
+def _check_alike(test: Sequence, reference: Sequence) -> None:
+    if len(test) != len(reference):
+        raise ImageError(
+            f"the test has {len(test)} frames (first {test.name(0)}) and the reference {len(reference)} "
+            f"(first {reference.name(0)}); give equal ones"
+        )
+    sizes = [f"{s.width}x{s.height}" for s in (test, reference)]
+    if sizes[0] != sizes[1]:
+        raise ImageError(
+            f"the test's images are {sizes[0]} ({test.name(0)}) and the reference's {sizes[1]} "
+            f"({reference.name(0)}); give equal ones"
+        )
+
+
+def _common_fps(test: Sequence, reference: Sequence) -> float:
+    if test.fps and reference.fps and abs(test.fps / reference.fps - 1.0) > FPS_TOLERANCE:
+        raise ImageError(
+            f"the test plays at {test.fps:g} frames per second ({test.name(0)}) and the reference at "
+            f"{reference.fps:g} ({reference.name(0)}); say with --fps at which both are shown"
+        )
+    return reference.fps or test.fps or DEFAULT_FPS
+
+
+def _is_exr(sequence: Sequence) -> bool:
+    return sequence.name(0).lower().endswith(".exr")

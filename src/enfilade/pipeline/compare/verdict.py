@@ -1,0 +1,181 @@
+"""What the metric says of two sequences: per frame, per band, steady and transient, and as one number."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from enfilade.metric import MetricOptions, sequence_score
+from enfilade.viewing import Viewing
+
+__all__ = ["Band", "FrameDifference", "Part", "SequenceDifference", "meaning", "psnr_db"]
+
+MEANINGS = (  # up to which score, JND; 1 JND is found in three of four cases (§6)
+    (0.0, "identical"),
+    (0.25, "nobody notices it"),
+    (0.75, "hardly noticed: a viewer who looks for it finds it in half of the cases"),
+    (1.5, "noticed: a viewer who looks for it finds it in three of four cases"),
+    (3.0, "plain: nearly every viewer sees it"),
+    (math.inf, "obvious at first sight"),
+)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Steady or transient errors of one frame.
+
+    Attributes
+    ----------
+    score : float
+        JND.
+    bands : tuple of float
+        Per radial band, finest first, JND.
+    """
+
+    score: float
+    bands: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FrameDifference:
+    """What the metric says of one pair of frames.
+
+    Attributes
+    ----------
+    name : str
+        Of the test's frame.
+    percent_visible : float
+        Pixels above 1 JND, percent.
+    score : float
+        The map pooled to one number, JND.
+    steady, transient : Part
+        Errors that stay on the surface, and errors that change from frame to frame. Both make up the
+        score; `transient` is zero where the metric doesn't look for them.
+    squared_error : float
+        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+    velocity_deg_s : float
+        Mean image velocity that was assumed.
+    """
+
+    name: str
+    percent_visible: float
+    score: float
+    steady: Part
+    transient: Part
+    squared_error: float
+    velocity_deg_s: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures as plain values for JSON; the PSNR of identical images is None."""
+        return {
+            "name": self.name,
+            "score_jnd": self.score,
+            "steady_jnd": self.steady.score,
+            "transient_jnd": self.transient.score,
+            "percent_visible": self.percent_visible,
+            "steady_bands_jnd": list(self.steady.bands),
+            "transient_bands_jnd": list(self.transient.bands),
+            "psnr_db": _finite(psnr_db(self.squared_error)),
+            "velocity_deg_s": self.velocity_deg_s,
+        }
+
+
+@dataclass(frozen=True)
+class Band:
+    """Spatial frequencies that a band passes, cycles per degree; `low_cpd` is 0 in the base."""
+
+    low_cpd: float
+    high_cpd: float
+
+
+@dataclass(frozen=True)
+class SequenceDifference:
+    """What the metric says of two sequences.
+
+    Attributes
+    ----------
+    frames : tuple of FrameDifference
+    viewing : Viewing
+        Who was assumed to look.
+    bands : tuple of Band
+        Finest first.
+    options : MetricOptions
+        Departures from the paper.
+    flow : str
+        Where the image flow came from: ``layers``, ``estimate`` or ``none``.
+    """
+
+    frames: tuple[FrameDifference, ...]
+    viewing: Viewing
+    bands: tuple[Band, ...]
+    options: MetricOptions
+    flow: str
+
+    @property
+    def score(self) -> float:
+        """One number for the sequence, JND: (mean over frames of score^3.5)^(1/3.5)."""
+        return sequence_score([f.score for f in self.frames])
+
+    @property
+    def mode(self) -> str:
+        """``paper``, ``modern``, or ``custom`` for anything between."""
+        known = {"paper": MetricOptions.paper(), "modern": MetricOptions.modern()}
+        return next((name for name, options in known.items() if options == self.options), "custom")
+
+    def _is_on(self, departure: str) -> bool:
+        return self.options.without(departure) != self.options
+
+    @property
+    def psnr_db(self) -> float:
+        """PSNR of the whole sequence, of the mean squared error over all frames; infinite if identical."""
+        return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures as plain values for JSON; `docs/compare.md` describes them."""
+        viewing = self.viewing
+        return {
+            "score_jnd": self.score,
+            "meaning": meaning(self.score),
+            "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
+            "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
+            "percent_visible": _spread([f.percent_visible for f in self.frames]),
+            "psnr_db": _finite(self.psnr_db),
+            "worst_frame": max(range(len(self.frames)), key=lambda i: self.frames[i].score),
+            "frames": len(self.frames),
+            "size": [viewing.width_px, viewing.height_px],
+            "fps": viewing.fps,
+            "pixels_per_degree": viewing.pixels_per_degree,
+            "distance_m": viewing.distance_m,
+            "peak_cd_m2": viewing.peak_cd_m2,
+            "black_cd_m2": viewing.black_cd_m2,
+            "mode": self.mode,
+            "departures": [name for name in self.options.departures() if self._is_on(name)],
+            "flow": self.flow,
+            "bands_cpd": [[band.low_cpd, band.high_cpd] for band in self.bands],
+            "per_frame": [frame.to_dict() for frame in self.frames],
+        }
+
+
+def meaning(score: float) -> str:
+    """A score in words.
+
+    Parameters
+    ----------
+    score
+        JND, 0 or more.
+    """
+    return next(text for most, text in MEANINGS if score <= most)
+
+
+def psnr_db(squared_error: float) -> float:
+    """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
+    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
+
+
+def _spread(values: list[float]) -> dict[str, float]:
+    return {"mean": sum(values) / len(values), "most": max(values)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

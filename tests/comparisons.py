@@ -1,0 +1,59 @@
+"""Small sequences to be compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.codec import write_exr
+from enfilade.monitor import Silence
+from enfilade.pipeline.compare import FlowChoice, SequenceDifference, Terms, compare, metric_options
+from enfilade.settings import MetricSettings
+
+SIZE = (48, 64)
+
+
+class Notes(Silence):
+    """Keeps what is said."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+
+
+def textured(shift: float = 0.0, level: float = 0.2) -> np.ndarray:
+    """A grey texture, moved to the left."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(np.float32)
+    grey = level * (1.0 + 0.5 * np.sin(0.8 * (x + shift)) * np.cos(0.6 * y))
+    return np.repeat(grey[..., None], 3, axis=2).astype(np.float32)
+
+
+def write_sequence(
+    folder: Path,
+    images: list[np.ndarray],
+    *,
+    flow_px: float | None = None,
+    layers: dict[str, Any] | None = None,
+) -> Path:
+    folder.mkdir(parents=True)
+    more = dict(layers or {})
+    if flow_px is not None:
+        forward = np.zeros((*SIZE, 2), np.float32)
+        forward[..., 0] = flow_px
+        more |= {"forward": forward, "backward": -forward}
+    for i, image in enumerate(images, 1):
+        write_exr(folder / f"{i:04}.exr", {"RGB": image, **more})
+    return folder
+
+
+def terms(*, mode: str = "modern", flow: str = "auto", metering: str = "both", **fields: Any) -> Terms:
+    metric = MetricSettings.from_table({"metering": metering})
+    return Terms(metric=metric, options=metric_options(mode), flow=FlowChoice(flow), **fields)
+
+
+def judged(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:
+    return compare(test, reference, terms(**options), monitor or Notes())

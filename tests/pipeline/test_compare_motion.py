@@ -1,0 +1,119 @@
+"""Flow from layers of each known kind, estimated, or none: the same motion whichever way it is told."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from comparisons import SIZE, Notes, judged, textured
+from enfilade.errors import ImageError
+from enfilade.pipeline.compare.motion import flow_of_layers
+
+RIGHT, DOWN = 3.0, -2.0  # of the surface, pixels per frame
+
+
+def plane(value):
+    return np.full(SIZE, value, np.float32)
+
+
+def layers_of(kind):
+    """Layers as `read_exr` gives them, of a surface that moves by RIGHT, DOWN."""
+    motion = np.stack([plane(RIGHT), plane(DOWN)], axis=-1)
+    if kind == "own":
+        return {"forward": motion, "backward": -motion}
+    if kind == "motion":
+        return {"motion": motion}
+    # Cycles: previous - now in x and (upwards) y, then now - next
+    x, y, z, w = -RIGHT, DOWN, -RIGHT, DOWN
+    return {f"{kind}": np.stack([plane(x), plane(y), plane(z)], axis=-1), f"{kind}.W": plane(w)}
+
+
+@pytest.mark.parametrize("kind", ["own", "motion", "Vector", "View Layer.Vector"])
+def test_layers_of_each_kind_tell_the_same_motion(kind):
+    flow = flow_of_layers(layers_of(kind))
+    assert (flow.has_backward, flow.has_forward) == (True, True)
+    np.testing.assert_allclose(flow.forward, np.broadcast_to((RIGHT, DOWN), (*SIZE, 2)))
+    np.testing.assert_allclose(flow.motion, flow.forward)
+
+
+def test_the_vector_pass_that_blender_writes_is_read_from_its_file(sequence):
+    layers = {f"View Layer.Vector.{c}": plane(v) for c, v in zip("XYZW", (-3, -2, -3, -2), strict=True)}
+    notes = Notes()
+    folder = sequence("blender", [textured(), textured(3.0)], layers=layers)
+    found = judged(folder, folder, notes)
+    assert found.flow == "layers"
+    assert "Blender's Vector pass" in notes.said[0]
+    assert found.frames[0].velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(np.hypot(3.0, 2.0)))
+
+
+def test_other_layers_are_no_flow():
+    three = np.zeros((*SIZE, 3), np.float32)
+    for layers in ({"RGB": three}, {"forward": plane(1.0)}, {"Vector": three}, {"motion": plane(1.0)}):
+        assert flow_of_layers(layers) is None
+
+
+def test_flow_comes_from_the_layers_of_the_reference_or_the_test(sequence):
+    plain, told = sequence("plain", [textured(1.0)]), sequence("told", [textured()], flow_px=2.0)
+    for test, reference, role in ((plain, told, "reference"), (told, plain, "test")):
+        notes = Notes()
+        found = judged(test, reference, notes)
+        assert found.flow == "layers"
+        assert f"the {role}'s layers" in notes.said[0]
+        assert found.frames[0].velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(2.0), rel=1e-5)
+
+
+def test_without_layers_it_is_estimated_and_that_is_said(tmp_path):
+    rng = np.random.default_rng(0)
+    wide = np.repeat(np.repeat(rng.integers(40, 200, (24, 40), np.uint8), 4, axis=0), 4, axis=1)
+    for i in range(3):
+        Image.fromarray(wide[:, 2 * i : 2 * i + 120]).convert("RGB").save(tmp_path / f"{i}.png")
+    notes = Notes()
+    found = judged(tmp_path, tmp_path, notes)
+    assert found.flow == "estimate"
+    assert "estimated from the reference" in notes.said[0]
+    for frame in found.frames:  # ends included; at the borders it can't be exact
+        assert frame.velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(2.0), rel=0.1)
+
+
+def test_none_and_a_single_image_stand_still(sequence):
+    one = sequence("one", [textured()])
+    two = sequence("two", [textured(), textured(2.0)], flow_px=2.0)
+    for folder, flow in ((one, "auto"), (one, "estimate"), (two, "none")):
+        notes = Notes()
+        found = judged(folder, folder, notes, flow=flow)
+        assert (found.flow, found.frames[0].velocity_deg_s) == ("none", 0.0)
+        assert "stood still" in notes.said[0]
+
+
+def test_layers_that_are_asked_for_have_to_be_there(sequence):
+    plain = sequence("plain", [textured()])
+    with pytest.raises(
+        ImageError, match=r"neither .*0001\.exr.* has layers of image flow; known are: .*Vector"
+    ):
+        judged(plain, plain, flow="layers")
+
+
+def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
+    ends = sequence("ends", [textured()], flow_px=2.0)
+    sequence("rest", [textured(), textured()])
+    (ends.parent / "rest" / "0002.exr").rename(ends / "0002.exr")
+    with pytest.raises(ImageError, match=r"0002\.exr has no layers forward"):
+        judged(ends, ends)
+    bad = np.zeros((*SIZE, 2), np.float32)
+    bad[3, 4] = np.nan
+    broken = sequence("broken", [textured()], layers={"forward": bad, "backward": bad})
+    with pytest.raises(ImageError, match=r"0001\.exr has NaN or infinite values in its image flow"):
+        judged(broken, broken)
+
+
+def test_what_flickers_at_a_cut_is_not_counted(sequence):
+    """Across a cut the error changes altogether, and nobody sees that as flicker."""
+    still = np.zeros((*SIZE, 2), np.float32)
+    layers = {"forward": still, "backward": still}
+    shots = [textured(level=0.1)] * 2 + [textured(level=0.6)] * 2
+    faulty = [image.copy() for image in shots]
+    for image in faulty:
+        image[10:30, 10:30] *= 0.8
+    test, reference = sequence("t", faulty, layers=layers), sequence("r", shots, layers=layers)
+    found = judged(test, reference)
+    assert [f.transient.score for f in found.frames] == [0.0] * 4
+    assert min(f.steady.score for f in found.frames) > 0.1
