@@ -8,19 +8,17 @@ its own. The comparison is then of the curve's shape, and no error is counted at
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.metric import Aqm
 from enfilade.monitor import Monitor
+from enfilade.studies.people.mode import Mode
 from enfilade.studies.people.screen import screen
 from enfilade.studies.people.tables import read_columns
 from enfilade.studies.people.threshold import threshold_contrast
-from enfilade.viewing import Viewing
 
 __all__ = ["UNMASKED_DB", "Masking", "gabor_and_sine", "measure"]
 
@@ -74,20 +72,20 @@ def gabor_and_sine() -> tuple[Float64Array, Float64Array]:
     return sine * np.exp(-0.5 * (x**2 + y**2) / SIGMA_DEG**2), sine
 
 
-def measure(judge: Callable[[Viewing], Aqm], monitor: Monitor) -> Masking:
+def measure(mode: Mode, monitor: Monitor) -> Masking:
     """Thresholds of the metric on Foley's masks, beside those of people.
 
     Parameters
     ----------
-    judge : callable
-        Makes the metric for viewing conditions.
+    mode : Mode
+        The metric.
     monitor : Monitor
         Is told of each mask.
     """
-    observer = judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = mode.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
     gabor, sine = gabor_and_sine()
     _, people = read_columns("foley.csv", "mask_db", "threshold_db")
-    monitor.stage("masking", len(people["mask_db"]) + 1)
+    monitor.stage(f"masking, {mode.name}", len(people["mask_db"]) + 1)
     alone_db = _db(threshold_contrast(observer, gabor, MEAN_CD_M2))
     gain_db = UNMASKED_DB - alone_db
     monitor.advance()

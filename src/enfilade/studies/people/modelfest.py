@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.special
 
-from enfilade.metric import Aqm
 from enfilade.monitor import Monitor
+from enfilade.studies.people.mode import Mode
 from enfilade.studies.people.screen import screen
 from enfilade.studies.people.tables import read_columns
 from enfilade.studies.people.threshold import threshold_contrast
-from enfilade.viewing import Viewing
 
 __all__ = ["PIXELS_PER_DEGREE", "SIZE_PX", "Thresholds", "measure", "target"]
 
@@ -168,13 +167,13 @@ def target(number: int) -> Float64Array:
     return WHOLE[number](x, y)
 
 
-def measure(judge: Callable[[Viewing], Aqm], monitor: Monitor) -> Thresholds:
+def measure(mode: Mode, monitor: Monitor) -> Thresholds:
     """Thresholds of the metric for all 41 targets, beside those of people.
 
     Parameters
     ----------
-    judge : callable
-        Makes the metric for viewing conditions.
+    mode : Mode
+        The metric.
     monitor : Monitor
         Is told of each target.
 
@@ -183,12 +182,12 @@ def measure(judge: Callable[[Viewing], Aqm], monitor: Monitor) -> Thresholds:
     Thresholds
         In the order of the targets' numbers.
     """
-    observer = judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = mode.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
     _, people = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
     numbers = people["target"].astype(np.int64)
     chosen = ~np.isin(numbers, IMAGES)
     found = []
-    monitor.stage("ModelFest", int(np.count_nonzero(chosen)))
+    monitor.stage(f"ModelFest, {mode.name}", int(np.count_nonzero(chosen)))
     for number, known_db in zip(numbers[chosen], people["sensitivity_db"][chosen], strict=True):
         guess = 10.0 ** (-known_db / 20.0)
         contrast = threshold_contrast(observer, target(int(number)), MEAN_CD_M2, guess=guess)

@@ -6,20 +6,18 @@ ModelFest (Watson and Ahumada 2005). No gain is fitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.studies.people.mode import Mode
 from enfilade.studies.people.tables import read_columns
 
-__all__ = ["STUDIES", "Csf", "Sensitivities", "measure"]
+__all__ = ["STUDIES", "Sensitivities", "measure"]
 
 Float64Array: TypeAlias = npt.NDArray[np.float64]
-Csf: TypeAlias = Callable[[float, float, float, float], float]
-"""Sensitivity by frequency (cpd), flicker (Hz), luminance (cd/m2) and area (deg2)."""
 
 STUDIES = ("robson1966", "laird2006", "modelfest")
 LOWEST_CPD, HIGHEST_CPD = 0.5, 12.0  # where the metric has bands, and pixels show them
@@ -58,15 +56,15 @@ class Sensitivities:
         return float(np.sqrt(np.mean(self.error_db**2)))
 
 
-def measure(study: str, csf: Csf) -> Sensitivities:
-    """Sensitivities of a CSF at 0.5 to 12 cpd, beside those of people.
+def measure(study: str, mode: Mode) -> Sensitivities:
+    """Sensitivities of the metric at 0.5 to 12 cpd, beside those of people.
 
     Parameters
     ----------
     study : str
         One of STUDIES.
-    csf : Csf
-        The metric's.
+    mode : Mode
+        The metric.
     """
     names = ("frequency_cpd", "temporal_hz", "luminance_cd_m2", "area_deg2", "sensitivity")
     rows, columns = read_columns("sensitivity.csv", *names)
@@ -74,5 +72,5 @@ def measure(study: str, csf: Csf) -> Sensitivities:
     is_chosen = (frequency >= LOWEST_CPD) & (frequency <= HIGHEST_CPD)
     is_chosen &= np.array([row["study"] == study for row in rows])
     cpd, hz, luminance, area, people = (columns[name][is_chosen] for name in names)
-    metric = np.array([csf(*shown) for shown in zip(cpd, hz, luminance, area, strict=True)])
+    metric = np.array([mode.sensitivity(*shown) for shown in zip(cpd, hz, luminance, area, strict=True)])
     return Sensitivities(cpd, hz, luminance, area, people, metric)
