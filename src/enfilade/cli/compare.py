@@ -126,14 +126,17 @@ def command(
 
     with watch(quiet=quiet) as monitor:
         found = compare(test, reference, terms, monitor, show=show).to_dict()
+    if as_json:
+        click.echo(json.dumps(found, indent=2))
+    else:
+        _print(found)
     if graph is not None:
         from enfilade.report.timegraph import plot_comparison
 
         plot_comparison(found, graph)
-    if as_json:
-        click.echo(json.dumps(found, indent=2))
-        return
-    _print(found, {"heat map": heatmap, "graph": graph})
+    for name, file in (("heat map", heatmap), ("graph", graph)):
+        if file is not None and not as_json:
+            click.echo(f"{name:<9} {file}")
 
 
 def _terms(
@@ -205,12 +208,9 @@ def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
     return painter.paint(frame.jnd, frame.grey, caption)
 
 
-def _print(found: dict[str, Any], files: dict[str, Path | None]) -> None:
+def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
     from enfilade.report.tables import comparison_table
 
     Console().print(comparison_table(found))
-    for name, file in files.items():
-        if file is not None:
-            click.echo(f"{name:<9} {file}")

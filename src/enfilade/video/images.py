@@ -25,6 +25,7 @@ PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PNG_DEPTH_BYTE = 24  # of the file: bit depth in IHDR, PNG (3rd ed.), 11.2.1
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709-6, item 1.3-1.4: R G B white
 CHROMATICITY_TOLERANCE = 0.005
+DECODED = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))  # linear, of each 8-bit value
 
 
 class ImageFiles:
@@ -105,7 +106,7 @@ class ImageFiles:
 def _linear(file: Path) -> F32:
     if file.suffix.lower() == ".exr":
         return _from_exr(file, read_exr(file))
-    return srgb_decode(_opaque(file, deep_png(file)) if _is_deep_png(file) else _from_pillow(file))
+    return srgb_decode(_opaque(file, deep_png(file))) if _is_deep_png(file) else _from_pillow(file)
 
 
 def _from_exr(file: Path, layers: dict[str, Any]) -> F32:
@@ -123,10 +124,13 @@ def _from_pillow(file: Path) -> F32:
     try:
         with Image.open(file, formats=("PNG", "JPEG")) as image:
             _check_size(file, image.width, image.height)
-            pixels = np.asarray(image.convert("RGBA"), np.float32) / np.float32(255.0)
+            pixels = np.asarray(image.convert("RGBA"))
     except (OSError, SyntaxError, EOFError, struct.error, zlib.error, Image.DecompressionBombError) as error:
         raise ImageError(f"can't read {file}: {error}; write or copy it again") from error
-    return _opaque(file, pixels)
+    if (pixels[..., 3] < 255).any():
+        raise _transparent(file)
+    decoded: F32 = DECODED[pixels[..., :3]]
+    return decoded
 
 
 def _check_size(file: Path, width: int, height: int) -> None:
@@ -136,8 +140,12 @@ def _check_size(file: Path, width: int, height: int) -> None:
 
 def _opaque(file: Path, rgba: F32) -> F32:
     if (rgba[..., 3] < 1.0).any():
-        raise ImageError(f"{file} has transparent pixels; put it over a background first")
+        raise _transparent(file)
     return rgba[..., :3]
+
+
+def _transparent(file: Path) -> ImageError:
+    return ImageError(f"{file} has transparent pixels; put it over a background first")
 
 
 def _is_deep_png(file: Path) -> bool:

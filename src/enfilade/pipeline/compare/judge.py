@@ -34,14 +34,19 @@ class JudgedFrame:
     difference : FrameDifference
     jnd : (H, W) float32
         The map.
-    grey : (H, W) float32
-        The reference, encoded for a screen, 0..1.
+    reference_relative : (H, W) float32
+        Luminance of the reference, 1 = white.
     """
 
     index: int
     difference: FrameDifference
     jnd: F32
-    grey: F32
+    reference_relative: F32
+
+    @property
+    def grey(self) -> F32:
+        """The reference, encoded for a screen, (H, W) float32, 0..1."""
+        return srgb_encode(self.reference_relative)
 
 
 Show = Callable[[Iterator[JudgedFrame], Viewing], object]
@@ -185,7 +190,7 @@ class _Judge:
             raise ImageError(f"{pair.name} can't be judged: {error}") from error
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
         difference = _difference(pair, found, speed)
-        return JudgedFrame(pair.index, difference, found.jnd, srgb_encode(pair.reference_relative))
+        return JudgedFrame(pair.index, difference, found.jnd, pair.reference_relative)
 
 
 def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
