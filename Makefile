@@ -1,5 +1,6 @@
 # make demo    set up, render a small walkthrough into runs/demo
 # make test    set up, run the tests
+# make validate-metric   set up, judge the metric by what people saw
 # make check   set up, run format, lint, type and import-floor checks
 # make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
 # make lock    write requirements.lock anew from pyproject.toml
@@ -9,7 +10,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python libraries demo test check format lock clean
+.PHONY: help setup python libraries demo test validate-metric check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -31,6 +32,9 @@ demo: setup
 
 test: setup
 	$(BIN)/python -m pytest $(TESTS)
+
+validate-metric: setup
+	$(BIN)/enfilade validate $(VALIDATE)
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -59,12 +59,12 @@ def _scene() -> Float64Array:
     fx, fy = np.fft.rfftfreq(SIZE_PX), np.fft.fftfreq(SIZE_PX)[:, None]
     spectrum = np.fft.rfft2(random.standard_normal((SIZE_PX, SIZE_PX)))
     cloud = np.fft.irfft2(spectrum / np.maximum(np.hypot(fx, fy), 1.0 / SIZE_PX), s=(SIZE_PX, SIZE_PX))
-    scene = MEAN_CD_M2 * (1.0 + 0.2 * cloud / cloud.std())
+    scene: Float64Array = MEAN_CD_M2 * (1.0 + 0.2 * cloud / cloud.std())
     y, x = np.mgrid[:SIZE_PX, :SIZE_PX]
     for centre_x, centre_y, level in ((70, 80, 1.5), (170, 110, 0.6), (120, 190, 1.3)):
         scene = np.where(np.hypot(x - centre_x, y - centre_y) < 28.0, level * scene, scene)
-    np.maximum(scene, 1.0, out=scene)
-    return scene
+    bright: Float64Array = np.maximum(scene, 1.0)
+    return bright
 
 
 def _blurred(scene: Float64Array) -> Float64Array:
@@ -112,9 +112,10 @@ def sequences(example: str) -> list[tuple[Float32Array, Float32Array, Float32Arr
         cd/m2. The flicker's mean squared error is 0.9 times that of the blur, in each frame.
     """
     error, pan_px = EXAMPLES[example]
+    still = _scene()
     found = []
     for frame in range(FRAMES):
-        scene = np.roll(_scene(), frame * pan_px, axis=1)
+        scene = np.roll(still, frame * pan_px, axis=1)
         blurred = _blurred(scene)
         change = error(frame, scene)
         change *= np.sqrt(SHARE * np.mean((blurred - scene) ** 2) / np.mean(change**2))

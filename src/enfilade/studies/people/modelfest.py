@@ -81,6 +81,12 @@ class Thresholds:
         """Root of the mean square of the errors, after the gain."""
         return float(np.sqrt(np.mean(self.error_db**2)))
 
+    @property
+    def left_out_rms_db(self) -> float:
+        """The same with, for each target, the gain that the other targets ask for."""
+        count = len(self.number)
+        return self.rms_db * count / (count - 1)
+
 
 def _plane() -> tuple[Float64Array, Float64Array]:
     """Degrees from the centre, which is a pixel: x to the right, y down."""

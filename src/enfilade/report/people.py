@@ -1,0 +1,176 @@
+"""Plots of a validation: what people saw, and what each mode of the metric says of the same stimuli."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.report.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
+
+__all__ = ["plot_people"]
+
+DPI = 100
+PANEL_IN = (4.6, 3.4)
+MODE_STYLES = (  # first the published metric, then the modern one
+    {"color": VERMILION, "marker": "s", "linestyle": "--"},
+    {"color": BLUE, "marker": "o", "linestyle": "-"},
+)
+STUDY_TITLES = {
+    "robson1966": "Robson 1966, 20 cd/m²",
+    "laird2006": "Laird et al. 2006, 60 cd/m²",
+    "modelfest": "Gabors of ModelFest, 30 cd/m²",
+}
+TEXTURE_COLORS = {"checkerboard": VERMILION, "gradient": GREEN, "grass": GREY, "noise": BLUE}
+DISPLAY_MARKERS = {"pc": "o", "phone": "s", "headset": "^"}
+
+
+def plot_people(validation: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Draw a plot for each data set.
+
+    Parameters
+    ----------
+    validation
+        ``Validation.to_dict()``; its first two modes are drawn.
+    folder
+        Where the PNG files go.
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
+    modes = validation["modes"][: len(MODE_STYLES)]
+    figures = {
+        "modelfest.png": _modelfest(modes),
+        "masking.png": _masking(modes),
+        "sensitivity.png": _sensitivity(modes),
+        "moving_texture.png": _moving_texture(modes),
+    }
+    return [save(figure, folder / name) for name, figure in figures.items()]
+
+
+def _new(columns: int, *, width: float = 1.0) -> tuple[Figure, list[Any]]:
+    size = (PANEL_IN[0] * columns * width, PANEL_IN[1] + 0.5)
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    axes = figure.subplots(1, columns, squeeze=False)[0]
+    for ax in axes:
+        ax.grid(color="#DDDDDD", linewidth=0.6)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(colors=INK, labelsize=9)
+    return figure, list(axes)
+
+
+def _modelfest(modes: Sequence[Mapping[str, Any]]) -> Figure:
+    figure, (ax,) = _new(1, width=2.2)
+    people = modes[0]["modelfest"]
+    places = np.arange(len(people["number"]))
+    ax.errorbar(
+        places,
+        people["people_db"],
+        yerr=people["spread_db"],
+        fmt="D",
+        color=INK,
+        markersize=5,
+        elinewidth=0.8,
+        label="16 observers, and their spread",
+    )
+    for mode, style in zip(modes, MODE_STYLES, strict=False):
+        found = mode["modelfest"]
+        gain_db = np.mean(_array(found["people_db"]) - _array(found["metric_db"]))
+        shown = _array(found["metric_db"]) + gain_db
+        ax.plot(
+            places,
+            shown,
+            **style | {"linestyle": "none"},
+            markersize=5,
+            label=f"{mode['mode']}, gain {gain_db:+.1f} dB",
+        )
+    ax.set_xticks(places, [str(n) for n in people["number"]], fontsize=8)
+    ax.set_xlabel("target")
+    ax.set_ylabel("contrast sensitivity, dB")
+    ax.legend(fontsize=8, frameon=False, loc="upper right")
+    return figure
+
+
+def _masking(modes: Sequence[Mapping[str, Any]]) -> Figure:
+    figure, (ax,) = _new(1, width=1.4)
+    people = modes[0]["masking"]
+    ax.plot(people["mask_db"], people["people_db"], "D", color=INK, markersize=6, label="Foley 1994")
+    for mode, style in zip(modes, MODE_STYLES, strict=False):
+        found = mode["masking"]
+        label = f"{mode['mode']}, moved {found['gain_db']:+.1f} dB"
+        ax.plot(found["mask_db"], found["metric_db"], **style, markersize=4, linewidth=1.4, label=label)
+    ax.set_xlabel("contrast of the mask, dB")
+    ax.set_ylabel("contrast of the target at threshold, dB")
+    ax.legend(fontsize=8, frameon=False, loc="upper left")
+    return figure
+
+
+def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
+    figure, axes = _new(len(STUDY_TITLES))
+    shades = {
+        0.0: INK,
+        1.0: INK,
+        6.06: GREEN,
+        10.0: INK,
+        16.0: BLUE,
+        20.0: BLUE,
+        22.63: VERMILION,
+        30.0: VERMILION,
+    }
+    for ax, (study, title) in zip(axes, STUDY_TITLES.items(), strict=True):
+        ax.set_title(title, fontsize=10, color=INK)
+        for hertz, color in shades.items():
+            _draw_rate(ax, [mode["sensitivity"][study] for mode in modes], hertz, color)
+        ax.set(xscale="log", yscale="log", xlabel="spatial frequency, cpd", ylim=(1.0, 500.0))
+        ax.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
+        ax.minorticks_off()
+        ax.legend(fontsize=8, frameon=False, loc="lower left")
+    axes[0].set_ylabel("contrast sensitivity")
+    figure.supxlabel("points: people; dashed: paper; line: modern", fontsize=9, color=INK)
+    return figure
+
+
+def _draw_rate(ax: Any, found: Sequence[Mapping[str, Any]], hertz: float, color: str) -> None:
+    """Points and curves of one temporal frequency, where there are enough to make a curve."""
+    is_chosen = np.abs(_array(found[0]["temporal_hz"]) - hertz) < 0.01
+    if np.count_nonzero(is_chosen) < 2:
+        return
+    cpd = _array(found[0]["frequency_cpd"])[is_chosen]
+    order = np.argsort(cpd, kind="stable")
+    ax.plot(cpd, _array(found[0]["people"])[is_chosen], "o", color=color, markersize=5, label=f"{hertz:g} Hz")
+    for mode, style in zip(found, MODE_STYLES, strict=False):
+        curve = _array(mode["metric"])[is_chosen][order]
+        ax.plot(cpd[order], np.maximum(curve, 0.01), style["linestyle"], color=color, linewidth=1.2)
+
+
+def _moving_texture(modes: Sequence[Mapping[str, Any]]) -> Figure:
+    figure, axes = _new(len(modes), width=1.2)
+    for ax, mode in zip(axes, modes, strict=True):
+        found = mode["moving_texture"]
+        people, metric = _array(found["people_jnd"]), _array(found["metric_jnd"])
+        spread = np.array([found["low_jnd"], found["high_jnd"]])
+        kinds = [(c["texture"], c["display"]) for c in found["conditions"]]
+        for texture, color in TEXTURE_COLORS.items():
+            for display, marker in DISPLAY_MARKERS.items():
+                is_chosen = np.array([kind == (texture, display) for kind in kinds])
+                shown = {"color": color, "markersize": 5, "elinewidth": 0.5}
+                label = f"{texture}, {display}"
+                bars = spread[:, is_chosen]
+                ax.errorbar(metric[is_chosen], people[is_chosen], yerr=bars, fmt=marker, label=label, **shown)
+        ax.set_xscale("log")
+        ax.set_title(mode["mode"], fontsize=10, color=INK)
+        ax.set_xlabel("score of the metric, JND")
+        ax.axhline(0.0, color=INK, linewidth=0.8)
+    axes[0].set_ylabel("quality lost to people, JND")
+    axes[-1].legend(fontsize=7, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _array(values: Sequence[float]) -> npt.NDArray[np.float64]:
+    return np.asarray(values, np.float64)

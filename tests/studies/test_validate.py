@@ -1,0 +1,125 @@
+"""The verdict: figures, bounds, exit status, plots; with made-up measurements but for one slow run."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from enfilade.cli import main
+from enfilade.metric import MetricOptions
+from enfilade.monitor import Silence
+from enfilade.studies.people import validate as validation
+from enfilade.studies.people.figures import ASKED, Asked, Figure, Measured
+from enfilade.studies.people.flicker import Pair
+from enfilade.studies.people.foley import Masking
+from enfilade.studies.people.modelfest import Thresholds
+from enfilade.studies.people.moving_texture import Losses, conditions
+from enfilade.studies.people.sensitivity import STUDIES, Sensitivities
+from enfilade.studies.people.validate import Validation, ablations
+
+
+def made_up(mode, *, error_db=0.5, flicker_jnd=2.0, is_bound=True):
+    """A mode that misses people's thresholds by turns by so much."""
+    error = error_db * np.array([1.0, -1.0] * 5)
+    people = np.linspace(20.0, 40.0, 10)
+    rates = np.array([1.0] * 5 + [16.0] * 5)
+    cpd = np.array([0.5, 1.0, 2.0, 4.0, 8.0] * 2)
+    shown = (cpd, rates, np.full(10, 20.0), np.ones(10))
+    csf = Sensitivities(*shown, people, people * 10.0 ** (error / 20.0))
+    loss = np.arange(72.0)
+    return Measured(
+        mode=mode,
+        is_bound=is_bound,
+        thresholds=Thresholds(np.arange(10), people, people + error, np.ones(10)),
+        masking=Masking(-people, -people, error - people, 3.0),
+        sensitivities=dict.fromkeys(STUDIES, csf),
+        losses=Losses(conditions(), loss, np.ones(72), np.ones(72), loss + 1.0),
+        flicker={"sparks": Pair(flicker_jnd, 1.0)},
+    )
+
+
+def run(monkeypatch, *arguments, **measured):
+    found = Validation((made_up("paper", error_db=9.0, is_bound=False), made_up("modern", **measured)))
+    monkeypatch.setattr(validation, "validate", lambda _: found)
+    return CliRunner().invoke(main, ["validate", "--quiet", *arguments])
+
+
+def test_bounds_hold_for_what_is_printed():
+    assert Asked(2.0).is_met(2.004)
+    assert not Asked(2.0).is_met(2.006)
+    assert Asked(0.9, is_least=True).is_met(0.896)
+    assert not Asked(0.9, is_least=True).is_met(0.894)
+    assert not Asked(2.0).is_met(float("nan"))
+
+
+def test_nothing_is_asked_of_a_figure_without_a_bound():
+    assert Figure("gain", "dB", 99.0).is_met
+
+
+def test_every_bound_has_its_figure():
+    names = [figure.name for figure in made_up("modern").figures() if figure.asked is not None]
+    assert sorted(names) == sorted(ASKED)
+
+
+def test_nothing_is_asked_of_the_papers_mode():
+    assert not Validation((made_up("paper", error_db=9.0, is_bound=False),)).missed
+
+
+def test_all_met_exits_with_0(monkeypatch):
+    found = run(monkeypatch)
+    assert found.exit_code == 0, found.output
+    assert "Missed" not in found.output
+    assert "ModelFest Gabors" in found.output
+
+
+def test_a_missed_figure_is_named_and_exits_with_1(monkeypatch):
+    found = run(monkeypatch, error_db=2.5)
+    assert found.exit_code == 1
+    assert "Missed: ModelFest, Foley masking." in found.output
+
+
+def test_flicker_must_be_scored_worse_than_blur(monkeypatch):
+    found = run(monkeypatch, flicker_jnd=1.0)
+    assert found.exit_code == 1
+    assert "Missed: flicker against blur." in found.output
+
+
+def test_json_has_figures_and_points(monkeypatch):
+    found = json.loads(run(monkeypatch, "--json").stdout)
+    assert found["is_met"]
+    assert found["missed"] == []
+    paper, modern = found["modes"]
+    assert paper["mode"] == "paper"
+    figures = {figure["name"]: figure for figure in modern["figures"]}
+    assert figures["ModelFest"]["value"] == pytest.approx(0.5)
+    assert figures["ModelFest"]["asked"] == {"bound": 2.0, "is_least": False}
+    assert len(modern["moving_texture"]["conditions"]) == 72
+
+
+def test_plots_of_each_data_set(monkeypatch, tmp_path):
+    found = run(monkeypatch, "--plots", str(tmp_path))
+    assert found.exit_code == 0, found.output
+    names = {file.name for file in tmp_path.iterdir()}
+    assert names == {"modelfest.png", "masking.png", "sensitivity.png", "moving_texture.png"}
+
+
+def test_an_ablation_takes_each_departure_by_itself():
+    modes = {mode.name: mode.options for mode in ablations()}
+    departures = MetricOptions.departures()
+    assert len(modes) == 2 + 2 * len(departures)
+    for name in departures:
+        assert modes[f"paper + {name}"] != MetricOptions.paper()
+        assert modes[f"modern - {name}"] == MetricOptions.modern().without(name)
+
+
+@pytest.mark.slow
+def test_the_modern_mode_is_nearer_to_people_than_the_papers():
+    paper, modern = validation.validate(Silence()).modes
+    paper_figures, modern_figures = (
+        {figure.name: figure.value for figure in mode.figures()} for mode in (paper, modern)
+    )
+    for name in ("ModelFest", "Robson 1966", "Laird 2006", "ModelFest Gabors"):
+        assert modern_figures[name] < paper_figures[name]
+    for name in ("moving texture, 54 conditions", "moving texture, 36 conditions", "flicker against blur"):
+        assert modern_figures[name] > paper_figures[name]
