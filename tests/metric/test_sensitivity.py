@@ -33,8 +33,8 @@ def test_any_speed_has_an_entry(table):
 
 
 def test_still_images_have_one_number(table):
-    sensitivity = ChannelSensitivity(table, [], 3)
-    assert sensitivity.map(LADDER[1]).shape == ()
+    sensitivity = ChannelSensitivity(table, [])
+    assert sensitivity.map(LADDER[1], 3).shape == ()
 
 
 def test_opposite_motions_do_not_cancel(table):
@@ -43,6 +43,6 @@ def test_opposite_motions_do_not_cancel(table):
     velocity[0] = np.where(np.arange(32) % 2, 6.0, -6.0)
     coarse = LADDER[-2]
     assert coarse.reduction > 1
-    got = ChannelSensitivity(table, [velocity], 3).map(coarse)
+    got = ChannelSensitivity(table, [velocity]).map(coarse, 3)
     expected = spatiovelocity_sensitivity(coarse.centre_cpp * PPD, 6.0)
     np.testing.assert_allclose(got, expected, rtol=0.01)

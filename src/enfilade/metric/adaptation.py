@@ -15,7 +15,7 @@ from enfilade.metric.pyramid import double, halve, halved_shape
 __all__ = ["DARKEST_CD_M2", "AdaptingLight", "adapting_luminance"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
-IndexArray: TypeAlias = npt.NDArray[np.intp]
+IndexArray: TypeAlias = npt.NDArray[np.int32]
 
 ADAPTATION_SIGMA_DEG = 0.5  # our choice: about the fovea's rim, where gaze and adaptation rest
 DARKEST_CD_M2 = 1e-3  # what is darker is seen as if it were this bright

@@ -16,7 +16,7 @@ from enfilade.metric.pooling import (
     root,
 )
 from enfilade.metric.pyramid import double, halve, halved_shape
-from enfilade.metric.spatial import gathered
+from enfilade.metric.spatial import Aperture
 
 __all__ = ["Comparison", "Part", "Pool", "PoolingRule"]
 
@@ -87,15 +87,15 @@ class PoolingRule:
     ----------
     exponent : float
         b, with which the J of channels are summed.
-    spatial_exponent : float or None
-        With which J is gathered over space (`metric.spatial`); None: each pixel by itself.
-    pixels_per_degree : float
-        Of the viewing conditions.
+    spatial_exponent : float
+        With which J is gathered over an aperture, if there is one.
+    is_gathered : bool
+        Whether the channels were gathered before they came (the transducer does).
     """
 
     exponent: float
-    spatial_exponent: float | None
-    pixels_per_degree: float
+    spatial_exponent: float
+    is_gathered: bool
 
 
 class Pool:
@@ -109,52 +109,66 @@ class Pool:
         Pixels to judge.
     rule : PoolingRule
         Exponents.
+    aperture : Aperture or None
+        What gathers over space.
     """
 
-    def __init__(self, bands: tuple[Band, ...], valid: BoolArray, rule: PoolingRule) -> None:
+    def __init__(
+        self, bands: tuple[Band, ...], valid: BoolArray, rule: PoolingRule, aperture: Aperture | None
+    ) -> None:
         self._valid = valid
         self._rule = rule
+        self._aperture = aperture
         self._areas: dict[int, Float32Array] = {1: valid.astype(np.float32)}
-        reduction = 1
-        while reduction < bands[-1].reduction:
-            self._areas[2 * reduction] = halve(self._areas[reduction])
-            reduction *= 2
-        self._weights = {step: float(area.sum(dtype=np.float64)) for step, area in self._areas.items()}
+        self._is_whole = bool(valid.all())
         self._sums: dict[bool, dict[int, Float32Array]] = {False: {}, True: {}}
         self._band_sums = {kind: [0.0] * len(bands) for kind in self._sums}
 
-    def add(self, band: Band, power: Float32Array, *, is_transient: bool = False) -> None:
-        """Add one channel's J^b, a map at the band's size, which is kept."""
+    def area(self, reduction: int) -> Float32Array | None:
+        """How much of each coarse sample is judged, 0 to 1; None where all is."""
+        if self._is_whole:
+            return None
+        if reduction not in self._areas:
+            self._areas[reduction] = halve(self._areas[reduction // 2])
+        return self._areas[reduction]
+
+    def add(self, level: int, power: Float32Array, reduction: int, *, is_transient: bool = False) -> None:
+        """Add J^b of a channel or of a band of that level, a map at reduced size, which is kept."""
         sums = self._sums[is_transient]
-        if band.reduction in sums:
-            sums[band.reduction] += power
+        if reduction in sums:
+            sums[reduction] += power
         else:
-            sums[band.reduction] = power
-        weight = self._weights[band.reduction]
-        pooled = float(np.vdot(self._areas[band.reduction], power))
-        self._band_sums[is_transient][band.level - 1] += pooled / weight if weight else 0.0
+            sums[reduction] = power
+        area = self.area(reduction)
+        if area is None:
+            pooled = float(power.mean(dtype=np.float64))
+        else:
+            weight = float(area.sum(dtype=np.float64))
+            pooled = float(np.vdot(area, power)) / weight if weight else 0.0
+        self._band_sums[is_transient][level - 1] += pooled
 
     def _map(self, sums: dict[int, Float32Array]) -> Float32Array:
         """J from the sums of channels: coarse ones interpolated to full size, root, gathered."""
-        valid, rule = self._valid, self._rule
+        shape, rule, aperture = self._valid.shape, self._rule, self._aperture
         if not sums:
-            return np.zeros(valid.shape, dtype=np.float32)
+            return np.zeros(shape, dtype=np.float32)
         reduction = max(sums)
         total = sums[reduction]
-        while reduction > 1:
+        while reduction > min(sums):
             reduction //= 2
-            total = double(total, halved_shape(valid.shape, reduction))
+            total = double(total, halved_shape(shape, reduction))
             if reduction in sums:
                 total += sums[reduction]
-        total = total * valid
-        if rule.spatial_exponent is None:
-            return root(total, rule.exponent)
-        # The root and the spatial exponent in one step.
-        ratio = rule.spatial_exponent / rule.exponent
-        powered = total if ratio == 1.0 else total ** np.float32(ratio)
-        gathered_map = gathered(powered, rule.pixels_per_degree, rule.spatial_exponent)
-        gathered_map *= valid
-        return gathered_map
+        if aperture is None or rule.is_gathered:
+            total = root(total, rule.exponent)
+            while reduction > 1:
+                reduction //= 2
+                total = double(total, halved_shape(shape, reduction))
+            return total * self._valid
+        area = self.area(reduction)
+        total = root(total if area is None else total * area, rule.exponent / rule.spatial_exponent)
+        (gathered,) = aperture.gather(aperture.coarse(total, reduction)[None], reduction)
+        return aperture.full(root(gathered, rule.spatial_exponent)) * self._valid
 
     def _score(self, jnd: Float32Array) -> float:
         judged = max(int(np.count_nonzero(self._valid)), 1)
@@ -167,10 +181,9 @@ class Pool:
 
     def comparison(self) -> Comparison:
         """Finish: maps, probabilities, figures."""
-        steady_map = self._map(self._sums[False])
-        steady = transient = 0.0
-        steady = self._score(steady_map)
-        jnd, score = steady_map, steady
+        jnd = self._map(self._sums[False])
+        score = steady = self._score(jnd)
+        transient = 0.0
         if self._sums[True]:
             transient = self._score(self._map(self._sums[True]))
             jnd = self._map(_added(*self._sums.values()))

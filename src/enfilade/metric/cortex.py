@@ -32,7 +32,9 @@ LEVELS_AT_REFERENCE = 6  # radial levels, base included ...
 REFERENCE_PPD = 28.0  # ... at the paper's pixels per degree (§6)
 FEWEST_LEVELS = 2
 NYQUIST = 0.5  # cycles per pixel
-OVERSAMPLING = 2.0  # no unit: our choice, see `Band.reduction`
+# No unit: our choice. What follows the transform is not linear, and its maps are interpolated; sampled
+# at the limit they would be off by 13 % in a tenth of the pixels.
+OVERSAMPLING = 2.0
 CORNER = math.hypot(NYQUIST, NYQUIST)  # highest frequency of all, cycles per pixel
 
 
@@ -65,6 +67,8 @@ class Band:
         Geometric mean of the two; in the base the power-weighted mean. Cycles per pixel.
     cutoff_cpp : float
         Nothing passes at or above, cycles per pixel; infinite in the finest band.
+    oversampling : float
+        How much finer than the sampling theorem asks the band is sampled at least.
     """
 
     level: int
@@ -72,6 +76,7 @@ class Band:
     high_cpp: float
     centre_cpp: float
     cutoff_cpp: float
+    oversampling: float = OVERSAMPLING
 
     @property
     def is_base(self) -> bool:
@@ -80,14 +85,10 @@ class Band:
 
     @property
     def reduction(self) -> int:
-        """Power of two by which the band is sampled more coarsely than the image.
-
-        At least twice finer than the sampling theorem asks: what follows is not linear, and its
-        maps are interpolated. (At the limit they would be off by 13 % in a tenth of the pixels.)
-        """
+        """Power of two by which the band is sampled more coarsely than the image."""
         if math.isinf(self.cutoff_cpp):
             return 1
-        coarsest = NYQUIST / self.cutoff_cpp / OVERSAMPLING
+        coarsest = NYQUIST / self.cutoff_cpp / self.oversampling
         return int(2 ** math.floor(math.log2(max(coarsest, 1.0))))
 
 
@@ -103,7 +104,7 @@ def _base_sigma(levels: int) -> float:
     return _cutoff(levels - 1) / BASE_SIGMAS
 
 
-def bands(pixels_per_degree: float) -> tuple[Band, ...]:
+def bands(pixels_per_degree: float, oversampling: float = OVERSAMPLING) -> tuple[Band, ...]:
     """Radial bands for a viewing condition, finest first, base last.
 
     The ladder hangs on the pixel, one octave a level; viewers far from the screen (many pixels per
@@ -114,6 +115,8 @@ def bands(pixels_per_degree: float) -> tuple[Band, ...]:
     ----------
     pixels_per_degree : float
         Above 0.
+    oversampling : float
+        1 or more; 1 will do where energies are summed over an area, and nothing else is done.
 
     Returns
     -------
@@ -130,8 +133,8 @@ def bands(pixels_per_degree: float) -> tuple[Band, ...]:
         high = CORNER if level == 1 else _radius(level - 1)
         low = base_edge if level == levels - 1 else _radius(level)
         cutoff = math.inf if level == 1 else _cutoff(level - 1)
-        rings.append(Band(level, low, high, math.sqrt(low * high), cutoff))
-    base = Band(levels, 0.0, base_edge, sigma / math.sqrt(math.pi), _cutoff(levels - 1))
+        rings.append(Band(level, low, high, math.sqrt(low * high), cutoff, oversampling))
+    base = Band(levels, 0.0, base_edge, sigma / math.sqrt(math.pi), _cutoff(levels - 1), oversampling)
     return (*rings, base)
 
 
@@ -179,6 +182,8 @@ class CortexTransform:
         What the filters sum to.
     tilt : callable, optional
         (rho, band, base band) -> what every frequency of a band is multiplied by besides.
+    oversampling : float
+        Of the bands, see `bands`.
     workers : int
         Threads of the FFT.
     """
@@ -191,10 +196,11 @@ class CortexTransform:
         *,
         partition: Partition = Partition.POWER,
         tilt: Callable[[Float32Array, Band, Band], Float32Array] | None = None,
+        oversampling: float = OVERSAMPLING,
         workers: int = 1,
     ) -> None:
         self.height_px, self.width_px = height_px, width_px
-        self.bands = bands(pixels_per_degree)
+        self.bands = bands(pixels_per_degree, oversampling)
         self._workers = workers
         down = np.fft.fftfreq(height_px).astype(np.float32)[:, None]
         across = np.fft.rfftfreq(width_px).astype(np.float32)[None, :]

@@ -1,4 +1,4 @@
-"""The observer that some options describe: which CSF at each band, which exponents, which masking."""
+"""The observer that some options describe: which CSF at each band, which exponents."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import numpy.typing as npt
 
 from enfilade.metric.adaptation import AdaptingLight
 from enfilade.metric.castle import castle_sensitivity
-from enfilade.metric.cortex import Band
+from enfilade.metric.cortex import OVERSAMPLING, Band
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import EYE_DRIFT_DEG_S
-from enfilade.metric.masking import masked_difference_squared
 from enfilade.metric.options import MetricOptions
-from enfilade.metric.pooling import POOLING_EXPONENT, raised
+from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.metric.spatial import REFERENCE_AREA_DEG2, SPATIAL_EXPONENT, patch_gain
-from enfilade.metric.transducer import TRANSDUCER_EXPONENT, transduced_difference
 from enfilade.metric.transient import flicker_sensitivity
 from enfilade.viewing import Viewing
 
@@ -30,7 +28,7 @@ MIDDLE_GREY = 0.18  # of the screen's peak: where the CSF's course within bands 
 
 
 class Observer:
-    """Sensitivity, masking and pooling under some options.
+    """Sensitivity, and the exponents of pooling, under some options.
 
     Parameters
     ----------
@@ -38,8 +36,6 @@ class Observer:
         Screen and distance.
     options : MetricOptions
         Departures from the paper.
-    mask_slope : float
-        Slope of threshold elevation, where that is the masking.
 
     Attributes
     ----------
@@ -49,22 +45,20 @@ class Observer:
         Exponent with which J is gathered over the aperture.
     gain : float
         What spatial pooling asks of the sensitivities (`spatial.patch_gain`), else 1.
+    oversampling : float
+        Of the bands: energies that are gathered need none.
     """
 
-    def __init__(self, viewing: Viewing, options: MetricOptions, mask_slope: float) -> None:
+    def __init__(self, viewing: Viewing, options: MetricOptions) -> None:
         self._viewing = viewing
         self._options = options
-        self._mask_slope = mask_slope
-        # Exponents are of contrast; the transducer has raised it already.
-        power = TRANSDUCER_EXPONENT if options.transducer else 1.0
+        # Exponents are of contrast; the transducer's J is of energy already.
+        power = ENERGY if options.transducer else 1.0
         self.channel_exponent = (ENERGY if options.ripple_free else POOLING_EXPONENT) / power
         self.spatial_exponent = SPATIAL_EXPONENT / power
-        self.gain = patch_gain(self._unmasked, self.spatial_exponent) if options.spatial_pooling else 1.0
-
-    def _unmasked(self, contrast_jnd: Float32Array) -> Float32Array:
-        if self._options.transducer:
-            return transduced_difference(np.zeros_like(contrast_jnd), contrast_jnd)
-        return np.abs(contrast_jnd)
+        self.gain = patch_gain() if options.spatial_pooling else 1.0
+        gathers = options.transducer and options.spatial_pooling
+        self.oversampling = 1.0 if gathers else OVERSAMPLING
 
     @property
     def knows_luminance(self) -> bool:
@@ -115,30 +109,3 @@ class Observer:
         seen = flicker_sensitivity(frequency, self._viewing.fps, knots, REFERENCE_AREA_DEG2)
         sensitivity = np.exp(np.interp(np.log(luminance), np.log(knots), np.log(seen)))
         return np.asarray(0.5 * self.gain * sensitivity / luminance, dtype=np.float32)
-
-    def masker(self, reference: Float32Array, difference: Float32Array) -> Float32Array:
-        """What masks the difference of a channel, from contrasts of either sign.
-
-        The reference with its sign for a transducer; for threshold elevation mutual masking: the
-        smaller contrast of the two images.
-        """
-        if self._options.transducer:
-            return reference
-        masker: Float32Array = np.abs(reference + difference)
-        np.minimum(masker, np.abs(reference), out=masker)
-        return masker
-
-    def power(self, masker_jnd: Float32Array, difference_jnd: Float32Array) -> Float32Array:
-        """J^channel_exponent of one channel, after masking.
-
-        Parameters
-        ----------
-        masker_jnd, difference_jnd : (...) float32
-            From `masker`, and the difference with its sign, in units of the threshold; the
-            difference is overwritten.
-        """
-        if self._options.transducer:
-            jnd = transduced_difference(masker_jnd, difference_jnd)
-            return jnd if self.channel_exponent == 1.0 else jnd ** np.float32(self.channel_exponent)
-        squared = masked_difference_squared(difference_jnd, masker_jnd, self._mask_slope)
-        return squared if self._options.ripple_free else raised(squared)

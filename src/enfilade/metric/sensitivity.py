@@ -18,7 +18,7 @@ __all__ = ["ChannelSensitivity", "SensitivityTable"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
-IndexArray: TypeAlias = npt.NDArray[np.intp]
+IndexArray: TypeAlias = npt.NDArray[np.int32]
 Csf: TypeAlias = Callable[[float, Float64Array, Float64Array], Float64Array]
 
 FASTEST_DEG_S = 2000.0  # faster retinal motion is taken as this: nothing is seen any more
@@ -63,17 +63,17 @@ class SensitivityTable:
         steps *= np.float32(self._steps_per_e)
         steps += np.float32(0.5)
         np.clip(steps, 0, self._size - 1, out=steps)
-        return np.asarray(steps, dtype=np.intp)
+        return np.asarray(steps, dtype=np.int32)
 
     def luminance_offset(self, luminance_cd_m2: Float32Array) -> IndexArray:
         """What to add to `index` for luminances in cd/m2, above 0."""
         if self._luminances == 1:
-            return np.zeros((), dtype=np.intp)
+            return np.zeros((), dtype=np.int32)
         darkest, brightest = LUMINANCE_RANGE_CD_M2
         steps = np.log(luminance_cd_m2 * np.float32(1.0 / darkest))
         steps = steps * np.float32((self._luminances - 1) / math.log(brightest / darkest))
         steps = np.clip(steps + np.float32(0.5), 0, self._luminances - 1)
-        return np.asarray(steps, dtype=np.intp) * self._size
+        return np.asarray(steps, dtype=np.int32) * self._size
 
     def row(self, band: Band) -> Float32Array:
         """Sensitivities of a band by entry; the first is that of a still eye."""
@@ -81,7 +81,7 @@ class SensitivityTable:
 
 
 class ChannelSensitivity:
-    """Sensitivities of one orientation in all bands, at the size of each.
+    """Sensitivities of all channels, band after band, at the size of each.
 
     Speeds are averaged over the area of a coarse sample as magnitudes, after the projection on the
     channel's direction, so that motions to the left and to the right do not cancel.
@@ -93,8 +93,6 @@ class ChannelSensitivity:
     velocities : sequence of (2, H, W) float32
         Retinal velocities, deg/s, one for each eye movement that may happen; the largest
         sensitivity counts. Empty when nothing moves.
-    orientation : int or None
-        Index into ORIENTATIONS_DEG; None for the base band.
     light : AdaptingLight, optional
         What the eye is adapted to; needed where the CSF depends on luminance.
     """
@@ -103,31 +101,42 @@ class ChannelSensitivity:
         self,
         table: SensitivityTable,
         velocities: Sequence[Float32Array],
-        orientation: int | None,
         light: AdaptingLight | None = None,
     ) -> None:
         self._table = table
+        self._velocities = velocities
         self._light = light
-        self._reduction = 1
-        theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
-        self._speeds = [channel_speed(velocity, theta) for velocity in velocities]
-        self._indices = [table.index(speed) for speed in self._speeds]
+        self._reduction = 0
+        self._indices: dict[int | None, list[IndexArray]] = {}
 
-    def _coarsen(self, reduction: int) -> None:
-        if reduction == self._reduction:
-            return
-        while self._reduction < reduction:
-            self._speeds = [halve(speed) for speed in self._speeds]
-            self._reduction *= 2
-        self._indices = [self._table.index(speed) for speed in self._speeds]
+    def _entries(self, orientation: int | None, reduction: int) -> list[IndexArray]:
+        """Places in the table by speed and luminance, kept for the bands of one size."""
+        if reduction != self._reduction:
+            self._indices.clear()
+            self._reduction = reduction
+        if orientation not in self._indices:
+            theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
+            offset = self._offset(reduction)
+            found = []
+            for velocity in self._velocities:
+                speed = channel_speed(velocity, theta)
+                for _ in range(reduction.bit_length() - 1):
+                    speed = halve(speed)
+                index = self._table.index(speed)
+                index += offset
+                found.append(index)
+            self._indices[orientation] = found
+        return self._indices[orientation]
 
-    def map(self, band: Band) -> Float32Array:
-        """Sensitivity in a band; ask for fine bands first.
+    def map(self, band: Band, orientation: int | None) -> Float32Array:
+        """Sensitivity of a channel; ask for all of one size together.
 
         Parameters
         ----------
         band : Band
-            Not finer than the last one asked for.
+            The channel's band.
+        orientation : int or None
+            Index into ORIENTATIONS_DEG; None for the base band.
 
         Returns
         -------
@@ -135,21 +144,19 @@ class ChannelSensitivity:
             A single number when nothing moves and the light is even, else a map at the band's
             reduced size.
         """
+        if not self._velocities:
+            return self.still(band)
         row = self._table.row(band)
-        offset = self._offset(band)
-        if not self._speeds:
-            return np.asarray(row[offset])
-        self._coarsen(band.reduction)
-        first, *others = (row.take(index + offset) for index in self._indices)
+        first, *others = (row.take(index) for index in self._entries(orientation, band.reduction))
         for other in others:
             np.maximum(first, other, out=first)
         return first
 
     def still(self, band: Band) -> Float32Array:
         """Sensitivity of an eye that rests, shaped as `map`."""
-        return np.asarray(self._table.row(band)[self._offset(band)])
+        return np.asarray(self._table.row(band)[self._offset(band.reduction)])
 
-    def _offset(self, band: Band) -> IndexArray:
+    def _offset(self, reduction: int) -> IndexArray:
         if self._light is None:
-            return np.zeros((), dtype=np.intp)
-        return self._light.offset(self._table.luminance_offset, band.reduction)
+            return np.zeros((), dtype=np.int32)
+        return self._light.offset(self._table.luminance_offset, reduction)
