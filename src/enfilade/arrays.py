@@ -42,6 +42,7 @@ __all__ = [
     "matrix3",
     "opaque",
     "pixel_grid",
+    "release_memory",
     "vector3",
 ]
 
@@ -113,6 +114,12 @@ def opaque(value: float | int, kind: Any = None) -> Any:
     """
     kind = kind or (UInt if isinstance(value, int) else Float)
     return dr.opaque(kind, value)
+
+
+def release_memory() -> None:
+    """Give back the memory that Dr.Jit keeps for arrays of sizes it has seen: at the end of a stage."""
+    dr.sync_thread()
+    dr.flush_malloc_cache()
 
 
 def pixel_grid(height: int, width: int) -> tuple[Any, Any, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from enfilade.arrays import release_memory
 from enfilade.errors import SettingsError
 from enfilade.monitor import Monitor
 from enfilade.pipeline.finish import antialias_shot, trace_reference, write_video
@@ -106,6 +107,7 @@ def _render_paper(workshop: Workshop, survey: Survey) -> None:
     for shot, segments in zip(path.shots(), refined, strict=True):
         _make_frames(workshop, shot, segments)
 
+    release_memory()
     workshop.monitor.stage("antialiasing", len(path))
     for shot in path.shots():
         antialias_shot(workshop, shot)
