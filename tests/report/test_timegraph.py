@@ -60,7 +60,7 @@ def test_visible_pixels_and_bands():
 
 def test_title_and_units():
     figure = time_figure(made_up())
-    assert "0.80 JND: noticed" in figure.get_suptitle()
+    assert "0.80 JND (noticed)" in figure.get_suptitle()
     assert [ax.get_ylabel() for ax in figure.axes[:3]] == ["JND", "% of pixels", "cycles per degree"]
     assert figure.axes[2].get_xlabel() == "frame"
 

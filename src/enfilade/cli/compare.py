@@ -211,6 +211,7 @@ def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.report.tables import comparison_table
+    from enfilade.report.tables import comparison_table, verdict
 
+    click.echo(verdict(found))
     Console().print(comparison_table(found))

@@ -1,6 +1,6 @@
 """Heat maps: visible differences in colour over the grey image, with a legend, as a video or as PNGs.
 
-Where nothing is seen the image is grey. From there the colours go from blue over orange to yellow, growing
+Where nothing is seen the image is grey. From there the colours go from blue over red to yellow, growing
 lighter: readers with any of the common colour deficiencies tell them apart, and so does a grey print.
 """
 
@@ -24,14 +24,15 @@ from enfilade.video import encode_video
 __all__ = ["VIDEO_CODECS", "HeatmapPainter", "overlay", "write_heatmap_images", "write_heatmap_video"]
 
 VIDEO_CODECS = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}  # by the suffix that is asked for
-FAINT_JND, SOLID_JND, TOP_JND = 0.25, 1.0, 8.0  # colour begins, hides most of the grey, ends
+FAINT_JND, SOLID_JND, TOP_JND = 0.25, 1.0, 16.0  # colour begins, hides most of the grey, ends
 COLORS = {  # sRGB of each JND; between them by straight lines over log(1 + JND)
     0.0: (0.10, 0.20, 0.70),
     0.5: (0.16, 0.32, 0.92),
-    1.0: (0.62, 0.16, 0.72),
-    2.0: (0.93, 0.38, 0.24),
-    4.0: (0.98, 0.68, 0.14),
-    8.0: (1.00, 0.98, 0.50),
+    1.0: (0.58, 0.16, 0.78),
+    2.0: (0.86, 0.25, 0.46),
+    4.0: (0.96, 0.47, 0.20),
+    8.0: (0.99, 0.73, 0.16),
+    16.0: (1.00, 0.98, 0.50),
 }
 STEPS = 1024  # of the colours between 0 and TOP_JND
 OPACITY = 0.9  # at most: a little of the image shows through
@@ -185,7 +186,8 @@ def write_heatmap_video(file: Path, pictures: Iterable[U8], *, size: tuple[int, 
     codec = VIDEO_CODECS.get(file.suffix.lower())
     if codec is None:
         raise SettingsError(f"{file}: a heat map is written as {', '.join(VIDEO_CODECS)}, or into a folder")
-    linear = (srgb_decode(p.astype(np.float32) / np.float32(255.0)) for p in pictures)
+    decoded = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))
+    linear = (decoded[picture] for picture in pictures)
     settings = VideoSettings(codec=codec)
     encode_video(file, linear, fps=fps, width=size[0], height=size[1], settings=settings, exposure_ev=0.0)
 

@@ -99,6 +99,18 @@ def _forecast_table(forecast: Mapping[str, Any]) -> Table:
     return table
 
 
+def verdict(found: Mapping[str, Any]) -> str:
+    """The result of a comparison in one line: score, meaning, and how much of the image it concerns.
+
+    Parameters
+    ----------
+    found
+        ``SequenceDifference.to_dict()``.
+    """
+    share = percent(found["percent_visible"]["mean"])
+    return f"{found['score_jnd']:.2f} JND ({found['meaning']}); {share} % of the pixels above 1 JND"
+
+
 def comparison_table(found: Mapping[str, Any]) -> Table:
     """What the metric says of two sequences, and of the frames where it sees most.
 
@@ -121,7 +133,6 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
     )
     density = f"{found['pixels_per_degree']:.1f} pixels per degree"
     table.title = (
-        f"{found['score_jnd']:.2f} JND: {found['meaning']}\n"
         f"{len(rows)} frames, {width}x{height}, {density}, {found['fps']:g} fps, mode {found['mode']}"
     )
     return table

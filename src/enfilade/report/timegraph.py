@@ -60,10 +60,14 @@ def time_figure(found: Mapping[str, Any]) -> Figure:
     rows = found["per_frame"]
     width, height = found["size"]
     title = (
-        f"{found['score_jnd']:.2f} JND: {found['meaning']}\n{len(rows)} frames, {width}x{height}, "
+        f"{found['score_jnd']:.2f} JND ({found['meaning']})\n{len(rows)} frames, {width}x{height}, "
         f"{found['fps']:g} fps, {found['pixels_per_degree']:.1f} pixels per degree, mode {found['mode']}"
     )
-    headings = ["score of each frame", "pixels above 1 JND", "score of each band of spatial frequencies"]
+    headings = [
+        "score of each frame",
+        "pixels above 1 JND",
+        "each band of spatial frequencies, pixel by pixel",
+    ]
     figure, axes = new_figure(title, headings)
     frames = list(range(len(rows)))
     _draw_score(axes[0], frames, rows, found["score_jnd"])
