@@ -21,8 +21,12 @@ __all__ = ["FlowEstimator"]
 
 WIDEST_PX = 1024  # larger images are halved before the search: 0.1 s a flow at most
 LEAST_PX = 32  # the search's patches are 8 pixels, over three levels; smaller images are enlarged
-CUT_RESIDUAL = 12.0  # of 255 encoded levels: what is left after compensation where a shot ends ...
+SMOOTH_PX = 1.0  # sigma of a blur before the search: pixel noise is no motion
+BLOCK_PX = 8  # images are compared by blocks of this, in which noise is averaged out
+CUT_RESIDUAL = 10.0  # of 255 encoded levels: what is left after compensation where a shot ends ...
 CUT_SHARE = 0.6  # ... and its part of what there was before
+TRUSTED, REFUSED = 0.7, 0.9  # part of the difference that is left: flow that explains less is taken for noise
+WINDOW = 1 / 16  # of the width: sigma of the window in which that is looked at
 
 
 class FlowEstimator:
@@ -36,8 +40,9 @@ class FlowEstimator:
     Notes
     -----
     Within 0.05 px (median) of the truth on textured surfaces up to 1024 pixels wide, twice that on
-    larger ones; where there is no texture, flow is filled in smoothly from around. Reflections and
-    noise are followed as if they were surfaces. Between two shots there is no flow. One thread: OpenCV
+    larger ones; where there is no texture, flow is filled in smoothly from around. Where a flow leaves
+    the images nearly as different as they were, they differ by noise, and nothing moves. Reflections and
+    shadows are followed as if they were surfaces. Between two shots there is no flow. One thread: OpenCV
     cuts the image into as many stripes as there are threads, and each stripe count has its own result.
     """
 
@@ -70,9 +75,11 @@ class FlowEstimator:
             raise InputError(f"flow: the image has shape {linear.shape}, not {self._size[::-1]}")
         encoded = srgb_encode(np.clip(linear, 0.0, 1.0))
         levels: U8 = np.rint(encoded * np.float32(255.0)).astype(np.uint8)
-        if self._factor == 1.0 and self._reduced_size == self._size:
-            return levels
-        return np.asarray(cv2.resize(levels, self._reduced_size, interpolation=cv2.INTER_AREA), np.uint8)
+        if self._reduced_size != self._size:
+            levels = np.asarray(
+                cv2.resize(levels, self._reduced_size, interpolation=cv2.INTER_AREA), np.uint8
+            )
+        return np.asarray(cv2.GaussianBlur(levels, (0, 0), SMOOTH_PX), np.uint8)
 
     def flow(self, image: U8, previous: U8 | None, following: U8 | None) -> Flow:
         """Flow of one frame to its neighbours.
@@ -99,21 +106,42 @@ class FlowEstimator:
         if np.array_equal(image, other):
             return still, True
         found = np.asarray(self._search.calc(image, other, None), np.float32)  # type: ignore[call-overload]
-        if self._is_cut(image, other, found):
+        place = self._grid + found
+        compensated = np.asarray(
+            cv2.remap(other, place[..., 0], place[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+            np.uint8,
+        )
+        if _is_cut(image, other, compensated):
             return still, False
+        found *= _trust(image, other, compensated)[..., None]
         if found.shape[:2] != (height, width):
             scale = np.array([width / found.shape[1], height / found.shape[0]], np.float32)
             found = np.asarray(cv2.resize(found, self._size, interpolation=cv2.INTER_LINEAR)) * scale
         return found, True
 
-    def _is_cut(self, image: U8, other: U8, flow: F32) -> bool:
-        place = self._grid + flow
-        compensated = cv2.remap(
-            other, place[..., 0], place[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
-        before = float(cv2.absdiff(image, other).mean())
-        after = float(cv2.absdiff(image, compensated).mean())
-        return after > CUT_RESIDUAL and after > CUT_SHARE * before
+
+def _is_cut(image: U8, other: U8, compensated: U8) -> bool:
+    now, before, after = (_blocks(of.astype(np.float32)) for of in (image, other, compensated))
+    left = float(np.abs(now - after).mean())
+    return left > CUT_RESIDUAL and left > CUT_SHARE * float(np.abs(now - before).mean())
+
+
+def _trust(image: U8, other: U8, compensated: U8) -> F32:
+    """From 0, where compensation changes nothing, to 1, where it explains the difference; (H, W)."""
+    height, width = image.shape
+    sigma = max(WINDOW * width / BLOCK_PX, 1.0)
+    before, after = (
+        cv2.GaussianBlur(_blocks(cv2.absdiff(image, of).astype(np.float32)), (0, 0), sigma)
+        for of in (other, compensated)
+    )
+    share = after / np.maximum(before, np.float32(1e-3))
+    trust = np.clip((REFUSED - share) / (REFUSED - TRUSTED), 0.0, 1.0)
+    return np.asarray(cv2.resize(trust, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _blocks(image: F32) -> F32:
+    height, width = (max(n // BLOCK_PX, 1) for n in image.shape)
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _factor(width: int, height: int) -> float:

@@ -22,7 +22,7 @@ __all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
 Layers = Mapping[str, npt.NDArray[Any]]
 
 CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, across which no flow means a cut
-STRIDE_PX = 4  # of the pixels that are looked at for it
+BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +174,13 @@ def _kind_of(sequence: Sequence) -> _Kind | None:
     return next((kind for kind in KINDS if kind.read(layers) is not None), None)
 
 
+def _blocks(image: F32) -> F32:
+    rows, columns = (min(n, BLOCK_PX) for n in image.shape)
+    height, width = (n - n % block for n, block in zip(image.shape, (rows, columns), strict=True))
+    blocks = image[:height, :width].reshape(height // rows, rows, width // columns, columns)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
+
+
 class _FromLayers:
     kind = "layers"
 
@@ -187,7 +194,7 @@ class _FromLayers:
         before: F32 | None = None
         for pair in pairs:
             flow = self._read(pair.index)
-            now = srgb_encode(np.clip(pair.reference_relative[::STRIDE_PX, ::STRIDE_PX], 0.0, 1.0))
+            now = _blocks(srgb_encode(pair.reference_relative))
             is_cut = (
                 not flow.has_backward
                 and before is not None
