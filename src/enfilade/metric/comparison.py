@@ -126,10 +126,11 @@ class Pool:
 
     def area(self, reduction: int) -> Float32Array | None:
         """How much of each coarse sample is judged, 0 to 1; None where all is."""
-        if self._is_whole:
-            return None
+        return None if self._is_whole else self._area(reduction)
+
+    def _area(self, reduction: int) -> Float32Array:
         if reduction not in self._areas:
-            self._areas[reduction] = halve(self._areas[reduction // 2])
+            self._areas[reduction] = halve(self._area(reduction // 2))
         return self._areas[reduction]
 
     def add(self, level: int, power: Float32Array, reduction: int, *, is_transient: bool = False) -> None:

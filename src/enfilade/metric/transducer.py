@@ -1,10 +1,10 @@
-"""Visual masking by a transducer: faint masks help, strong ones hide (Legge and Foley 1980).
+"""Visual masking by a transducer: faint masks help a little, strong ones hide (Legge and Foley 1980).
 
 A channel's response to the contrast energy E that the eye gathers is R = (1 + z) E / (z + N^0.8), in
 which N is the energy that inhibits it: its own and that of the two neighbouring orientations. Energy
 is in units of the threshold's, so that R = 1 at threshold. R grows with the square of faint contrasts
-and the power 0.4 of strong ones; so a faint mask makes a target easier to see, and with strong masks
-the threshold rises with the power 0.6.
+and the power 0.4 of strong ones; so a faint mask makes a target a little easier to see (by less than
+people say: 1 to 2 dB instead of 5), and with strong masks the threshold rises with the power 0.6.
 
 Two images differ in a channel by how much more energy one has, and by how much of its pattern has
 changed besides (moved, or been replaced at equal energy):
