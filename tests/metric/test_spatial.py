@@ -23,10 +23,10 @@ def test_a_point_becomes_the_gaussian(reduction):
     energy[48 // reduction, 64 // reduction] = 1.0
     found = gathered(energy, reduction)
     assert found.sum() == pytest.approx(reduction**2, rel=0.01)
-    # Square averages lose where in a square the point was: 1.5 pixels at most.
+    # Square averages lose where in a square the point was: 3.5 pixels at most.
     middle = (48.0, 64.0)
     for axis, centre in zip((y, x), middle, strict=True):
-        assert (found * axis).sum() / found.sum() == pytest.approx(centre, abs=1.6)
+        assert (found * axis).sum() / found.sum() == pytest.approx(centre, abs=3.6)
     variance = (found * (x - (found * x).sum() / found.sum()) ** 2).sum() / found.sum()
     assert np.sqrt(variance) == pytest.approx(APERTURE_SIGMA_DEG * PPD, rel=0.12)
 

@@ -20,7 +20,7 @@ from enfilade.metric.noise import NOISE_SIGMAS
 from enfilade.metric.observer import Observer
 from enfilade.metric.options import MetricOptions
 from enfilade.metric.pair import ImagePair, Retina
-from enfilade.metric.pyramid import halved_shape
+from enfilade.metric.pyramid import double, halved_shape
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.metric.spatial import Aperture
 from enfilade.viewing import Viewing
@@ -209,12 +209,12 @@ class Aqm:
     def _channels(self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity) -> Iterator[Channel]:
         """Reference, test and difference of each channel of a band, in units of its threshold."""
         shape = halved_shape(self._shape, band.reduction)
-        contrast = pair.contrast.at(band.reduction)
+        contrast = pair.contrast.at(sensitivity.reduction(band))
         ring = self.cortex.ring(pair.spectra[:2], band)
         for orientation in self.cortex.orientations(band):
             channel = self.cortex.fan(ring, band, orientation)
             reference, difference = self._border.crop(channel, band.reduction, shape)
-            weight = sensitivity.map(band, orientation) * contrast
+            weight = _at_size(sensitivity.map(band, orientation) * contrast, band, shape)
             test = None if self.options.transducer else (reference + difference) * weight
             uniform = pair.uniform_part(difference, band.reduction) if band.is_base else 0.0
             difference -= np.float32(uniform)
@@ -225,7 +225,8 @@ class Aqm:
             reference *= weight
             difference *= weight
             if uniform:
-                still = sensitivity.still(band) * contrast * np.float32(abs(uniform))
+                still = _at_size(sensitivity.still(band) * contrast, band, shape)
+                still = still * np.float32(abs(uniform))
                 difference += np.copysign(still, difference)
             yield reference, test, difference
 
@@ -236,3 +237,9 @@ class Aqm:
         (change,) = self._border.crop(self.cortex.fan(ring, band, None), band.reduction, shape)
         change *= self._observer.flicker_weight(band, pair.light)
         yield np.zeros_like(change), None, change
+
+
+def _at_size(weight: Float32Array, band: Band, shape: tuple[int, int]) -> Float32Array:
+    """Weights of a band at its own size; in the finest bands they come at half of it."""
+    is_halved = weight.ndim and ChannelSensitivity.reduction(band) > band.reduction
+    return double(weight, shape) if is_halved else weight

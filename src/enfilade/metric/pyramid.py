@@ -100,11 +100,15 @@ def double(coarse: Float32Array, shape: tuple[int, int]) -> Float32Array:
     shape float32
         Never outside the range of `coarse`.
     """
-    height, width = shape
-    rows = np.empty((height, coarse.shape[1]), dtype=np.float32)
-    rows[::2] = coarse[: (height + 1) // 2]
-    rows[1::2] = np.float32(0.5) * (coarse[: height // 2] + coarse[1 : height // 2 + 1])
+    rows = np.empty((shape[0], coarse.shape[1]), dtype=np.float32)
+    _double(coarse, rows)
     fine = np.empty(shape, dtype=np.float32)
-    fine[:, ::2] = rows[:, : (width + 1) // 2]
-    fine[:, 1::2] = np.float32(0.5) * (rows[:, : width // 2] + rows[:, 1 : width // 2 + 1])
+    _double(rows.T, fine.T)
     return fine
+
+
+def _double(coarse: Float32Array, fine: Float32Array) -> None:
+    between = fine[1::2]
+    fine[::2] = coarse[: (len(fine) + 1) // 2]
+    np.add(coarse[: len(between)], coarse[1 : len(between) + 1], out=between)
+    between *= np.float32(0.5)

@@ -26,6 +26,7 @@ SPEEDS = 4096  # 0.23 % between speeds
 SPEEDS_BY_LUMINANCE = 512  # 1.9 % between speeds, where luminance matters too
 LUMINANCES = 128  # 13 % between luminances, of which sensitivity depends on a small power
 LUMINANCE_RANGE_CD_M2 = (1e-3, 1e4)
+FINEST_REDUCTION = 2  # velocity and light are taken from every second pixel, for speed
 LEAST_SENSITIVITY = 1e-3  # contrast of 1000: never seen, and float32 powers stay normal
 
 
@@ -141,20 +142,25 @@ class ChannelSensitivity:
         Returns
         -------
         () or (h, w) float32
-            A single number when nothing moves and the light is even, else a map at the band's
-            reduced size.
+            A single number when nothing moves and the light is even, else a map at the size of
+            `reduction`.
         """
         if not self._velocities:
             return self.still(band)
         row = self._table.row(band)
-        first, *others = (row.take(index) for index in self._entries(orientation, band.reduction))
+        first, *others = (row.take(index) for index in self._entries(orientation, self.reduction(band)))
         for other in others:
             np.maximum(first, other, out=first)
         return first
 
     def still(self, band: Band) -> Float32Array:
         """Sensitivity of an eye that rests, shaped as `map`."""
-        return np.asarray(self._table.row(band)[self._offset(band.reduction)])
+        return np.asarray(self._table.row(band)[self._offset(self.reduction(band))])
+
+    @staticmethod
+    def reduction(band: Band) -> int:
+        """How coarse the maps of a band are: at every second pixel in the finest bands too."""
+        return max(band.reduction, FINEST_REDUCTION)
 
     def _offset(self, reduction: int) -> IndexArray:
         if self._light is None:

@@ -18,7 +18,7 @@ Float32Array: TypeAlias = npt.NDArray[np.float32]
 # have 0.6); ModelFest does not tell these apart, and a small aperture leaves a sharper map.
 APERTURE_SIGMA_DEG = 0.3
 SPATIAL_EXPONENT = 2.0  # no unit: contrast energy
-COARSEST_SIGMA = 2.0  # samples: the aperture is applied at reduced size, but not more reduced than this
+COARSEST_SIGMA = 1.0  # samples: the aperture is applied at reduced size, but not more reduced than this
 REACH_SIGMAS = 3.5
 
 REFERENCE_SIGMA_DEG = 0.5  # of the Gabor patch at which pooling leaves the CSF as it is
