@@ -105,7 +105,7 @@ def _draw_bands(
     parts = [np.array([row[key] for row in rows]).T for key in ("steady_bands_jnd", "transient_bands_jnd")]
     power = np.maximum(*parts)
     rungs = np.arange(len(bands) + 1) - 0.5
-    top = max(1.0, float(power.max()))
+    top = float(power.max()) or 1.0  # where nothing differs, any
     mesh = ax.pcolormesh(frame_edges(frames), rungs, power, cmap="cividis", vmin=0.0, vmax=top)
     ax.set_yticks(range(len(bands)), [_name(band) for band in bands])
     ax.invert_yaxis()
