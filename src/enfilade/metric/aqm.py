@@ -21,7 +21,7 @@ from enfilade.metric.observer import Observer
 from enfilade.metric.options import MetricOptions
 from enfilade.metric.pair import ImagePair, Retina
 from enfilade.metric.pyramid import double, halved_shape
-from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
+from enfilade.metric.sensitivity import FINEST_REDUCTION, ChannelSensitivity, SensitivityTable
 from enfilade.metric.spatial import Aperture
 from enfilade.viewing import Viewing
 
@@ -203,7 +203,15 @@ class Aqm:
     ) -> list[Float32Array]:
         if velocity is None:
             return []
-        planes = np.where(is_judged, np.moveaxis(velocity, -1, 0), np.float32(0.0))
+        # From every second pixel, as `ChannelSensitivity` asks.
+        rows, columns = (
+            np.minimum(FINEST_REDUCTION * np.arange(samples), pixels - 1)
+            for samples, pixels in zip(
+                halved_shape(is_judged.shape, FINEST_REDUCTION), is_judged.shape, strict=True
+            )
+        )
+        here = np.ix_(rows, columns)
+        planes = np.where(is_judged[here], np.moveaxis(velocity[here], -1, 0), np.float32(0.0))
         return [retinal_velocity(planes, eye) for eye in pursuit.hypotheses]
 
     def _channels(self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity) -> Iterator[Channel]:
@@ -211,10 +219,12 @@ class Aqm:
         shape = halved_shape(self._shape, band.reduction)
         contrast = pair.contrast.at(sensitivity.reduction(band))
         ring = self.cortex.ring(pair.spectra[:2], band)
+        weight: Float32Array | None = None
         for orientation in self.cortex.orientations(band):
             channel = self.cortex.fan(ring, band, orientation)
             reference, difference = self._border.crop(channel, band.reduction, shape)
-            weight = _at_size(sensitivity.map(band, orientation) * contrast, band, shape)
+            if weight is None or not sensitivity.is_still:
+                weight = _at_size(sensitivity.map(band, orientation) * contrast, band, shape)
             test = None if self.options.transducer else (reference + difference) * weight
             uniform = pair.uniform_part(difference, band.reduction) if band.is_base else 0.0
             difference -= np.float32(uniform)

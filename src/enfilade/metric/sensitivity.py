@@ -14,7 +14,7 @@ from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
 from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed
 from enfilade.metric.pyramid import halve
 
-__all__ = ["ChannelSensitivity", "SensitivityTable"]
+__all__ = ["FINEST_REDUCTION", "ChannelSensitivity", "SensitivityTable"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
@@ -91,9 +91,9 @@ class ChannelSensitivity:
     ----------
     table : SensitivityTable
         The CSF.
-    velocities : sequence of (2, H, W) float32
-        Retinal velocities, deg/s, one for each eye movement that may happen; the largest
-        sensitivity counts. Empty when nothing moves.
+    velocities : sequence of (2, h, w) float32
+        Retinal velocities at every second pixel, deg/s, one for each eye movement that may happen;
+        the largest sensitivity counts. Empty when nothing moves.
     light : AdaptingLight, optional
         What the eye is adapted to; needed where the CSF depends on luminance.
     """
@@ -121,7 +121,7 @@ class ChannelSensitivity:
             found = []
             for velocity in self._velocities:
                 speed = channel_speed(velocity, theta)
-                for _ in range(reduction.bit_length() - 1):
+                for _ in range((reduction // FINEST_REDUCTION).bit_length() - 1):
                     speed = halve(speed)
                 index = self._table.index(speed)
                 index += offset
@@ -145,13 +145,18 @@ class ChannelSensitivity:
             A single number when nothing moves and the light is even, else a map at the size of
             `reduction`.
         """
-        if not self._velocities:
+        if self.is_still:
             return self.still(band)
         row = self._table.row(band)
         first, *others = (row.take(index) for index in self._entries(orientation, self.reduction(band)))
         for other in others:
             np.maximum(first, other, out=first)
         return first
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing moves, so that all orientations are alike."""
+        return not self._velocities
 
     def still(self, band: Band) -> Float32Array:
         """Sensitivity of an eye that rests, shaped as `map`."""
