@@ -245,7 +245,8 @@ class Aqm:
         shape = halved_shape(self._shape, band.reduction)
         ring = self.cortex.ring(pair.spectra[2:], band)
         (change,) = self._border.crop(self.cortex.fan(ring, band, None), band.reduction, shape)
-        change *= self._observer.flicker_weight(band, pair.light)
+        light = pair.light.at(ChannelSensitivity.reduction(band))
+        change *= _at_size(self._observer.flicker_weight(band, light), band, shape)
         yield np.zeros_like(change), None, change
 
 

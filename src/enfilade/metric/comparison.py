@@ -13,6 +13,7 @@ from enfilade.metric.pooling import (
     POOLING_EXPONENT,
     detection_probability,
     percent_visible,
+    raised,
     root,
 )
 from enfilade.metric.pyramid import double, halve, halved_shape
@@ -173,7 +174,7 @@ class Pool:
 
     def _score(self, jnd: Float32Array) -> float:
         judged = max(int(np.count_nonzero(self._valid)), 1)
-        total = float((jnd ** np.float32(POOLING_EXPONENT)).sum(dtype=np.float64))
+        total = float(raised(np.square(jnd)).sum(dtype=np.float64))
         return float((total / judged) ** (1.0 / POOLING_EXPONENT))
 
     def _band_jnd(self, *kinds: bool) -> tuple[float, ...]:

@@ -7,7 +7,6 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.metric.adaptation import AdaptingLight
 from enfilade.metric.castle import castle_sensitivity
 from enfilade.metric.cortex import OVERSAMPLING, Band
 from enfilade.metric.csf import spatiovelocity_sensitivity
@@ -23,6 +22,7 @@ __all__ = ["Observer"]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
+LIGHT_KNOTS = np.geomspace(1e-3, 1e4, 64)  # cd/m2, between which sensitivity is a power of light
 ENERGY = 2.0  # no unit: exponent with which channels sum without ripple
 MIDDLE_GREY = 0.18  # of the screen's peak: where the CSF's course within bands is taken
 
@@ -57,6 +57,7 @@ class Observer:
         self.channel_exponent = (ENERGY if options.ripple_free else POOLING_EXPONENT) / power
         self.spatial_exponent = SPATIAL_EXPONENT / power
         self.gain = patch_gain() if options.spatial_pooling else 1.0
+        self._flicker: dict[int, Float64Array] = {}
         gathers = options.transducer and options.spatial_pooling
         self.oversampling = 1.0 if gathers else OVERSAMPLING
 
@@ -101,11 +102,12 @@ class Observer:
             )
         return np.asarray(here / there, dtype=np.float32)
 
-    def flicker_weight(self, band: Band, light: AdaptingLight) -> Float32Array:
-        """From the change of the error, cd/m2, to units of its threshold, at the band's size."""
-        luminance = light.at(band.reduction)
-        knots = np.geomspace(1e-3, 1e4, 64)
-        frequency = band.centre_cpp * self._viewing.pixels_per_degree
-        seen = flicker_sensitivity(frequency, self._viewing.fps, knots, REFERENCE_AREA_DEG2)
-        sensitivity = np.exp(np.interp(np.log(luminance), np.log(knots), np.log(seen)))
-        return np.asarray(0.5 * self.gain * sensitivity / luminance, dtype=np.float32)
+    def flicker_weight(self, band: Band, luminance_cd_m2: Float32Array) -> Float32Array:
+        """From the change of the error, cd/m2, to units of its threshold, at some light."""
+        if band.level not in self._flicker:
+            frequency = band.centre_cpp * self._viewing.pixels_per_degree
+            seen = flicker_sensitivity(frequency, self._viewing.fps, LIGHT_KNOTS, REFERENCE_AREA_DEG2)
+            self._flicker[band.level] = 0.5 * self.gain * seen / LIGHT_KNOTS
+        log_weight = np.log(self._flicker[band.level])
+        weight = np.exp(np.interp(np.log(luminance_cd_m2), np.log(LIGHT_KNOTS), log_weight))
+        return np.asarray(weight, dtype=np.float32)

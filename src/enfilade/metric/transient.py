@@ -101,9 +101,11 @@ class ErrorChange:
         error_before, judged_before = last
         if backward_flow_px is not None:
             flow = np.where(is_judged[..., None], backward_flow_px, np.float32(0.0))
-            share, is_inside = moved(judged_before.astype(np.float32), flow)
-            error_before, _ = moved(error_before, flow)
-            judged_before = is_inside & (share > WHOLE)
+            before = judged_before
+            error_before, judged_before = moved(error_before, flow)
+            if not before.all():
+                share, _ = moved(before.astype(np.float32), flow)
+                judged_before &= share > WHOLE
         change = np.zeros_like(error)
         np.subtract(error, error_before, out=change, where=is_judged & judged_before)
         return change
