@@ -3,6 +3,10 @@
 The published metric judges each frame alone, so that an error that comes and goes counts as one
 that sticks to the surface. The eye has a channel for what changes: it is fed here with the
 difference between the error of this frame and that of the last, fetched from where the surface was.
+
+What it does not do: the error of the frame itself counts as steady besides, as if the film were
+stopped there, so that an error that comes and goes is never scored below one that stays. The eye is
+taken to follow the surface, and nothing masks the change.
 """
 
 from __future__ import annotations
