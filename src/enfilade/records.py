@@ -315,6 +315,12 @@ class Frame:
         _check(self.color, (*self.source.shape, 3), np.float32, "color")
         _check(self.source, self.color.shape[:2], np.uint8, "source")
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of pixels by source, by its name in lower case."""
+        counts = np.bincount(self.source.ravel(), minlength=len(Source))
+        return {source.name.lower(): int(counts[source]) for source in Source}
+
 
 def _check(array: npt.NDArray[Any], shape: tuple[int, ...], kind: type, name: str) -> None:
     if array.shape != shape or array.dtype != kind:

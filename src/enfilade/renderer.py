@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,8 @@ class Purpose(IntEnum):
     REFERENCE = 0
     KEYFRAME = 1
     FILL = 2
+    LIGHT = 3
+    GATHER = 4
 
 
 class PixelFilter(IntEnum):
@@ -72,6 +74,54 @@ class Surfaces:
     albedo: Any
     item: Any
     surface: Any
+
+
+@dataclass(frozen=True)
+class Lit:
+    """First hits of rays with what shading them takes, as lanes.
+
+    Attributes
+    ----------
+    surfaces : Surfaces
+    position : Array3f
+        Of the hit, in the world.
+    emission : Array3f
+        Radiance towards the ray's origin of what emits: the surface, or the environment where nothing is
+        hit. Where lights were already sampled at the ray's origin, weighted against that.
+    has_lobe : Bool
+        Whether the surface does anything but scatter diffusely.
+    native : Any
+        The backend's own record of the hit.
+    """
+
+    surfaces: Surfaces
+    position: Any
+    emission: Any
+    has_lobe: Any
+    native: Any
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """One bounce off everything but the diffuse lobe, as lanes.
+
+    Attributes
+    ----------
+    rays : Rays
+    throughput : Array3f
+        Of the bounce; may be negative where a lobe is what remains after the diffuse one.
+    direct : Array3f
+        Radiance that the lobe sends back from sampled lights.
+    is_alive : Bool
+    native : Any
+        What the backend must know to weight the light that the rays find.
+    """
+
+    rays: Rays
+    throughput: Any
+    direct: Any
+    is_alive: Any
+    native: Any
 
 
 @dataclass(frozen=True)
@@ -138,4 +188,36 @@ class Renderer(Protocol):
         Shading
             Of shape (N,). Non-finite samples are left out and counted.
         """
+        ...
+
+
+@runtime_checkable
+class LightRenderer(Renderer, Protocol):
+    """A renderer that can also be asked for the light apart from the surfaces it falls on.
+
+    Every BSDF is a sum: albedo times a diffuse lobe, and the rest. Exactly: what ``light`` estimates, times
+    the albedo, plus what ``scatter`` finds, plus the emission, is what ``trace`` converges to.
+    """
+
+    def lit(self, rays: Rays, scattered: Scattered | None = None) -> Lit:
+        """Find the first surface along rays, and the light it emits.
+
+        Parameters
+        ----------
+        rays
+        scattered
+            The bounce that the rays come from; None for camera rays.
+        """
+        ...
+
+    def light(self, lit: Lit, rng: Any) -> Any:
+        """Estimate the radiance that the diffuse lobe would send if the albedo were one; Array3f.
+
+        One path, with lights sampled at its first vertex: irradiance over pi, as the material's own
+        diffuse lobe weights it.
+        """
+        ...
+
+    def scatter(self, lit: Lit, rng: Any) -> Scattered:
+        """Sample one bounce off everything but the diffuse lobe."""
         ...

@@ -185,6 +185,14 @@ class AntialiasSettings(Section):
 
 
 @dataclass(frozen=True)
+class LightSettings(Section):
+    """Keyframes as a cache of light (--method decoupled)."""
+
+    samples: int = option(16, "Camera rays of a pixel in every frame.", least=1, most=4096)
+    keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
+
+
+@dataclass(frozen=True)
 class VideoSettings(Section):
     """Encoding of the video."""
 
@@ -205,6 +213,7 @@ class Settings:
     metric: MetricSettings = field(default_factory=MetricSettings)
     masks: MaskSettings = field(default_factory=MaskSettings)
     antialias: AntialiasSettings = field(default_factory=AntialiasSettings)
+    light: LightSettings = field(default_factory=LightSettings)
     video: VideoSettings = field(default_factory=VideoSettings)
 
     @classmethod

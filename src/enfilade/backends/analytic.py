@@ -29,8 +29,8 @@ from enfilade.backends.analytic_scene import (
     read_scene,
     scene_text,
 )
-from enfilade.backends.estimate import estimate
 from enfilade.camera import Camera
+from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
 

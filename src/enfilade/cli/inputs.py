@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-METHODS = ("reference", "paper")
-JOB_SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "video")
+METHODS = ("reference", "paper", "decoupled")
+JOB_SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video")
 
 
 class Size(click.ParamType[tuple[int, int]]):

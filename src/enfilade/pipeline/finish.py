@@ -42,7 +42,7 @@ def antialias_shot(workshop: Workshop, shot: range) -> None:
             color = _filtered(workshop, frame, window)
             here = window[frame]
             made = Frame(color, here.source)
-            _write(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
+            write_frame_result(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
         workshop.monitor.advance()
 
 
@@ -56,7 +56,7 @@ def trace_reference(workshop: Workshop, frame: int) -> None:
     shading = workshop.trace(frame, everything, Purpose.REFERENCE, pixel_filter)
     source = np.full(everything.shape, Source.KEYFRAME, np.uint8)
     made = Frame(shading.color.reshape(*everything.shape, 3), source)
-    _write(workshop, frame, view.geometry, view.flow, made, shading.dropped)
+    write_frame_result(workshop, frame, view.geometry, view.flow, made, shading.dropped)
 
 
 def write_video(workshop: Workshop) -> str:
@@ -113,7 +113,10 @@ def _filtered(workshop: Workshop, frame: int, window: dict[int, _Raw]) -> F32:
         )
 
 
-def _write(workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made: Frame, dropped: int) -> None:
+def write_frame_result(
+    workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made: Frame, dropped: int
+) -> None:
+    """Write a delivered frame with all its layers, and record it."""
     file = workshop.run.file("frames", workshop.number(frame))
     with workshop.costs.of("files"):
         write_result(
@@ -125,7 +128,13 @@ def _write(workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made:
             position=positions(geometry),
             attributes={"framesPerSecond": float(workshop.job.path.fps)},
         )
-    workshop.finish(result_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
+    workshop.finish(
+        result_unit(workshop, frame),
+        [file],
+        frame=workshop.number(frame),
+        sources=made.counts,
+        dropped=dropped,
+    )
 
 
 def _finished(workshop: Workshop) -> Iterator[F32]:

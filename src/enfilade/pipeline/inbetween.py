@@ -68,11 +68,10 @@ def _write(workshop: Workshop, frame: int, made: Frame, dropped: int) -> None:
     file = workshop.run.file("raw", workshop.number(frame))
     with workshop.costs.of("files"):
         write_frame(file, made)
-    counts = np.bincount(made.source.ravel(), minlength=len(Source))
     workshop.finish(
         raw_unit(workshop, frame),
         [file],
         frame=workshop.number(frame),
-        sources={s.name.lower(): int(counts[s]) for s in Source},
+        sources=made.counts,
         dropped=dropped,
     )

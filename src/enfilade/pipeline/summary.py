@@ -53,11 +53,9 @@ def summarize(workshop: Workshop, survey: Survey, video: str) -> dict[str, Any]:
 def _per_frame(workshop: Workshop, survey: Survey, lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
     sources = {line["frame"]: line["sources"] for line in lines if "sources" in line}
     pixels = workshop.job.path.width * workshop.job.path.height
-    everything = {"keyframe": pixels}  # a reference frame is traced whole
     rows = []
     for number, speed in zip(workshop.job.path.numbers, survey.speed_deg_s, strict=True):
-        counts = sources.get(number, everything)
-        row = {s: 100.0 * counts.get(s, 0) / pixels for s in TRACED.values()}
+        row = {s: 100.0 * sources[number][s] / pixels for s in TRACED.values()}
         rows.append({"frame": number, "velocity_deg_s": speed, **row, "traced": sum(row.values())})
     return rows
 

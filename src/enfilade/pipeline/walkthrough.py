@@ -8,6 +8,7 @@ from typing import Any
 from enfilade.arrays import release_memory
 from enfilade.errors import SettingsError
 from enfilade.monitor import Monitor
+from enfilade.pipeline.decoupled import LightTable, make_frame
 from enfilade.pipeline.finish import antialias_shot, trace_reference, write_video
 from enfilade.pipeline.inbetween import make_copy, make_inbetween, make_keyframe
 from enfilade.pipeline.job import Job, open_renderer
@@ -57,6 +58,8 @@ def render(job: Job, folder: Path, monitor: Monitor) -> dict[str, Any]:
         match job.method:
             case "reference":
                 _render_reference(workshop)
+            case "decoupled":
+                _render_decoupled(workshop, survey)
             case "paper":
                 _render_paper(workshop, survey)
             case _:
@@ -111,6 +114,17 @@ def _render_paper(workshop: Workshop, survey: Survey) -> None:
     workshop.monitor.stage("antialiasing", len(path))
     for shot in path.shots():
         antialias_shot(workshop, shot)
+
+
+def _render_decoupled(workshop: Workshop, survey: Survey) -> None:
+    path = workshop.job.path
+    workshop.monitor.stage("frames", len(path))
+    shots = initial_segments(path, survey, workshop.job.settings)
+    for shot, segments in zip(path.shots(), shots, strict=True):
+        table = LightTable(workshop, segments)
+        for frame in shot:
+            make_frame(workshop, table, frame)
+            workshop.monitor.advance()
 
 
 def _make_frames(workshop: Workshop, shot: range, segments: list[tuple[Segment, Verdict]]) -> None:

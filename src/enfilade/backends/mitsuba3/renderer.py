@@ -1,4 +1,4 @@
-"""Mitsuba 3, embedded (Jakob et al. 2022): the renderer that comes with enfilade.
+"""A Mitsuba scene behind the seam of ``renderer.LightRenderer``.
 
 Its own ``path`` integrator traces our own rays, one list of pixels at a time: the film is never used,
 since changing its size or crop compiles anew and its Gaussian filter adds in no fixed order.
@@ -17,16 +17,17 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt
-from enfilade.backends.estimate import estimate
+from enfilade.backends.mitsuba3.light import Light
+from enfilade.backends.mitsuba3.lobes import diffuse_reflectance, has_lobe
 from enfilade.backends.scenefile import fingerprint
 from enfilade.camera import Camera
 from enfilade.device import active
 from enfilade.errors import SceneError
+from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
+from enfilade.renderer import Lit, PixelFilter, Purpose, Rays, Scattered, SceneFacts, Surfaces
 from enfilade.settings import TraceSettings
 
-DIFFUSE_LOBES = ("DiffuseReflection", "DiffuseTransmission")
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
 
@@ -66,6 +67,7 @@ class MitsubaRenderer:
         self._chunk = settings.chunk
         self._integrator = _integrator(scene, settings.max_depth)
         self._sampler = _lane_sampler()
+        self._light = Light(scene, self._radiance)
         self._items = _items(scene)
         self._file = file
 
@@ -83,25 +85,55 @@ class MitsubaRenderer:
 
         Where a mask is partly transparent, its surface counts when it is at least half opaque.
         """
+        return self._find(rays)[0]
+
+    def lit(self, rays: Rays, scattered: Scattered | None = None) -> Lit:
+        """Find the first surface along rays, and the light it emits.
+
+        Camera rays look through masks as :meth:`surfaces` does; scattered ones meet them as Mitsuba's own
+        paths do.
+        """
+        surfaces, seen = self._find(rays, looks_through=scattered is None)
+        return Lit(
+            surfaces=surfaces,
+            position=Array3f(seen.p),
+            emission=self._light.emission(seen, scattered.native if scattered else None),
+            has_lobe=self._light.has_rest(seen),
+            native=seen,
+        )
+
+    def light(self, lit: Lit, rng: Any) -> Any:
+        """See :meth:`enfilade.renderer.LightRenderer.light`."""
+        return self._light.light(lit, rng)
+
+    def scatter(self, lit: Lit, rng: Any) -> Scattered:
+        """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
+        return self._light.scatter(lit, rng)
+
+    def _find(self, rays: Rays, *, looks_through: bool = True) -> tuple[Surfaces, Any]:
         direction = mi.Vector3f(rays.direction)
         length = dr.norm(direction)
         ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
-        seen, distance = self._visible(ray)
+        if looks_through:
+            seen, distance = self._visible(ray)
+        else:
+            seen = self._scene.ray_intersect(ray)
+            distance = seen.t
 
         is_hit = seen.is_valid()
         material = seen.bsdf(mi.RayDifferential3f(ray))
         flags = material.flags()
-        albedo = material.eval_diffuse_reflectance(seen, is_hit & _has(flags, *DIFFUSE_LOBES))
         normal = seen.sh_frame.n
         normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
-        return Surfaces(
+        surfaces = Surfaces(
             is_hit=is_hit,
             distance=distance / length,
             normal=Array3f(normal),
-            albedo=_reflectance(albedo),
+            albedo=Array3f(diffuse_reflectance(seen, material, is_hit)),
             item=dr.gather(UInt, self._items.number, _registry(seen), is_hit),
             surface=_surface_class(flags, seen.shape.is_emitter(), is_hit),
         )
+        return surfaces, seen
 
     def trace(
         self,
@@ -196,23 +228,13 @@ def _registry(seen: Any) -> Any:
     return dr.select(instance != 0, instance, shape)
 
 
-def _reflectance(albedo: Any) -> Any:
-    channels = (albedo.x, albedo.y, albedo.z)
-    return Array3f(*(dr.select(dr.isfinite(c), dr.clip(c, 0, 1), 0) for c in channels))
-
-
-def _has(flags: Any, *lobes: str) -> Any:
-    """Whether a material has any of these lobes."""
-    return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
-
-
 def _surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
     """``records.SurfaceClass`` of a material, from the flags of its lobes."""
-    bends = _has(flags, "DeltaTransmission", "GlossyTransmission")
-    mirrors = _has(flags, "DeltaReflection")
-    is_glossy = _has(flags, "GlossyReflection")
-    is_broad = is_glossy | _has(flags, *DIFFUSE_LOBES)
-    is_thin_glass = _has(flags, "Null") & mirrors & ~is_broad
+    bends = has_lobe(flags, "DeltaTransmission", "GlossyTransmission")
+    mirrors = has_lobe(flags, "DeltaReflection")
+    is_glossy = has_lobe(flags, "GlossyReflection")
+    is_broad = is_glossy | has_lobe(flags, "DiffuseReflection", "DiffuseTransmission")
+    is_thin_glass = has_lobe(flags, "Null") & mirrors & ~is_broad
 
     surface = UInt(SurfaceClass.DIFFUSE)
     surface = dr.select(is_emitter, UInt(SurfaceClass.EMISSIVE), surface)

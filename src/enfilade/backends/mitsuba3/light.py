@@ -1,0 +1,116 @@
+"""The light apart from the surfaces: what ``renderer.LightRenderer`` asks, answered by Mitsuba."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from enfilade.arrays import Array3f, Bool
+from enfilade.backends.mitsuba3.lobes import LEAST_ALBEDO, Lobes
+from enfilade.renderer import Lit, Rays, Scattered
+
+Radiance = Callable[[Rays, Any], Any]
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """Where scattered rays come from, and how likely their direction was."""
+
+    seen: Any
+    pdf: Any
+    is_delta: Any
+
+
+class Light:
+    """Emission, light samples and bounces of a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+    radiance
+        The path tracer: radiance along rays, given a random number generator for each.
+    """
+
+    def __init__(self, scene: Any, radiance: Radiance) -> None:
+        self._scene = scene
+        self._radiance = radiance
+        self._lobes = Lobes(scene)
+
+    def emission(self, seen: Any, bounce: Bounce | None) -> Any:
+        """Radiance that a hit, or the environment, sends back along the ray."""
+        emitted = seen.emitter(self._scene).eval(seen)
+        if bounce is None:
+            return Array3f(emitted)
+        direction = mi.DirectionSample3f(self._scene, seen, bounce.seen)
+        sampled = self._scene.pdf_emitter_direction(bounce.seen, direction, ~bounce.is_delta)
+        return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _balance(bounce.pdf, sampled)))
+
+    def has_rest(self, seen: Any) -> Any:
+        """Whether a hit's material is more than a diffuse lobe."""
+        material = seen.bsdf()
+        flags = material.flags()
+        beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
+        return seen.is_valid() & (((flags & beyond) != 0) | self._lobes.is_undivided(seen, material))
+
+    def light(self, lit: Lit, rng: Any) -> Any:
+        """See :meth:`enfilade.renderer.LightRenderer.light`."""
+        seen = lit.native
+        active = seen.is_valid() & (dr.max(lit.surfaces.albedo) > LEAST_ALBEDO)
+        material = seen.bsdf()
+
+        # Lights, sampled.
+        received = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active)
+
+        # One direction of the lobe: what the path tracer finds there, its first emitter weighted.
+        wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
+        active &= pdf > 0.0
+        ray = seen.spawn_ray(seen.to_world(wo))
+        found = self._radiance(Rays(Array3f(ray.o), Array3f(ray.d)), rng)
+        following = self._scene.ray_intersect(ray, active)
+        whole = following.emitter(self._scene).eval(following, active)
+        weighted = self.emission(following, Bounce(seen, pdf, Bool(False)))
+        received += dr.select(active, weight * (found - whole + weighted), 0.0)
+
+        albedo = lit.surfaces.albedo
+        received = Array3f(received)
+        return Array3f(
+            *(
+                dr.select(a > LEAST_ALBEDO, r / dr.maximum(a, LEAST_ALBEDO), 0.0)
+                for r, a in zip(received, albedo, strict=True)
+            )
+        )
+
+    def scatter(self, lit: Lit, rng: Any) -> Scattered:
+        """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
+        seen = lit.native
+        material = seen.bsdf()
+        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, lit.has_lobe)
+        wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng)
+        ray = seen.spawn_ray(seen.to_world(wo))
+        return Scattered(
+            rays=Rays(Array3f(ray.o), Array3f(ray.d)),
+            throughput=Array3f(weight),
+            direct=Array3f(direct),
+            is_alive=lit.has_lobe & (pdf > 0.0),
+            native=Bounce(seen, pdf, is_delta),
+        )
+
+    def _sampled_lights(self, seen: Any, material: Any, evaluate: Any, rng: Any, active: Any) -> Any:
+        """Radiance that a lobe sends from one sampled point on the lights, weighted."""
+        point = mi.Point2f(rng.next_float32(), rng.next_float32())
+        light, radiance = self._scene.sample_emitter_direction(seen, point, True, active)
+        active = active & (light.pdf != 0.0)
+        value, pdf = evaluate(seen, material, seen.to_local(light.d), active)
+        share = dr.select(light.delta, 1.0, _balance(light.pdf, pdf))
+        return dr.select(active, value * radiance * share, 0.0)
+
+
+def _balance(this: Any, other: Any) -> Any:
+    """Veach's power heuristic; 0 where neither strategy would have found it."""
+    this, other = this * this, other * other
+    share = this / (this + other)
+    return dr.select(dr.isfinite(share), share, 0.0)

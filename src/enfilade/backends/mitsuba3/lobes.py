@@ -1,0 +1,115 @@
+"""Mitsuba's BSDFs as a diffuse lobe times an albedo, and the rest.
+
+Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when asked to. Some do not
+(``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
+diffuse lobe is Lambert's with their own albedo, and the rest is what the whole BSDF has beyond it, which may
+be negative.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from enfilade.arrays import Bool, UInt
+
+UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
+LEAST_ALBEDO = 1e-4  # below it the diffuse lobe counts as none
+
+
+class Lobes:
+    """The materials of a scene, divided.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+    """
+
+    def __init__(self, scene: Any) -> None:
+        flags = mi.BSDFFlags
+        self._all = mi.BSDFContext()
+        self._diffuse, self._rest = mi.BSDFContext(), mi.BSDFContext()
+        self._diffuse.type_mask = int(flags.Diffuse)
+        self._rest.type_mask = int(flags.All) & ~int(flags.Diffuse)
+        materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
+        numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
+        registry = [int(number[0]) for number in numbers]
+        is_undivided = np.zeros(max(registry, default=0) + 1, bool)
+        is_undivided[registry] = [_has_undivided(material) for material in materials]
+        self._is_undivided = Bool(is_undivided)
+
+    def is_undivided(self, seen: Any, material: Any) -> Any:
+        """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
+        number: Any = dr.reinterpret_array(UInt, material)
+        return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
+
+    def eval_diffuse(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """Diffuse lobe times cosine, and its density, for a direction in the local frame."""
+        undivided = self.is_undivided(seen, material)
+        own, own_pdf = material.eval_pdf(self._diffuse, seen, wo, active & ~undivided)
+        lambert, lambert_pdf = _lambert(seen, material, wo, active & undivided)
+        return dr.select(undivided, lambert, own), dr.select(undivided, lambert_pdf, own_pdf)
+
+    def sample_diffuse(self, seen: Any, material: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
+        """Direction, density and weight of a sample of the diffuse lobe."""
+        undivided = self.is_undivided(seen, material)
+        first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        own, weight = material.sample(self._diffuse, seen, first, second, active & ~undivided)
+        up = mi.warp.square_to_cosine_hemisphere(second)
+        up = mi.Vector3f(up.x, up.y, dr.copysign(up.z, seen.wi.z))
+        albedo = diffuse_reflectance(seen, material, active & undivided)
+        wo = dr.select(undivided, up, own.wo)
+        pdf = dr.select(undivided, dr.abs(up.z) / dr.pi, own.pdf)
+        return wo, pdf, dr.select(undivided, albedo, weight)
+
+    def eval_rest(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """Everything but the diffuse lobe, times cosine, and the density of :meth:`sample_rest`."""
+        undivided = self.is_undivided(seen, material)
+        own, own_pdf = material.eval_pdf(self._rest, seen, wo, active & ~undivided)
+        whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active & undivided)
+        lambert, _ = _lambert(seen, material, wo, active & undivided)
+        return dr.select(undivided, whole - lambert, own), dr.select(undivided, whole_pdf, own_pdf)
+
+    def sample_rest(self, seen: Any, material: Any, rng: Any) -> tuple[Any, Any, Any, Any]:
+        """Direction, density, weight, and whether the direction is the only one (a delta lobe)."""
+        undivided = self.is_undivided(seen, material)
+        first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        own, weight = material.sample(self._rest, seen, first, second, ~undivided)
+        whole, whole_weight = material.sample(self._all, seen, first, second, undivided)
+        kind = dr.select(undivided, whole.sampled_type, own.sampled_type)
+        is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) | mi.has_flag(kind, mi.BSDFFlags.Null)
+        lambert, _ = _lambert(seen, material, whole.wo, undivided)
+        beyond = whole_weight - dr.select(is_delta | (whole.pdf <= 0.0), 0.0, lambert / whole.pdf)
+        wo, pdf = dr.select(undivided, whole.wo, own.wo), dr.select(undivided, whole.pdf, own.pdf)
+        return wo, pdf, dr.select(undivided, beyond, weight), is_delta
+
+
+def _has_undivided(material: Any) -> bool:
+    """Whether a material, or one nested in it, does not divide itself."""
+    nodes = mi.traverse(material).hierarchy
+    return any(isinstance(n, mi.BSDF) and n.class_name() in UNDIVIDED for n in nodes)
+
+
+def diffuse_reflectance(seen: Any, material: Any, active: Any) -> Any:
+    """Albedo of the diffuse lobe, 0..1: what the light is multiplied with and what the rest is without.
+
+    Of materials without a diffuse lobe Mitsuba would answer with their value straight ahead.
+    """
+    is_diffuse = active & has_lobe(material.flags(), "DiffuseReflection", "DiffuseTransmission")
+    albedo = material.eval_diffuse_reflectance(seen, is_diffuse)
+    channels = (albedo.x, albedo.y, albedo.z)
+    return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in channels))
+
+
+def has_lobe(flags: Any, *lobes: str) -> Any:
+    """Whether a material has any of these lobes, by Mitsuba's names of them."""
+    return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
+
+
+def _lambert(seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+    is_reflected = wo.z * seen.wi.z > 0.0
+    pdf = dr.select(is_reflected, dr.abs(wo.z) / dr.pi, 0.0)
+    return diffuse_reflectance(seen, material, active) * pdf, pdf

@@ -1,0 +1,91 @@
+"""Reverse lookup: what a keyframe knows of a point on a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from enfilade.arrays import Array3f, Float, Int, UInt
+
+FLOOR = 1e-3  # weight that each agreeing tap has at least: a lone one at the border still counts
+
+
+@dataclass(frozen=True)
+class Page:
+    """A keyframe as lanes and matrices.
+
+    Attributes
+    ----------
+    depths : Float
+    items : UInt
+    values : Array3f
+        Images, width * height lanes.
+    eye : Array3f
+    direction_from_pixel, pixel_from_direction : Matrix3f
+        Of the camera.
+    width, height : int
+    """
+
+    depths: Any
+    items: Any
+    values: Any
+    eye: Any
+    direction_from_pixel: Any
+    pixel_from_direction: Any
+    width: int
+    height: int
+
+
+def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance: float) -> tuple[Any, Any]:
+    """Interpolate a keyframe's values at points in the world.
+
+    Of the four pixels around a point's projection those count that see the same item, within a
+    tolerance of the point's own tangent plane: surfaces that hide it, or that meet it at an edge,
+    do not.
+
+    Parameters
+    ----------
+    position, normal : Array3f
+        Points in the world, and the normals of their surfaces, of any length and side.
+    item : UInt
+    page
+    plane_tolerance
+        Distance from the tangent plane, by depth, up to which a pixel is of the same surface.
+
+    Returns
+    -------
+    total : Array3f
+        Weighted sum of the values.
+    weight : Float
+        Sum of the weights; 0 where the keyframe does not know the surface, at most about one.
+    """
+    # Where the keyframe would see the point.
+    seen = page.pixel_from_direction @ (position - page.eye)
+    is_ahead = seen.z > 0.0
+    x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
+    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < page.width - 0.5) & (y < page.height - 0.5)
+    left, top = dr.floor(x), dr.floor(y)
+    across, down = x - left, y - top
+
+    # Distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
+    scale = dr.rcp(dr.norm(normal))
+    offset = dr.dot(normal, page.eye - position) * scale
+    slope = (page.direction_from_pixel.T @ normal) * scale
+    tolerance = plane_tolerance * seen.z
+
+    total, weight = Array3f(0), Float(0)
+    for row, weight_y in ((0, 1.0 - down), (1, down)):
+        for column, weight_x in ((0, 1.0 - across), (1, across)):
+            i = dr.clip(Int(left) + column, 0, page.width - 1)
+            j = dr.clip(Int(top) + row, 0, page.height - 1)
+            lane = UInt(j * page.width + i)
+            depth = dr.gather(Float, page.depths, lane, is_inside)
+            distance = offset + depth * dr.dot(slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1))
+            is_same = is_inside & (dr.gather(UInt, page.items, lane, is_inside) == item)
+            is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
+            share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
+            total += share * dr.gather(Array3f, page.values, lane, is_same)
+            weight += share
+    return total, weight

@@ -1,0 +1,187 @@
+"""With an empty cache the estimator is a path tracer; with a full one it is near it."""
+
+import numpy as np
+import pytest
+
+from enfilade.backends.mitsuba3 import MitsubaRenderer
+from enfilade.camera import Camera, look_at
+from enfilade.geometry import find_geometry
+from enfilade.irradiance import LightCache, open_cache, shade
+from enfilade.pixels.estimate import estimate
+from enfilade.records import Keyframe, Shading
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import TraceSettings
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+TINT = '<rgb name="{}" value="0.6, 0.4, 0.2"/>'
+ROUGH = '<float name="alpha" value="0.25"/>'
+MATERIALS = {
+    "diffuse": f'<bsdf type="diffuse">{TINT.format("reflectance")}</bsdf>',
+    "plastic": f'<bsdf type="plastic">{TINT.format("diffuse_reflectance")}</bsdf>',
+    "roughplastic": f'<bsdf type="roughplastic">{ROUGH}{TINT.format("diffuse_reflectance")}</bsdf>',
+    "conductor": '<bsdf type="conductor"/>',
+    "roughconductor": f'<bsdf type="roughconductor">{ROUGH}</bsdf>',
+    "dielectric": '<bsdf type="dielectric"/>',
+    "roughdielectric": f'<bsdf type="roughdielectric">{ROUGH}</bsdf>',
+    "thindielectric": '<bsdf type="thindielectric"/>',
+    "principled": f'<bsdf type="principled">{TINT.format("base_color")}<float name="roughness" value="0.3"/>'
+    '<float name="metallic" value="0.3"/><float name="specular" value="0.8"/></bsdf>',
+    "blend": f'<bsdf type="blendbsdf"><float name="weight" value="0.4"/><bsdf type="diffuse"/>'
+    f'<bsdf type="roughconductor">{ROUGH}</bsdf></bsdf>',
+    "mask": f'<bsdf type="mask"><float name="opacity" value="1"/>'
+    f'<bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
+    "twosided": f'<bsdf type="twosided"><bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
+}
+
+
+def _plane(name: str, transform: str, color: str) -> str:
+    return (
+        f'<shape type="rectangle" id="{name}"><transform name="to_world">{transform}</transform>'
+        f'<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{color}"/></bsdf></bsdf>'
+        "</shape>"
+    )
+
+
+def _scene(balls: dict[str, str]) -> str:
+    shapes = [
+        f'<shape type="sphere" id="{name}"><float name="radius" value="0.42"/>'
+        f'<point name="center" x="{i % 4 - 1.5}" y="{0.5 + i // 4}" z="0"/>{bsdf}</shape>'
+        for i, (name, bsdf) in enumerate(balls.items())
+    ]
+    shapes.append(_plane("floor", '<scale value="4"/><rotate x="1" angle="-90"/>', "0.6, 0.6, 0.5"))
+    shapes.append(_plane("back", '<scale value="4"/><translate z="-1.5"/>', "0.2, 0.5, 0.7"))
+    lamp = (
+        '<shape type="rectangle" id="lamp"><transform name="to_world"><scale value="0.8"/>'
+        '<rotate x="1" angle="90"/><translate y="4" z="1"/></transform>'
+        '<emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>'
+        '<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>'
+    )
+    # No limit of depth: where a path is cut off, the two estimators cut differently.
+    integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'
+    return f'<scene version="3.0.0">{integrator}{"".join(shapes)}{lamp}</scene>'
+
+
+def _opened(folder, balls: dict[str, str]) -> MitsubaRenderer:
+    file = folder / "scene.xml"
+    file.write_text(_scene(balls))
+    return MitsubaRenderer(file, TraceSettings())
+
+
+def _camera(width: int = 48, height: int = 36, x: float = 0.0) -> Camera:
+    return Camera(look_at((x, 1.8, 6), (0.6 * x, 1.5, 0)), 36, width, height)
+
+
+def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2) -> Shading:
+    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    return estimate(
+        camera,
+        pixels,
+        lambda rays, rng: shade(renderer, cache, rays, rng),
+        spp=spp,
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random={"seed": seed, "frame": 0, "purpose": int(Purpose.GATHER)},
+    )
+
+
+def _traced(renderer, camera: Camera, spp: int) -> Shading:
+    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    return renderer.trace(camera, pixels, spp=spp, seed=1, frame=0, purpose=Purpose.REFERENCE)
+
+
+def test_without_a_cache_every_material_keeps_its_energy(tmp_path):
+    renderer, camera = _opened(tmp_path, MATERIALS), _camera()
+    ours, reference = _shaded(renderer, LightCache(), camera, 256), _traced(renderer, camera, 256)
+    item = find_geometry(renderer, camera).item.ravel()
+    names = renderer.describe().items
+    misses = {}
+    for number in np.unique(item[item > 0]):
+        where = item == number
+        difference = ((ours.color - reference.color) @ LUMINANCE)[where].sum()
+        deviation = np.sqrt((ours.variance + reference.variance)[where].sum())
+        misses[names[number - 1]] = difference / deviation
+    assert set(MATERIALS) < set(misses)
+    # Standard errors of sums over a ball's pixels; 14 items, so that four are passed once in a thousand runs.
+    assert {name: miss for name, miss in misses.items() if abs(miss) > 4.0} == {}
+
+
+@pytest.fixture(scope="module")
+def diffuse(tmp_path_factory):
+    """Diffuse balls, with the light of two keyframes."""
+    renderer = _opened(
+        tmp_path_factory.mktemp("diffuse"), {"one": MATERIALS["diffuse"], "two": MATERIALS["diffuse"]}
+    )
+    keyframes = [_keyframe(renderer, _camera(x=x)) for x in (-0.5, 0.5)]
+    return renderer, keyframes
+
+
+def _keyframe(renderer, camera: Camera) -> Keyframe:
+    light = estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng: renderer.light(renderer.lit(rays), rng),
+        spp=256,
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random={"seed": 3, "frame": 0, "purpose": int(Purpose.LIGHT)},
+    )
+    size = (camera.height, camera.width)
+    return Keyframe(
+        0,
+        find_geometry(renderer, camera),
+        Shading(light.color.reshape(*size, 3), light.variance.reshape(size)),
+    )
+
+
+def test_with_a_cache_one_sample_is_near_many_paths(diffuse):
+    renderer, keyframes = diffuse
+    camera = _camera()
+    cached = _shaded(renderer, open_cache(keyframes, [0.5, 0.5]), camera, 1)
+    uncached = _shaded(renderer, LightCache(), camera, 1)
+    reference = _traced(renderer, camera, 1024).color
+    error, error_uncached = (np.sqrt(((c.color - reference) ** 2).mean()) for c in (cached, uncached))
+    # The light of 512 paths, for one camera ray; what remains are edges of shadows and what no keyframe saw.
+    assert error < 0.25 * error_uncached
+    assert abs(cached.color.mean() / reference.mean() - 1.0) < 0.02
+
+
+def test_a_keyframe_knows_its_own_pixels(diffuse):
+    renderer, keyframes = diffuse
+    keyframe = keyframes[0]
+    geometry = keyframe.geometry
+    image = _shaded(renderer, open_cache([keyframe], [1.0]), geometry.camera, 1).color.reshape(36, 48, 3)
+    expected = geometry.albedo * keyframe.shading.color
+    # Inside surfaces; at edges a tap may be another surface, and the lamp emits.
+    inside = (geometry.item == 3) | (geometry.item == 4)
+    wrong = np.abs(image - expected).max(axis=2)[inside] > 0.01
+    assert wrong.mean() < 0.02
+
+
+def test_what_no_keyframe_saw_is_traced(diffuse):
+    renderer, keyframes = diffuse
+    away = Camera(look_at((0, 1.5, 3), (3.5, 0.5, -1.5)), 30, 24, 18)
+    cached = _shaded(renderer, open_cache(keyframes[:1], [1.0]), away, 128)
+    reference = _traced(renderer, away, 128)
+    difference = ((cached.color - reference.color) @ LUMINANCE).mean()
+    deviation = np.sqrt((cached.variance + reference.variance).sum()) / cached.variance.size
+    assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
+
+
+def test_same_seed_same_bytes_whatever_the_chunks(diffuse):
+    renderer, keyframes = diffuse
+    camera, cache = _camera(24, 18), open_cache(keyframes, [0.5, 0.5])
+    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    random = {"seed": 5, "frame": 1, "purpose": int(Purpose.GATHER)}
+    images = [
+        estimate(
+            camera,
+            pixels,
+            lambda rays, rng: shade(renderer, cache, rays, rng),
+            spp=4,
+            chunk=chunk,
+            pixel_filter=PixelFilter.GAUSSIAN,
+            random=random,
+        ).color.tobytes()
+        for chunk in (1 << 20, 1024)
+    ]
+    assert images[0] == images[1]

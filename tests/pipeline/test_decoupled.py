@@ -1,0 +1,68 @@
+"""Walkthroughs by ``--method decoupled``."""
+
+import numpy as np
+import pytest
+
+from enfilade.codec import read_exr
+from enfilade.errors import SettingsError
+from enfilade.monitor import Silence
+from enfilade.path import load_path
+from enfilade.pipeline.job import Job
+from enfilade.pipeline.walkthrough import render
+from enfilade.scenes import write_scene
+from enfilade.settings import Settings
+from scenes_analytic import slide, wall
+from small_runs import frame_bytes, job_of, rendered
+
+FRAMES = (1, 22, 24, 26, 28)
+
+
+def _job(folder, method: str, spp: int) -> Job:
+    files = write_scene("room", folder / "room", preset="small")
+    path = load_path(files.path, size=(64, 48), frames=FRAMES)
+    settings = Settings.from_tables(
+        {"trace": {"spp": spp}, "keyframes": {"spacing": 4}, "light": {"samples": 8}}
+    )
+    return Job(files.scene, path, settings, method)
+
+
+@pytest.fixture(scope="module")
+def decoupled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("decoupled")
+    return (
+        _job(folder, "decoupled", 32),
+        folder / "run",
+        render(_job(folder, "decoupled", 32), folder / "run", Silence()),
+    )
+
+
+def test_it_is_about_as_near_to_many_paths_as_tracing_every_frame_with_as_many(decoupled, tmp_path):
+    _, folder, summary = decoupled
+    render(_job(tmp_path, "reference", 256), tmp_path / "many", Silence())
+    render(_job(tmp_path, "reference", 32), tmp_path / "few", Silence())
+
+    def error(run):
+        images = [
+            [read_exr(r / "frames" / f"{n:04d}.exr")["RGB"].astype(float) for n in FRAMES]
+            for r in (run, tmp_path / "many")
+        ]
+        return np.sqrt(np.mean(np.minimum(np.subtract(*images) ** 2, 1.0)))
+
+    # Two frames of five are traced. The reference has noise of its own, and eight camera rays alias checks.
+    assert error(folder) < 1.25 * error(tmp_path / "few")
+    assert summary["table1"]["keyframes"] == pytest.approx(100 * 2 / 5)
+    assert summary["dropped_samples"] == 0
+
+
+def test_a_run_that_lost_files_is_mended_to_the_same_bytes(decoupled):
+    job, folder, _ = decoupled
+    before = frame_bytes(folder)
+    (folder / "frames" / "0024.exr").unlink()
+    (folder / "keyframes" / "0001.exr").unlink()
+    render(job, folder, Silence())
+    assert frame_bytes(folder) == before
+
+
+def test_a_renderer_without_light_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="needs a Mitsuba scene"):
+        rendered(tmp_path, job_of(tmp_path, wall(), slide(3), method="decoupled"))
