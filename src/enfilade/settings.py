@@ -101,6 +101,9 @@ class ViewingSettings(Section):
     distance_m: float = option(0.5, "Distance of the eye from the screen, metres.", least=0.05)
     peak_cd_m2: float = option(100.0, "Luminance of the display's white, cd/m2.", least=1.0)
     black_cd_m2: float = option(0.1, "Luminance of the display's black, cd/m2.", least=0.0)
+    persistence: float = option(
+        1.0, "Share of a frame's time for which the display shows it.", least=0.0, most=1.0
+    )
     exposure_ev: float = option(0.0, "Exposure before the view transform, in stops.", least=-32.0, most=32.0)
 
 

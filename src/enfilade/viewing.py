@@ -35,6 +35,9 @@ class Viewing:
         From the eye to the screen, metres.
     fps : float
         Frames per second at which the sequence is shown.
+    persistence : float
+        Share of a frame's time for which the display shows it: 1 on desktops, phones and televisions,
+        a few percent in headsets and on tubes.
     peak_cd_m2, black_cd_m2 : float
         Luminance of white and of black on the screen, reflected room light included, cd/m2;
         black may be zero.
@@ -52,6 +55,7 @@ class Viewing:
     fps: float = 30.0
     peak_cd_m2: float = 100.0
     black_cd_m2: float = 0.1
+    persistence: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("width_px", "height_px"):
@@ -64,6 +68,9 @@ class Viewing:
             if not (math.isfinite(number) and number > 0):
                 msg = f"viewing: {name} is {number!r}; give a finite number above 0"
                 raise InputError(msg)
+        if not 0 <= self.persistence <= 1:
+            msg = f"viewing: persistence is {self.persistence!r}; give a share from 0 to 1"
+            raise InputError(msg)
         if not 0 <= self.black_cd_m2 < self.peak_cd_m2:
             msg = (
                 f"viewing: black_cd_m2 is {self.black_cd_m2!r}; "
@@ -129,6 +136,8 @@ class Display:
         Luminance of white and of black, reflected room light included, cd/m2.
     text : str
         What it stands for.
+    persistence : float
+        See :class:`Viewing`.
     """
 
     name: str
@@ -139,6 +148,7 @@ class Display:
     peak_cd_m2: float
     black_cd_m2: float
     text: str
+    persistence: float = 1.0
 
     def viewing(self, width_px: int, height_px: int, fps: float) -> Viewing:
         """Conditions for an image of a size, of which each pixel is one of the screen.
@@ -156,6 +166,7 @@ class Display:
             fps=fps,
             peak_cd_m2=self.peak_cd_m2,
             black_cd_m2=self.black_cd_m2,
+            persistence=self.persistence,
         )
         return screen.cropped(width_px, height_px)
 
@@ -164,7 +175,7 @@ class Display:
 # picture heights before a television (ITU-R BT.2022), half a cinema's length. Luminances: typical settings,
 # the office's reflections in the black; the cinema's 48 cd/m2 are SMPTE ST 431-1's.
 DISPLAYS = (
-    Display("paper", 640, 480, 0.25, 0.5, 100.0, 0.1, "the paper's screen (§6), 28 pixels per degree"),
+    Display("paper", 640, 480, 0.25, 0.5, 100.0, 0.1, "the paper's tube (§6), 28 pixels per degree", 0.05),
     Display("desktop-24-fhd", 1920, 1080, 0.61, 0.6, 200.0, 0.3, "24 inch monitor, in an office"),
     Display("desktop-27-4k", 3840, 2160, 0.686, 0.6, 250.0, 0.3, "27 inch monitor, in an office"),
     Display("laptop-14", 1920, 1200, 0.356, 0.5, 250.0, 0.4, "14 inch laptop, in an office"),

@@ -5,7 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enfilade.metric.eye import Pursuit, channel_speed, retinal_speed, retinal_velocity
+from enfilade.metric.eye import (
+    Pursuit,
+    channel_speed,
+    held_smear,
+    retinal_speed,
+    retinal_velocity,
+    smeared_share,
+)
 
 speeds = st.floats(0, 300, width=32)
 
@@ -64,3 +71,17 @@ def test_projection_is_on_the_frequency_vector():
 def test_hypotheses():
     assert Pursuit.BOTH.hypotheses == (Pursuit.PURSUIT, Pursuit.NONE)
     assert Pursuit.NONE.hypotheses == (Pursuit.NONE,)
+
+
+def test_a_held_frame_smears_for_an_eye_that_follows():
+    velocity = np.array([10.0, 0.0], dtype=np.float32).reshape(2, 1, 1)
+    smear = held_smear(velocity, Pursuit.PURSUIT, 1.0 / 60.0)
+    assert smear is not None
+    # The eye follows at 0.82 * 10 + 0.15 deg/s (Eq. 5).
+    assert smear[:, 0, 0] == pytest.approx([8.35 / 60.0, 0.0], rel=1e-5)
+    assert held_smear(velocity, Pursuit.NONE, 1.0 / 60.0) is None
+    # One whole period under the smear leaves nothing; along the bars nothing is lost.
+    period_cpd = 60.0 / 8.35
+    assert smeared_share(smear, 0.0, period_cpd) == pytest.approx(0.0, abs=1e-5)
+    assert smeared_share(smear, 90.0, period_cpd) == pytest.approx(1.0, abs=1e-5)
+    assert smeared_share(smear, 0.0, 0.5 * period_cpd) == pytest.approx(2.0 / np.pi, rel=1e-4)

@@ -25,6 +25,7 @@ FLOWS = ("auto", "layers", "estimate", "none")
 DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would load NumPy
     "csf",
     "luminance_adaptive",
+    "hold_blur",
     "csf_within_bands",
     "ripple_free",
     "transducer",

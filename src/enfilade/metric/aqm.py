@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +13,7 @@ from enfilade.metric.borders import MirrorBorder, fill_undefined
 from enfilade.metric.comparison import Comparison, Pool, PoolingRule
 from enfilade.metric.cortex import Band, CortexTransform, Partition, bands
 from enfilade.metric.decision import Channel, Decision
-from enfilade.metric.eye import Pursuit, retinal_velocity
+from enfilade.metric.eye import Pursuit, held_smear, retinal_velocity
 from enfilade.metric.inputs import check_luminance, check_map, check_valid
 from enfilade.metric.masking import MASK_SLOPE
 from enfilade.metric.noise import NOISE_SIGMAS
@@ -167,8 +167,11 @@ class Aqm:
         is_judged = np.ones(self._shape, dtype=np.bool_) if valid is None else valid
         test, reference = fill_undefined(test, reference, valid)
         pair = self._retina.pair(test, reference, is_judged, noise_variance, change)
-        velocities = self._retinal_velocities(velocity, is_judged, pursuit or self.pursuit)
-        sensitivity = ChannelSensitivity(self._table, velocities, pair.light)
+        movements = (pursuit or self.pursuit).hypotheses
+        planes = [] if velocity is None else [_every_second(velocity, is_judged)] * len(movements)
+        velocities = [retinal_velocity(p, eye) for p, eye in zip(planes, movements, strict=False)]
+        smears = self._smears(planes, movements)
+        sensitivity = ChannelSensitivity(self._table, velocities, pair.light, smears)
         pool = Pool(self.cortex.bands, is_judged, self._rule, self._aperture)
         for band in self.cortex.bands:
             self._decision.add(pool, band, self._channels(pair, band, sensitivity))
@@ -198,22 +201,12 @@ class Aqm:
         if velocity is not None:
             check_map("velocity", velocity, (*self._shape, 2), valid, is_signed=True)
 
-    @staticmethod
-    def _retinal_velocities(
-        velocity: Float32Array | None, is_judged: BoolArray, pursuit: Pursuit
-    ) -> list[Float32Array]:
-        if velocity is None:
+    def _smears(self, planes: list[Float32Array], movements: Sequence[Pursuit]) -> list[Float32Array | None]:
+        """How far held frames smear for each eye movement; nothing where displays flash."""
+        if not self.options.hold_blur:
             return []
-        # From every second pixel, as `ChannelSensitivity` asks.
-        rows, columns = (
-            np.minimum(FINEST_REDUCTION * np.arange(samples), pixels - 1)
-            for samples, pixels in zip(
-                halved_shape(is_judged.shape, FINEST_REDUCTION), is_judged.shape, strict=True
-            )
-        )
-        here = np.ix_(rows, columns)
-        planes = np.where(is_judged[here], np.moveaxis(velocity[here], -1, 0), np.float32(0.0))
-        return [retinal_velocity(planes, eye) for eye in pursuit.hypotheses]
+        hold_s = self.viewing.persistence / self.viewing.fps
+        return [held_smear(p, eye, hold_s) for p, eye in zip(planes, movements, strict=False)]
 
     def _channels(self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity) -> Iterator[Channel]:
         """Reference, test and difference of each channel of a band, in units of its threshold."""
@@ -249,6 +242,18 @@ class Aqm:
         light = pair.light.at(ChannelSensitivity.reduction(band))
         change *= _at_size(self._observer.flicker_weight(band, light), band, shape)
         yield np.zeros_like(change), None, change
+
+
+def _every_second(velocity: Float32Array, is_judged: BoolArray) -> Float32Array:
+    """Velocity at every second pixel, as `ChannelSensitivity` asks, (2, h, w); 0 where not judged."""
+    rows, columns = (
+        np.minimum(FINEST_REDUCTION * np.arange(samples), pixels - 1)
+        for samples, pixels in zip(
+            halved_shape(is_judged.shape, FINEST_REDUCTION), is_judged.shape, strict=True
+        )
+    )
+    here = np.ix_(rows, columns)
+    return np.where(is_judged[here], np.moveaxis(velocity[here], -1, 0), np.float32(0.0))
 
 
 def _at_size(weight: Float32Array, band: Band, shape: tuple[int, int]) -> Float32Array:

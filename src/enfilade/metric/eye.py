@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Pursuit", "channel_speed", "retinal_speed", "retinal_velocity"]
+__all__ = ["Pursuit", "channel_speed", "held_smear", "retinal_speed", "retinal_velocity"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 
@@ -92,6 +92,59 @@ def retinal_velocity(velocity_deg_s: Float32Array, pursuit: Pursuit) -> Float32A
     share = retinal_speed(speed, pursuit)
     share /= np.maximum(speed, np.float32(SLOWEST_DEG_S), out=speed)
     return velocity_deg_s * share
+
+
+def held_smear(velocity_deg_s: Float32Array, pursuit: Pursuit, hold_s: float) -> Float32Array | None:
+    """How far a held frame moves over the retina of an eye that follows the motion.
+
+    The display shows a moving pattern in jumps; between them it stands, and the eye does not.
+
+    Parameters
+    ----------
+    velocity_deg_s : (2, ...) float32
+        Image velocity, degrees per second.
+    pursuit : Pursuit
+        PURSUIT or NONE.
+    hold_s : float
+        How long a frame is lit, seconds.
+
+    Returns
+    -------
+    (2, ...) float32 or None
+        Degrees, in the direction of the motion; None for an eye that rests.
+    """
+    if pursuit is Pursuit.NONE:
+        return None
+    smear: Float32Array = velocity_deg_s - retinal_velocity(velocity_deg_s, pursuit)
+    smear *= np.float32(hold_s)
+    return smear
+
+
+def smeared_share(smear_deg: Float32Array, theta_deg: float | None, frequency_cpd: float) -> Float32Array:
+    """Contrast that a smear leaves of a channel: the spectrum of a box as long as the smear.
+
+    Parameters
+    ----------
+    smear_deg : (2, ...) float32
+        From `held_smear`.
+    theta_deg : float or None
+        Direction of the frequency vector; None for the base band.
+    frequency_cpd : float
+        Cycles per degree.
+
+    Returns
+    -------
+    (...) float32
+        0..1.
+    """
+    across, down = smear_deg
+    if theta_deg is None:
+        along: Float32Array = np.hypot(across, down)
+    else:
+        theta = math.radians(theta_deg)
+        along = np.float32(math.cos(theta)) * across + np.float32(math.sin(theta)) * down
+    share: Float32Array = np.abs(np.sinc(along * np.float32(frequency_cpd)))
+    return share
 
 
 def channel_speed(retinal_velocity_deg_s: Float32Array, theta_deg: float | None) -> Float32Array:

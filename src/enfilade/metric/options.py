@@ -23,6 +23,9 @@ class MetricOptions:
     luminance_adaptive : bool
         Contrast and sensitivity at the luminance that surrounds each pixel, instead of contrast of
         the retina's response over the mean of the image (`metric.adaptation`).
+    hold_blur : bool
+        A frame stands still while it is held, and an eye that follows the motion smears it
+        (`metric.eye`); the paper's screens flashed.
     csf_within_bands : bool
         The CSF varies within a band as it does for still images, instead of being that of the
         band's centre throughout.
@@ -40,6 +43,7 @@ class MetricOptions:
 
     csf: Literal["paper", "castle"] = "paper"
     luminance_adaptive: bool = False
+    hold_blur: bool = False
     csf_within_bands: bool = False
     ripple_free: bool = False
     transducer: bool = False
@@ -62,6 +66,7 @@ class MetricOptions:
         return cls(
             csf="castle",
             luminance_adaptive=True,
+            hold_blur=True,
             csf_within_bands=True,
             ripple_free=True,
             transducer=True,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from enfilade.metric.adaptation import AdaptingLight
 from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
-from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed
+from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed, smeared_share
 from enfilade.metric.pyramid import halve
 
 __all__ = ["FINEST_REDUCTION", "ChannelSensitivity", "SensitivityTable"]
@@ -48,6 +48,7 @@ class SensitivityTable:
     def __init__(
         self, csf: Csf, bands: tuple[Band, ...], pixels_per_degree: float, *, by_luminance: bool = False
     ) -> None:
+        self._pixels_per_degree = pixels_per_degree
         self._size = SPEEDS_BY_LUMINANCE if by_luminance else SPEEDS
         self._luminances = LUMINANCES if by_luminance else 1
         speeds = np.geomspace(EYE_DRIFT_DEG_S, FASTEST_DEG_S, self._size)
@@ -76,6 +77,10 @@ class SensitivityTable:
         steps = np.clip(steps + np.float32(0.5), 0, self._luminances - 1)
         return np.asarray(steps, dtype=np.int32) * self._size
 
+    def frequency_cpd(self, band: Band) -> float:
+        """Centre of a band, cycles per degree."""
+        return band.centre_cpp * self._pixels_per_degree
+
     def row(self, band: Band) -> Float32Array:
         """Sensitivities of a band by entry; the first is that of a still eye."""
         return self._rows[band.level - 1]
@@ -96,6 +101,9 @@ class ChannelSensitivity:
         the largest sensitivity counts. Empty when nothing moves.
     light : AdaptingLight, optional
         What the eye is adapted to; needed where the CSF depends on luminance.
+    smears : sequence of (2, h, w) float32 or None
+        How far a held frame smears for each of `velocities`, degrees; None where it does not. Empty
+        for a display that flashes.
     """
 
     def __init__(
@@ -103,8 +111,10 @@ class ChannelSensitivity:
         table: SensitivityTable,
         velocities: Sequence[Float32Array],
         light: AdaptingLight | None = None,
+        smears: Sequence[Float32Array | None] = (),
     ) -> None:
         self._table = table
+        self._smears = smears or [None] * len(velocities)
         self._velocities = velocities
         self._light = light
         self._reduction = 0
@@ -148,10 +158,22 @@ class ChannelSensitivity:
         if self.is_still:
             return self.still(band)
         row = self._table.row(band)
-        first, *others = (row.take(index) for index in self._entries(orientation, self.reduction(band)))
+        indices = self._entries(orientation, self.reduction(band))
+        maps = [row.take(index) for index in indices]
+        for found, smear in zip(maps, self._smears, strict=True):
+            if smear is not None:
+                np.multiply(found, self._smeared(smear, band, orientation), out=found)
+        first, *others = maps
         for other in others:
             np.maximum(first, other, out=first)
         return first
+
+    def _smeared(self, smear: Float32Array, band: Band, orientation: int | None) -> Float32Array:
+        theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
+        share = smeared_share(smear, theta, self._table.frequency_cpd(band))
+        for _ in range((self.reduction(band) // FINEST_REDUCTION).bit_length() - 1):
+            share = halve(share)
+        return share
 
     @property
     def is_still(self) -> bool:

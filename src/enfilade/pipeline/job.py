@@ -46,6 +46,7 @@ class Job:
             fps=self.path.fps,
             peak_cd_m2=of.peak_cd_m2,
             black_cd_m2=of.black_cd_m2,
+            persistence=of.persistence,
         )
 
     def identity(self, renderer: Renderer) -> dict[str, Any]:

@@ -88,6 +88,7 @@ class Terms:
             fps=fps,
             peak_cd_m2=self.viewing.peak_cd_m2,
             black_cd_m2=self.viewing.black_cd_m2,
+            persistence=self.viewing.persistence,
         )
 
 

@@ -149,6 +149,7 @@ class SequenceDifference:
             "distance_m": viewing.distance_m,
             "peak_cd_m2": viewing.peak_cd_m2,
             "black_cd_m2": viewing.black_cd_m2,
+            "persistence": viewing.persistence,
             "mode": self.mode,
             "departures": [name for name in self.options.departures() if self._is_on(name)],
             "flow": self.flow,
