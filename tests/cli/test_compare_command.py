@@ -14,8 +14,8 @@ from enfilade.viewing import DISPLAYS
 
 KEYS = {  # docs/compare.md
     "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "worst_frame",
-    "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2", "persistence", "mode",
-    "departures", "flow", "bands_cpd", "per_frame",
+    "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2", "persistence",
+    "mode", "departures", "flow", "bands_cpd", "per_frame",
 }  # fmt: skip
 FRAME_KEYS = {
     "name", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "steady_bands_jnd",

@@ -13,6 +13,7 @@ rotation that went on throughout; so does this.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -44,7 +45,7 @@ Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 ROWS = slice(192, 320)  # a quarter of the texture is enough: rows are alike
-FRAMES = 3  # the first has no frame before it
+FRAMES = 4  # the first has no frame before it
 ROTATION_DEG_S = 2.0  # the authors' correction of all speeds
 
 
@@ -58,22 +59,25 @@ class Display:
         Pixels and images per second.
     mean_cd_m2 : float
         Luminance of a texture whose mean is a half.
+    persistence : float
+        Share of a frame's time for which it is lit.
     """
 
     pixels_per_degree: float
     fps: float
     mean_cd_m2: float
+    persistence: float = 1.0
 
     def viewing(self, width_px: int, height_px: int) -> Viewing:
         """Viewing conditions of an image on it."""
         square = screen(width_px, self.pixels_per_degree, fps=self.fps, peak_cd_m2=2.0 * self.mean_cd_m2)
-        return square.cropped(width_px, height_px)
+        return dataclasses.replace(square.cropped(width_px, height_px), persistence=self.persistence)
 
 
 DISPLAYS = {
     "pc": Display(50.0, 144.0, 150.0),
     "phone": Display(90.0, 60.0, 75.0),
-    "headset": Display(26.0, 144.0, 2.5),
+    "headset": Display(26.0, 144.0, 2.5, persistence=0.04),  # of its kind; the paper does not say
 }
 TEXTURES = frozenset({"checkerboard", "gradient", "grass", "noise"})
 SCREENS = frozenset(DISPLAYS)

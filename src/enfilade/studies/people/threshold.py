@@ -19,7 +19,7 @@ __all__ = ["response_jnd", "threshold_contrast"]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
-CLOSE_DB = 0.02  # a threshold is this near
+CLOSE_DB = 0.05  # a threshold is this near
 MOST_STEPS = 12
 DARKEST = 0.98  # a target takes away at most this share of the light
 FAINTEST_JND = 1e-12  # keeps the logarithm finite where nothing is seen
