@@ -93,7 +93,7 @@ def _modelfest(modes: Sequence[Mapping[str, Any]]) -> Figure:
     ax.set_xticks(places, [str(n) for n in people["number"]], fontsize=8)
     ax.set_xlabel("target")
     ax.set_ylabel("contrast sensitivity, dB")
-    ax.legend(fontsize=8, frameon=False, loc="upper right")
+    ax.legend(fontsize=8, frameon=False, loc="lower right", ncols=3, bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
@@ -137,16 +137,23 @@ def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def _draw_rate(ax: Any, found: Sequence[Mapping[str, Any]], hertz: float, color: str) -> None:
-    """Points and curves of one temporal frequency, where there are enough to make a curve."""
-    is_chosen = np.abs(_array(found[0]["temporal_hz"]) - hertz) < 0.01
-    if np.count_nonzero(is_chosen) < 2:
-        return
-    cpd = _array(found[0]["frequency_cpd"])[is_chosen]
-    order = np.argsort(cpd, kind="stable")
-    ax.plot(cpd, _array(found[0]["people"])[is_chosen], "o", color=color, markersize=5, label=f"{hertz:g} Hz")
-    for mode, style in zip(found, MODE_STYLES, strict=False):
-        curve = _array(mode["metric"])[is_chosen][order]
-        ax.plot(cpd[order], np.maximum(curve, 0.01), style["linestyle"], color=color, linewidth=1.2)
+    """Points and curves of one temporal frequency, where there are enough to make a curve.
+
+    Gratings as large as the largest make one curve, filled points; smaller ones another, open points.
+    """
+    is_rate = np.abs(_array(found[0]["temporal_hz"]) - hertz) < 0.01
+    area, cpd = (_array(found[0][name]) for name in ("area_deg2", "frequency_cpd"))
+    is_large = area > 0.99 * area.max()
+    for is_chosen, face in ((is_rate & is_large, color), (is_rate & ~is_large, "white")):
+        if np.count_nonzero(is_chosen) < 2:
+            continue
+        label = f"{hertz:g} Hz" + ("" if face == color else ", smaller")
+        people = _array(found[0]["people"])[is_chosen]
+        ax.plot(cpd[is_chosen], people, "o", color=color, markerfacecolor=face, markersize=5, label=label)
+        order = np.argsort(cpd[is_chosen], kind="stable")
+        for mode, style in zip(found, MODE_STYLES, strict=False):
+            curve = np.maximum(_array(mode["metric"])[is_chosen][order], 0.01)
+            ax.plot(cpd[is_chosen][order], curve, style["linestyle"], color=color, linewidth=1.2)
 
 
 def _moving_texture(modes: Sequence[Mapping[str, Any]]) -> Figure:

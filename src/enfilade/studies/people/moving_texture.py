@@ -77,7 +77,7 @@ class Display:
 DISPLAYS = {
     "pc": Display(50.0, 144.0, 150.0),
     "phone": Display(90.0, 60.0, 75.0),
-    "headset": Display(26.0, 144.0, 2.5, persistence=0.04),  # of its kind; the paper does not say
+    "headset": Display(26.0, 144.0, 2.5, persistence=0.04),  # as the published answers list it
 }
 TEXTURES = frozenset({"checkerboard", "gradient", "grass", "noise"})
 SCREENS = frozenset(DISPLAYS)
