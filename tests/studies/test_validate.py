@@ -45,12 +45,11 @@ def run(monkeypatch, *arguments, **measured):
     return CliRunner().invoke(main, ["validate", "--quiet", *arguments])
 
 
-def test_bounds_hold_for_what_is_printed():
-    assert Asked(2.0).is_met(2.004)
-    assert not Asked(2.0).is_met(2.006)
-    assert Asked(0.9, is_least=True).is_met(0.896)
-    assert not Asked(0.9, is_least=True).is_met(0.894)
-    assert not Asked(2.0).is_met(float("nan"))
+def test_bounds_are_strict():
+    assert Asked(2.0).is_met(2.0)
+    assert not Asked(2.0).is_met(2.004)
+    assert Asked(0.9, is_least=True).is_met(0.9)
+    assert not Asked(0.9, is_least=True).is_met(0.897)
 
 
 def test_nothing_is_asked_of_a_figure_without_a_bound():

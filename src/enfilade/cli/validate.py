@@ -87,7 +87,7 @@ def _table(found: Validation) -> Table:
         last = figures[-1]
         asked = "" if last.asked is None else f"{'≥' if last.asked.is_least else '≤'} {last.asked.bound:.2f}"
         verdict = "" if last.asked is None else ("ok" if last.is_met else "MISSED")
-        table.add_row(last.name, *(f"{figure.value:.2f}" for figure in figures), asked, verdict, last.unit)
+        table.add_row(last.name, *(f"{figure.value:.3f}" for figure in figures), asked, verdict, last.unit)
     return table
 
 

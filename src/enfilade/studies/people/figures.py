@@ -35,9 +35,8 @@ class Asked:
     is_least: bool = False
 
     def is_met(self, value: float) -> bool:
-        """Whether a value, rounded to the two digits that are printed, keeps to the bound."""
-        shown = round(value, 2)
-        return shown >= self.bound if self.is_least else shown <= self.bound
+        """Whether a value keeps to the bound."""
+        return value >= self.bound if self.is_least else value <= self.bound
 
 
 ASKED = {  # of the modern mode
