@@ -50,6 +50,7 @@ def test_bounds_are_strict():
     assert not Asked(2.0).is_met(2.004)
     assert Asked(0.9, is_least=True).is_met(0.9)
     assert not Asked(0.9, is_least=True).is_met(0.897)
+    assert not Asked(2.0).is_met(float("nan"))
 
 
 def test_nothing_is_asked_of_a_figure_without_a_bound():
