@@ -23,7 +23,6 @@ class _Path:
     lane: Any  # UInt, where its light goes
     throughput: Any  # Array3f
     rng: Any  # PCG32
-    scattered: Any  # Scattered: the bounce that it comes from
 
 
 def shade(renderer: LightRenderer, cache: LightCache, rays: Rays, rng: Any) -> Any:
@@ -49,7 +48,7 @@ def shade(renderer: LightRenderer, cache: LightCache, rays: Rays, rng: Any) -> A
     count = dr.width(rng.state)
     radiance = dr.zeros(Array3f, count)
     lit = renderer.lit(rays)
-    path = _Path(dr.arange(UInt, count), dr.full(Array3f, 1, count), rng, None)
+    path = _Path(dr.arange(UInt, count), dr.full(Array3f, 1, count), rng)
     for bounce in range(BOUNCES):
         _add(radiance, path, _arriving(renderer, cache, lit, path))
 
@@ -66,7 +65,7 @@ def shade(renderer: LightRenderer, cache: LightCache, rays: Rays, rng: Any) -> A
             break
         path = _chosen(path, alive)
         scattered = dr.gather(Scattered, scattered, alive)
-        path = _Path(path.lane, path.throughput * scattered.throughput, path.rng, None)
+        path = _Path(path.lane, path.throughput * scattered.throughput, path.rng)
         lit = renderer.lit(scattered.rays, scattered)
     return radiance
 
@@ -110,7 +109,6 @@ def _chosen(path: _Path, lanes: Any) -> _Path:
         lane=dr.gather(UInt, path.lane, lanes),
         throughput=dr.gather(Array3f, path.throughput, lanes),
         rng=dr.gather(PCG32, path.rng, lanes),
-        scattered=None,
     )
 
 
