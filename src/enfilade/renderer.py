@@ -25,6 +25,7 @@ class Purpose(IntEnum):
     FILL = 2
     LIGHT = 3
     GATHER = 4
+    GUIDE = 5
 
 
 class PixelFilter(IntEnum):

@@ -24,6 +24,7 @@ __all__ = [
     "GREEN",
     "GREY",
     "INK",
+    "ORANGE",
     "SOURCE_COLORS",
     "VERMILION",
     "Figure",

@@ -1,0 +1,64 @@
+"""Open Image Denoise (Áfra, https://www.openimagedenoise.org), by ``pyoidn``, which brings its weights."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from importlib.util import find_spec
+
+import numpy as np
+
+from enfilade.errors import SettingsError
+from enfilade.records import F32
+
+__all__ = ["denoise", "denoiser_name", "why_no_denoiser"]
+
+
+def denoise(color: F32, albedo: F32, normal: F32) -> F32:
+    """Denoise one HDR image by itself, on the CPU, with guides that have no noise of their own.
+
+    Parameters
+    ----------
+    color : (H, W, 3) float32
+        Linear radiance of paths spread uniformly over each pixel (a box filter): the networks were
+        trained on that. Negative values count as 0.
+    albedo : (H, W, 3) float32
+        0..1, filtered as the colours.
+    normal : (H, W, 3) float32
+        In the world, -1..1, filtered as the colours.
+
+    Returns
+    -------
+    (H, W, 3) float32
+
+    Raises
+    ------
+    SettingsError
+        ``pyoidn`` is not installed.
+
+    Notes
+    -----
+    About 6 microseconds of CPU time a pixel at its highest quality.
+    """
+    if why := why_no_denoiser():
+        raise SettingsError(why)
+    import pyoidn
+
+    guides = {
+        name: np.ascontiguousarray(a, np.float32) for name, a in (("albedo", albedo), ("normal", normal))
+    }
+    found: F32 = pyoidn.denoise(
+        np.maximum(color, np.float32(0.0)), **guides, hdr=True, clean_aux=True, quality="high"
+    )
+    return found
+
+
+def denoiser_name() -> str:
+    """Name and version of what denoises."""
+    return f"Open Image Denoise (pyoidn {version('pyoidn')})"
+
+
+def why_no_denoiser() -> str:
+    """Why nothing can be denoised here, and how to change it; empty where it can."""
+    if find_spec("pyoidn") is None:
+        return "Open Image Denoise is not installed: pip install 'enfilade[denoise]' brings it"
+    return ""

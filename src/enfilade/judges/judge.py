@@ -1,0 +1,54 @@
+"""What all judges share: frames in order go in, one number a frame and one for all come out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from enfilade.judges.shown import Shown
+
+__all__ = ["Judge", "Scale"]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The scale on which a judge gives its numbers.
+
+    Attributes
+    ----------
+    name : str
+        Short, for files and programs.
+    title : str
+        For people.
+    unit : str
+    is_more_better : bool
+    error_of : callable
+        From a score to an error, 0 or more, 0 for identical sequences: what is compared and
+        interpolated on a logarithmic axis, whichever way the score goes.
+    """
+
+    name: str
+    title: str
+    unit: str
+    is_more_better: bool = False
+    error_of: Callable[[float], float] = float
+
+    def text(self, score: float | None) -> str:
+        """A score in about three digits; None and infinity are ``identical``."""
+        if score is None or math.isinf(score):
+            return "identical"
+        return f"{score:.1f}" if score >= 10.0 else f"{score:.2f}" if score >= 1.0 else f"{score:.4f}"
+
+
+class Judge(Protocol):
+    """Judges the frames of a sequence in order; made anew for each sequence."""
+
+    def judge(self, pair: Shown) -> float | None:
+        """Judge the next frame; None where there is nothing to say of it alone (a first frame)."""
+        ...
+
+    def pooled(self, values: Sequence[float | None]) -> float:
+        """One number for a sequence from what :meth:`judge` said of its frames."""
+        ...

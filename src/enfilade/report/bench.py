@@ -1,0 +1,224 @@
+"""The chart of a bench, quality over CPU time; and crops of every contestant beside the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from enfilade.codec import read_exr
+from enfilade.pixels.tone import srgb_encode
+from enfilade.records import F32
+from enfilade.report.bench_tables import score_text
+from enfilade.report.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
+
+__all__ = ["plot_bench", "plot_crops"]
+
+DPI = 130
+PANEL_IN = (5.6, 4.1)
+GREY = "#7A7A7A"
+STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and line as well as by colour
+    "traced": {"color": GREY, "marker": "o", "linestyle": "--", "label": "path tracing every frame"},
+    "denoised": {
+        "color": ORANGE,
+        "marker": "s",
+        "linestyle": "-.",
+        "label": "path tracing + Open Image Denoise",
+    },
+    "interpolated": {
+        "color": VERMILION,
+        "marker": "X",
+        "linestyle": "none",
+        "label": "keyframes + minterpolate",
+    },
+    "paper": {"color": GREEN, "marker": "^", "linestyle": ":", "label": "enfilade, paper (2000)"},
+    "decoupled": {"color": BLUE, "marker": "D", "linestyle": "-", "label": "enfilade, decoupled"},
+}
+OURS = "decoupled"
+CROP_PX = 72  # side of a crop
+SHOWN_FRAMES = 3
+SHOWN_A_FAMILY = 3  # contestants of one family among the crops: cheapest, middle, dearest
+
+
+def plot_bench(found: Mapping[str, Any], file: Path) -> Path:
+    """Draw a panel for each judge, CPU time to the right, quality upwards.
+
+    Parameters
+    ----------
+    found
+        What ``bench.json`` holds.
+    file
+        Where the PNG goes.
+    """
+    judges = found["judges"]
+    columns = 2 if len(judges) > 1 else 1
+    rows = -(-len(judges) // columns)
+    figure = Figure(figsize=(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.9), dpi=DPI, layout="constrained")
+    width, height = found["size"]
+    figure.suptitle(
+        f"{found['scene']}: {len(found['frames'])} frames of {width}x{height}",
+        fontsize=13,
+        color=INK,
+    )
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, (judge, of) in zip(axes, judges.items(), strict=False):
+        _panel(ax, found, judge, of)
+    for ax in axes[len(judges) :]:
+        ax.set_visible(False)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9.5, frameon=False)
+    return save(figure, file)
+
+
+def _panel(ax: Any, found: Mapping[str, Any], judge: str, of: Mapping[str, Any]) -> None:
+    ax.set_title(f"{of['title']}, {of['unit']}", loc="left", fontsize=11, color=INK)
+    ax.set_title("better ↑", loc="right", fontsize=9, color=INK)
+    for family, style in STYLES.items():
+        points = [
+            (c["cost"]["cpu_s"], c["scores"][judge], c)
+            for c in found["contestants"]
+            if c["family"] == family and c["scores"][judge] is not None
+        ]
+        if points:
+            _curve(ax, points, family, style)
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
+    if not of["is_more_better"]:
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_locator(NullLocator())
+        ax.invert_yaxis()
+    ax.set_xlabel("CPU time of all frames, s", fontsize=9.5, color=INK)
+    ax.grid(color="#E4E4E4", linewidth=0.7)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.tick_params(colors=INK, labelsize=8.5)
+    ax.margins(x=0.08, y=0.1)
+
+
+def _curve(
+    ax: Any, points: Sequence[tuple[float, float, Any]], family: str, style: Mapping[str, Any]
+) -> None:
+    is_ours = family == OURS
+    ax.plot(
+        [p[0] for p in points],
+        [p[1] for p in points],
+        **style,
+        linewidth=2.6 if is_ours else 1.5,
+        markersize=8 if is_ours else 6.5,
+        markeredgecolor="white",
+        markeredgewidth=0.8,
+        zorder=4 if is_ours else 3,
+    )
+    for cpu_s, score, contestant in points:
+        ax.annotate(
+            _short(contestant),
+            (cpu_s, score),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha="center",
+            fontsize=7,
+            color=style["color"],
+            zorder=5,
+        )
+
+
+def _short(contestant: Mapping[str, Any]) -> str:
+    """What tells a point from its neighbours on the curve: paths a pixel, or the end of its name."""
+    if contestant["family"] in (OURS, "paper"):
+        return str(contestant["name"]).rpartition("-")[2]
+    return str(contestant["spp"])
+
+
+def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
+    """Put crops of the contestants beside those of the reference, where they differ most.
+
+    Parameters
+    ----------
+    found
+        What ``bench.json`` holds.
+    folder
+        Of the bench.
+    file
+        Where the PNG goes.
+
+    Notes
+    -----
+    Two rows for each of up to three frames: the crop, and four times its difference to the reference
+    around mid-grey.
+    """
+    shown = _selected(found["contestants"])
+    numbers = found["frames"]
+    frames = sorted(
+        {numbers[round((i + 0.5) * len(numbers) / SHOWN_FRAMES - 0.5)] for i in range(SHOWN_FRAMES)}
+    )
+    columns = ["reference", *shown]
+    figure = Figure(figsize=(1.25 * len(columns), 1.3 * 2 * len(frames) + 0.4), dpi=DPI, layout="constrained")
+    axes = figure.subplots(2 * len(frames), len(columns), squeeze=False)
+    for ax in axes.ravel():
+        ax.set_axis_off()
+    for row, number in enumerate(frames):
+        references = {
+            name: _shown(folder / "references" / name, number) for name in found["reference"]["filters"]
+        }
+        images = {c["name"]: _shown(folder / "contestants" / c["name"], number) for c in shown.values()}
+        against = {c["name"]: references[c["pixel_filter"]] for c in shown.values()}
+        place = _most_different(images, against)
+        reference = references.get("gaussian", next(iter(references.values()), None))
+        if reference is None:
+            continue
+        axes[2 * row, 0].imshow(reference[place], interpolation="nearest")
+        axes[2 * row, 0].text(2, 8, f"frame {number}", color="white", fontsize=7)
+        for column, name in enumerate(shown, start=1):
+            axes[2 * row, column].imshow(images[name][place], interpolation="nearest")
+            off = 0.5 + 4.0 * (images[name][place] - against[name][place])
+            axes[2 * row + 1, column].imshow(np.clip(off, 0.0, 1.0), interpolation="nearest")
+    first = next(iter(found["judges"]), None)
+    for column, name in enumerate(columns):
+        text = name if not column or first is None else f"{name}\n{score_text(shown[name]['scores'][first])}"
+        axes[0, column].set_title(text, fontsize=7, color=INK)
+    return save(figure, file)
+
+
+def _selected(contestants: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    chosen: dict[str, Mapping[str, Any]] = {}
+    for family in STYLES:
+        members = [c for c in contestants if c["family"] == family]
+        count = min(SHOWN_A_FAMILY, len(members))
+        for index in range(count):
+            one = members[round(index * (len(members) - 1) / max(count - 1, 1))]
+            chosen[one["name"]] = one
+    return chosen
+
+
+def _shown(folder: Path, number: int) -> F32:
+    sign = "-" if number < 0 else ""
+    linear = read_exr(folder / "frames" / f"{sign}{abs(number):04d}.exr")["RGB"].astype(np.float32)
+    return srgb_encode(np.clip(linear, 0.0, 1.0)).astype(np.float32)
+
+
+def _most_different(images: Mapping[str, F32], against: Mapping[str, F32]) -> tuple[slice, slice]:
+    """The square where the contestants together are farthest from their references."""
+    first = next(iter(against.values()), None)
+    if first is None:
+        return slice(0, CROP_PX), slice(0, CROP_PX)
+    height, width = first.shape[:2]
+    # Each contestant counts by where it errs, not by how much: the worst one would else decide alone.
+    total = np.zeros((height, width))
+    for name, image in images.items():
+        error = np.square(image - against[name]).sum(axis=-1)
+        total += error / max(float(error.mean()), 1e-12)
+    side_y, side_x = min(CROP_PX, height), min(CROP_PX, width)
+    sums = np.pad(total.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    inside: npt.NDArray[np.float64] = (
+        sums[side_y:, side_x:] - sums[:-side_y, side_x:] - sums[side_y:, :-side_x] + sums[:-side_y, :-side_x]
+    )
+    top, left = np.unravel_index(int(inside.argmax()), inside.shape)
+    return slice(int(top), int(top) + side_y), slice(int(left), int(left) + side_x)

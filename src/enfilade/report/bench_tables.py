@@ -1,0 +1,87 @@
+"""Tables of a bench, for a terminal: who took part, and CPU time at equal quality."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from enfilade.report.tables import seconds
+
+SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ "}
+
+
+def bench_tables(found: Mapping[str, Any]) -> list[Table]:
+    """Contestants with cost and scores; then the ratios, where there are any.
+
+    Parameters
+    ----------
+    found
+        What ``bench.json`` holds.
+    """
+    return [_contestants(found), *_ratios(found)]
+
+
+def _contestants(found: Mapping[str, Any]) -> Table:
+    width, height = found["size"]
+    judges = found["judges"]
+    table = _table(f"{found['scene']}, {len(found['frames'])} frames of {width}x{height}", "contestant")
+    for heading in ("CPU", "wall", "MiB", *(f"{of['title']}, {of['unit']}" for of in judges.values())):
+        table.add_column(heading, justify="right")
+    family = None
+    for row in found["contestants"]:
+        if family not in (None, row["family"]):
+            table.add_section()
+        family = row["family"]
+        cost = row["cost"]
+        cells = [seconds(cost["cpu_s"]), seconds(cost["wall_s"]), f"{cost['peak_mib']:.0f}"]
+        table.add_row(row["name"], *cells, *(score_text(row["scores"][judge]) for judge in judges))
+    filters = " and ".join(found["reference"]["filters"])
+    table.caption = f"against references of {found['reference']['spp']} paths a pixel, filter {filters}"
+    return table
+
+
+def _ratios(found: Mapping[str, Any]) -> list[Table]:
+    verdict, judges = found["verdict"], found["judges"]
+    tables = []
+    if verdict["traced"] or verdict["denoised"]:
+        table = _table(
+            "decoupled: times less CPU at equal quality", "than", *(of["title"] for of in judges.values())
+        )
+        for rival, by_judge in verdict["traced"].items():
+            table.add_row(rival, *(ratio_text(by_judge[judge]) for judge in judges))
+        if denoised := verdict["denoised"]:
+            table.add_section()
+            table.add_row("denoised", *(ratio_text(denoised["by_judge"][judge]) for judge in judges))
+            table.caption = f"denoised: geometric mean over the judges {denoised['geometric_mean']:.2f}"
+        tables.append(table)
+    if verdict["paper"]:
+        table = _table("better than the paper's method by every judge, at less cost", "paper")
+        table.add_column("ours")
+        for rival, names in verdict["paper"].items():
+            table.add_row(rival, ", ".join(names) or "none")
+        tables.append(table)
+    return tables
+
+
+def ratio_text(ratio: Mapping[str, Any]) -> str:
+    """A ratio for people: ``≥ 3.12``."""
+    times = ratio["times"]
+    return SIGNS[ratio["kind"]] + (f"{times:.2f}" if times < 10.0 else f"{times:.1f}")
+
+
+def score_text(score: float | None) -> str:
+    """A score in about three digits."""
+    if score is None:
+        return "identical"
+    return f"{score:.1f}" if score >= 10.0 else f"{score:.2f}" if score >= 1.0 else f"{score:.4f}"
+
+
+def _table(title: str, first: str, *others: str) -> Table:
+    table = Table(title=title, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column(first, no_wrap=True)
+    for name in others:
+        table.add_column(name, justify="right")
+    return table

@@ -1,0 +1,119 @@
+"""Noise-free guides of a denoiser: albedo and normal of each pixel, seen in mirrors and through glass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import PCG32, Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.camera import Camera
+from enfilade.pixels.random import streams
+from enfilade.pixels.rays import pinhole_directions
+from enfilade.records import F32, SurfaceClass
+from enfilade.renderer import LightRenderer, Lit, Purpose, Rays, Renderer
+
+SIDE = 4  # strata along each side of a pixel: 16 rays
+BOUNCES = 6  # off mirrors and through glass, before the chain counts as it is
+DELTA = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+
+
+def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: int) -> tuple[F32, F32]:
+    """Find what guides a denoiser, filtered by a box as its colours are.
+
+    Parameters
+    ----------
+    renderer
+        One that can be asked for lobes (:class:`LightRenderer`) is followed through mirrors and glass, as
+        Open Image Denoise recommends; of another, the first surface counts.
+    camera, seed, frame
+        Of the image; what the random numbers depend on.
+    chunk
+        Rays in flight at once; changes no result.
+
+    Returns
+    -------
+    albedo : (H, W, 3) float32
+        Diffuse reflectance plus, where a surface shines, that of its lobe; times what mirrors and glass
+        before it leave. 0..1; 0 where nothing is seen.
+    normal : (H, W, 3) float32
+        Of the surface where the chain ends, in the world, not of unit length where several meet.
+    """
+    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    step = max(chunk // SIDE**2, 1)
+    random = {"seed": seed, "frame": frame, "purpose": int(Purpose.GUIDE)}
+    parts = [_of_pixels(renderer, camera, pixels[i : i + step], random) for i in range(0, len(pixels), step)]
+    found = np.concatenate(parts, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
+    albedo = np.clip(found[..., :3], 0.0, 1.0)
+    return np.ascontiguousarray(albedo), np.ascontiguousarray(found[..., 3:])
+
+
+def _of_pixels(
+    renderer: Renderer, camera: Camera, pixels: npt.NDArray[np.uint32], random: dict[str, int]
+) -> npt.NDArray[np.float32]:
+    # One ray in each of the strata of each pixel, neighbouring lanes.
+    count = SIDE * SIDE
+    lane = dr.arange(UInt, len(pixels) * count)
+    slot = lane // count
+    stratum = lane - slot * count
+    pixel = dr.gather(UInt, lanes(pixels), slot)
+    rng = streams(pixel, stratum, **random)
+    row = pixel // opaque(camera.width)
+    inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
+    at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE
+    direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
+    rays = Rays(origin=vector3(camera.eye), direction=direction)
+
+    albedo, normal = (
+        _followed(renderer, rays, rng) if isinstance(renderer, LightRenderer) else _first(renderer, rays)
+    )
+    dr.eval(albedo, normal)
+    sums = [np.array(dr.block_sum(v, count)) for v in (*albedo, *normal)]
+    return np.asarray(np.stack(sums) / count, np.float32)
+
+
+def _first(renderer: Renderer, rays: Rays) -> tuple[Any, Any]:
+    seen = renderer.surfaces(rays)
+    return Array3f(dr.select(seen.is_hit, seen.albedo, 0)), Array3f(dr.select(seen.is_hit, seen.normal, 0))
+
+
+def _followed(renderer: LightRenderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
+    lit = renderer.lit(rays)
+    count = dr.width(rng.state)
+    lane, throughput = dr.arange(UInt, count), dr.full(Array3f, 1, count)
+    albedo, normal = dr.zeros(Array3f, count), dr.zeros(Array3f, count)
+    for _ in range(BOUNCES):
+        # What the chain shows: its last surface's normal, and the albedo on the way.
+        seen = lit.surfaces
+        _add(albedo, lane, dr.select(seen.is_hit, throughput * seen.albedo, 0))
+        for target, value in zip(normal, dr.select(seen.is_hit, seen.normal, 0), strict=True):
+            dr.scatter(target, value, lane)
+        dr.eval(albedo, normal, lit, rng)
+
+        # Lobes: those that are not sharp add their reflectance and end the chain.
+        going: Any = dr.compress(lit.has_lobe & seen.is_hit)
+        if len(going) == 0:
+            break
+        lane, throughput = dr.gather(UInt, lane, going), dr.gather(Array3f, throughput, going)
+        lit, rng = dr.gather(Lit, lit, going), dr.gather(PCG32, rng, going)
+        scattered = renderer.scatter(lit, rng)
+        throughput = dr.select(scattered.is_alive, throughput * scattered.throughput, 0)
+        surface = lit.surfaces.surface
+        is_sharp = scattered.is_alive & ((surface == int(DELTA[0])) | (surface == int(DELTA[1])))
+        _add(albedo, lane, dr.select(is_sharp, 0, throughput))
+        dr.eval(scattered.rays, throughput, is_sharp, rng)
+        following: Any = dr.compress(is_sharp)
+        if len(following) == 0:
+            break
+        lane, throughput = dr.gather(UInt, lane, following), dr.gather(Array3f, throughput, following)
+        rng = dr.gather(PCG32, rng, following)
+        lit = renderer.lit(dr.gather(Rays, scattered.rays, following))
+    return albedo, normal
+
+
+def _add(total: Any, lane: Any, value: Any) -> None:
+    for target, part in zip(total, value, strict=True):
+        dr.scatter_add(target, Float(part), lane)
+    dr.eval(total)

@@ -1,0 +1,94 @@
+"""A contestant's frames before the judges, beside those of its reference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.codec import read_exr
+from enfilade.judges import SCALES, Shown, open_judge, seen_before, shown
+from enfilade.metric import Pursuit
+from enfilade.monitor import Monitor
+from enfilade.pipeline.job import Job
+from enfilade.records import F32, Flow
+
+__all__ = ["judge", "pairs"]
+
+
+def judge(test: Path, reference: Path, job: Job, names: Sequence[str], monitor: Monitor) -> dict[str, Any]:
+    """Let judges look at two run folders, each frame read once.
+
+    Parameters
+    ----------
+    test, reference
+        Run folders; the frames of the reference carry layers.
+    job
+        Their path, and the viewing conditions.
+    names
+        Of judges.
+    monitor
+        Is told of each frame.
+
+    Returns
+    -------
+    dict
+        By judge: ``score`` and ``per_frame``, None where a judge has no number (identical; a first frame).
+    """
+    pursuit = Pursuit(job.settings.metric.metering.value)
+    judges = {name: open_judge(name, job.viewing, pursuit=pursuit) for name in names}
+    values: dict[str, list[float | None]] = {name: [] for name in names}
+    for pair in pairs(test, reference, job):
+        for name, one in judges.items():
+            values[name].append(one.judge(pair))
+        monitor.advance()
+    return {
+        name: {
+            "score": _finite(judges[name].pooled(values[name])),
+            "per_frame": [None if value is None else _finite(value) for value in values[name]],
+        }
+        for name in names
+    }
+
+
+def error_of(name: str, score: float | None) -> float:
+    """Error of a score as :func:`judge` gives it: identical sequences have none."""
+    return 0.0 if score is None else SCALES[name].error_of(score)
+
+
+def pairs(test: Path, reference: Path, job: Job) -> Iterator[Shown]:
+    """Frames of two run folders side by side, in order."""
+    path = job.path
+    exposure_ev = job.settings.viewing.exposure_ev
+    last: dict[str, Any] | None = None
+    for frame, number in enumerate(path.numbers):
+        layers = read_exr(_file(reference, number))
+        before, after = path.neighbours(frame)
+        flow = Flow(layers["backward"], layers["forward"], before is not None, after is not None)
+        seen = seen_before(layers, last) if last is not None and before is not None else None
+        color = read_exr(_file(test, number))["RGB"]
+        yield shown(
+            _f32(color),
+            _f32(layers["RGB"]),
+            job.viewing,
+            exposure_ev=exposure_ev,
+            flow=flow,
+            seen_before=seen,
+        )
+        last = layers
+
+
+def _f32(values: Any) -> F32:
+    return np.ascontiguousarray(values, np.float32)
+
+
+def _file(folder: Path, number: int) -> Path:
+    sign = "-" if number < 0 else ""
+    return folder / "frames" / f"{sign}{abs(number):04d}.exr"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
