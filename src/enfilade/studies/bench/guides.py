@@ -8,16 +8,16 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera import Camera
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import pinhole_directions
-from enfilade.records import F32, SurfaceClass
-from enfilade.renderer import LightRenderer, Lit, Purpose, Rays, Renderer
+from enfilade.records import F32, SPECULAR, SurfaceClass
+from enfilade.renderer import LightRenderer, Purpose, Rays, Renderer, Surfaces
 
 SIDE = 4  # strata along each side of a pixel: 16 rays
 BOUNCES = 6  # off mirrors and through glass, before the chain counts as it is
-DELTA = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
 
 def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: int) -> tuple[F32, F32]:
@@ -66,51 +66,63 @@ def _of_pixels(
     direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
     rays = Rays(origin=vector3(camera.eye), direction=direction)
 
-    albedo, normal = (
-        _followed(renderer, rays, rng) if isinstance(renderer, LightRenderer) else _first(renderer, rays)
-    )
+    albedo, normal = _followed(renderer, rays, rng)
     dr.eval(albedo, normal)
     sums = [np.array(dr.block_sum(v, count)) for v in (*albedo, *normal)]
     return np.asarray(np.stack(sums) / count, np.float32)
 
 
-def _first(renderer: Renderer, rays: Rays) -> tuple[Any, Any]:
-    seen = renderer.surfaces(rays)
+def _first(seen: Surfaces) -> tuple[Any, Any]:
     return Array3f(dr.select(seen.is_hit, seen.albedo, 0)), Array3f(dr.select(seen.is_hit, seen.normal, 0))
 
 
-def _followed(renderer: LightRenderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
-    lit = renderer.lit(rays)
-    count = dr.width(rng.state)
-    lane, throughput = dr.arange(UInt, count), dr.full(Array3f, 1, count)
-    albedo, normal = dr.zeros(Array3f, count), dr.zeros(Array3f, count)
-    for _ in range(BOUNCES):
-        # What the chain shows: its last surface's normal, and the albedo on the way.
-        seen = lit.surfaces
-        _add(albedo, lane, dr.select(seen.is_hit, throughput * seen.albedo, 0))
-        for target, value in zip(normal, dr.select(seen.is_hit, seen.normal, 0), strict=True):
-            dr.scatter(target, value, lane)
-        dr.eval(albedo, normal, lit, rng)
-
-        # Lobes: those that are not sharp add their reflectance and end the chain.
-        going: Any = dr.compress(lit.has_lobe & seen.is_hit)
-        if len(going) == 0:
-            break
-        lane, throughput = dr.gather(UInt, lane, going), dr.gather(Array3f, throughput, going)
-        lit, rng = dr.gather(Lit, lit, going), dr.gather(PCG32, rng, going)
+def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
+    # What the pixel itself shows.
+    seen = renderer.surfaces(rays)
+    albedo, normal = _first(seen)
+    shines = _is_one_of(seen, SPECULAR)
+    dr.eval(albedo, normal, shines, rng)
+    lane: Any = dr.compress(shines)
+    if not isinstance(renderer, LightRenderer) or len(lane) == 0:
+        return albedo, normal
+    rays, rng = dr.gather(Rays, rays, lane), dr.gather(PCG32, rng, lane)
+    throughput = dr.full(Array3f, 1, len(lane))
+    for bounce in range(BOUNCES):
+        lit = renderer.lit(rays)
         scattered = renderer.scatter(lit, rng)
         throughput = dr.select(scattered.is_alive, throughput * scattered.throughput, 0)
-        surface = lit.surfaces.surface
-        is_sharp = scattered.is_alive & ((surface == int(DELTA[0])) | (surface == int(DELTA[1])))
+
+        # A lobe that is not sharp adds its reflectance and ends the chain.
+        is_sharp = scattered.is_alive & _is_one_of(lit.surfaces, SHARP) & (bounce < BOUNCES - 1)
         _add(albedo, lane, dr.select(is_sharp, 0, throughput))
         dr.eval(scattered.rays, throughput, is_sharp, rng)
-        following: Any = dr.compress(is_sharp)
-        if len(following) == 0:
+        going: Any = dr.compress(is_sharp)
+        if len(going) == 0:
             break
-        lane, throughput = dr.gather(UInt, lane, following), dr.gather(Array3f, throughput, following)
-        rng = dr.gather(PCG32, rng, following)
-        lit = renderer.lit(dr.gather(Rays, scattered.rays, following))
+        lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
+        rays, throughput = dr.gather(Rays, scattered.rays, going), dr.gather(Array3f, throughput, going)
+
+        # A sharp one shows what is behind.
+        seen = renderer.surfaces(rays)
+        behind, turned = _first(seen)
+        shines = _is_one_of(seen, SPECULAR)
+        _add(albedo, lane, throughput * behind)
+        for target, value in zip(normal, turned, strict=True):
+            dr.scatter(target, value, lane)
+        dr.eval(normal, shines, rays, throughput, rng)
+        going = dr.compress(shines)
+        if len(going) == 0:
+            break
+        lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
+        rays, throughput = dr.gather(Rays, rays, going), dr.gather(Array3f, throughput, going)
     return albedo, normal
+
+
+def _is_one_of(seen: Surfaces, classes: tuple[SurfaceClass, ...]) -> Any:
+    found = Bool(False)
+    for one in classes:
+        found |= seen.surface == int(one)
+    return found & seen.is_hit
 
 
 def _add(total: Any, lane: Any, value: Any) -> None:

@@ -1,0 +1,37 @@
+"""Frames for judges: a picture, its copies with errors, and flow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from enfilade.judges import Shown, shown
+from enfilade.pixels.tone import srgb_decode
+from enfilade.records import Flow
+from enfilade.viewing import Viewing
+
+HEIGHT, WIDTH = 48, 64
+VIEWING = Viewing(WIDTH, HEIGHT, diagonal_m=0.025)  # 28 pixels per degree
+
+
+def picture(shift: float = 0.0) -> np.ndarray:
+    """Waves that move to the right, sRGB-encoded (H, W, 3), 0.3..0.7."""
+    x = np.arange(WIDTH) - shift
+    y = np.arange(HEIGHT)[:, None]
+    waves = 0.5 + 0.1 * np.sin(x / 4.0) + 0.1 * np.sin(y / 5.0)
+    return np.repeat(waves[..., None], 3, axis=2).astype(np.float32)
+
+
+def noise(seed: int, size: float) -> np.ndarray:
+    return (size * np.random.default_rng(seed).standard_normal((HEIGHT, WIDTH, 3))).astype(np.float32)
+
+
+def pair(test: np.ndarray, reference: np.ndarray, *, shift: float = 0.0, is_first: bool = False) -> Shown:
+    """Encoded images as a judge sees them; the surfaces move by `shift` pixels a frame."""
+    backward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+    backward[..., 0] = -shift
+    x = np.broadcast_to(np.arange(WIDTH) - shift, (HEIGHT, WIDTH))
+    seen = (x >= 0.0) & (x <= WIDTH - 1)
+    flow = Flow(np.zeros_like(backward) if is_first else backward, -backward, not is_first, True)
+    return shown(
+        srgb_decode(test), srgb_decode(reference), VIEWING, flow=flow, seen_before=None if is_first else seen
+    )
