@@ -1,6 +1,7 @@
 # make demo    set up, render a small walkthrough into runs/demo
 # make test    set up, run the tests
 # make validate-metric   set up, judge the metric by what people saw
+# make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
 # make check   set up, run format, lint, type and import-floor checks
 # make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
 # make lock    write requirements.lock anew from pyproject.toml
@@ -10,7 +11,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python libraries demo test validate-metric check format lock clean
+.PHONY: help setup python libraries demo test validate-metric bench check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -35,6 +36,9 @@ test: setup
 
 validate-metric: setup
 	$(BIN)/enfilade validate $(VALIDATE)
+
+bench: setup
+	$(BIN)/python benchmarks/bench.py $(BENCH)
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -89,7 +89,7 @@ def test_more_paths_are_judged_better_and_the_box_has_its_own_reference(held):
 def test_references_draw_other_random_numbers_than_contestants(held):
     _, _, folder, *_ = held
     runs = [json.loads((folder / place / "run.json").read_text()) for place in
-            ("references/gaussian", "contestants/traced-4")]  # fmt: skip
+            ("references/reference-gaussian", "contestants/traced-4")]  # fmt: skip
     assert runs[0]["identity"]["trace"]["seed"] != runs[1]["identity"]["trace"]["seed"]
 
 

@@ -11,7 +11,7 @@ import click
 
 from enfilade.cli.flags import SettingsCommand, settings_of, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import Size, output_options
+from enfilade.cli.inputs import Size, json_option, quiet_option
 from enfilade.device import Choice, activate
 
 if TYPE_CHECKING:
@@ -109,7 +109,15 @@ class Counts(click.ParamType[tuple[int, ...]]):
     required=True,
     help="The bench's folder; the same command goes on with what is there.",
 )
-@output_options
+@click.option(
+    "--reference-device",
+    type=click.Choice(("auto", "cpu", "gpu")),
+    default="auto",
+    show_default=True,
+    help="Run the references on the GPU where there is one, or say on what; contestants run on the CPU.",
+)
+@json_option
+@quiet_option
 @debug_option
 @settings_options(*SECTIONS)
 @click.pass_context
@@ -122,7 +130,7 @@ def command(
     only: tuple[str, ...],
     redo: tuple[str, ...],
     judges: tuple[str, ...],
-    device: Choice,
+    reference_device: Choice,
     as_json: bool,
     quiet: bool,
     **inputs: Any,
@@ -135,7 +143,7 @@ def command(
     crops.png.
     """
     mark_resumable(ctx)
-    activate(device)
+    activate("cpu")
     job, everybody = _entries(ctx, **inputs)
     from enfilade.cli.progress import watch
     from enfilade.studies.bench.bench import Terms, bench, forecast_s
@@ -143,7 +151,7 @@ def command(
 
     takes_part = chosen(everybody, only)
     again = tuple(c.name for c in chosen(everybody, redo)) if redo else ()
-    terms = Terms(reference_spp, judges, again, device)
+    terms = Terms(reference_spp, judges, again, reference_device)
     with watch(quiet=quiet) as monitor:
         minutes = forecast_s(job, takes_part, terms, len(os.sched_getaffinity(0))) / 60.0
         monitor.say(f"{len(takes_part)} contestants; some {minutes:.0f} minutes of tracing when begun anew")

@@ -166,7 +166,8 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
         ax.set_axis_off()
     for row, number in enumerate(frames):
         references = {
-            name: _shown(folder / "references" / name, number) for name in found["reference"]["filters"]
+            name: _shown(folder / "references" / f"reference-{name}", number)
+            for name in found["reference"]["filters"]
         }
         images = {c["name"]: _shown(folder / "contestants" / c["name"], number) for c in shown.values()}
         against = {c["name"]: references[c["pixel_filter"]] for c in shown.values()}

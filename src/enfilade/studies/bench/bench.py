@@ -3,7 +3,7 @@
 ::
 
     run.json  ledger.jsonl       what is compared; what is finished
-    references/gaussian/  box/   run folders, with layers
+    references/reference-gaussian/  reference-box/   run folders, with layers
     contestants/NAME/            a run folder each
     spent/NAME/0000.json         what each session of a contestant has spent
     bench.json  bench.png  crops.png
@@ -56,14 +56,14 @@ class Terms:
         Names; empty: all that can be had here.
     redo : tuple of str
         Names of contestants to begin anew.
-    device
-        For kernels.
+    reference_device
+        For the kernels of references, whose cost is nobody's concern. Contestants run on the CPU.
     """
 
     reference_spp: int
     judges: tuple[str, ...] = ()
     redo: tuple[str, ...] = ()
-    device: Choice = "auto"
+    reference_device: Choice = "auto"
 
 
 def bench(
@@ -142,7 +142,7 @@ def bench(
 
 
 def forecast_s(job: Job, contestants: Sequence[Contestant], terms: Terms, cores: int) -> float:
-    """Roughly how long a bench takes that begins anew, wall seconds: by its paths alone, at 1 us each."""
+    """Roughly how long a bench takes that begins anew on CPUs, wall seconds: by its paths alone."""
     pixels = job.path.width * job.path.height * len(job.path)
     filters = len({c.pixel_filter for c in contestants})
     spp = terms.reference_spp * filters + sum(
@@ -165,10 +165,12 @@ class _Race:
         seed = (trace.seed + 1) % 2**32
         settings = replace(self._job.settings, trace=replace(trace, spp=self._terms.reference_spp, seed=seed))
         job = replace(self._job, method="reference", settings=settings)
-        name = pixel_filter.name.lower()
         task = EveryFrame(job, pixel_filter, has_layers=True)
-        folder = self._run.folder / "references" / name
-        return self._rendered(f"reference {name}", task, folder, f"reference-{name}", {})
+        folder = self._reference_folder(pixel_filter)
+        return self._rendered(folder.name, task, folder, {}, self._terms.reference_device)
+
+    def _reference_folder(self, pixel_filter: PixelFilter) -> Path:
+        return self._run.folder / "references" / f"reference-{pixel_filter.name.lower()}"
 
     def contestant(self, one: Contestant, judges: Sequence[str]) -> dict[str, Any]:
         """Render and judge a contestant: its row of the result."""
@@ -179,7 +181,7 @@ class _Race:
                 f"{folder} was made with other settings ({', '.join(changed)}): begin it anew with "
                 f"--redo {one.name}, or give the preset another name"
             )
-        cost = self._rendered(unit, one.task(), folder, one.name, one.setting())
+        cost = self._rendered(unit, one.task(), folder, one.setting(), "cpu")
         verdicts = self._judged(one, folder, judges)
         return {
             "name": one.name,
@@ -200,14 +202,14 @@ class _Race:
         shutil.rmtree(self._run.folder / "spent" / name, ignore_errors=True)
 
     def _rendered(
-        self, unit: str, task: Any, folder: Path, name: str, setting: dict[str, Any]
+        self, unit: str, task: Any, folder: Path, setting: dict[str, Any], device: Choice
     ) -> dict[str, Any]:
         line = self._run.done(unit)
         if line is not None and (folder / "ledger.jsonl").is_file():
             cost: dict[str, Any] = line["cost"]
             return cost
-        notes = self._run.folder / "spent" / name
-        spent = race(task, folder, notes, _Named(self._monitor, name), device=self._terms.device)
+        notes = self._run.folder / "spent" / folder.name
+        spent = race(task, folder, notes, _Named(self._monitor, folder.name), device=device)
         self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting})
         return spent.to_dict()
 
@@ -218,7 +220,7 @@ class _Race:
         missing = [name for name in judges if name not in found]
         if missing:
             self._monitor.stage(f"{one.name}: judges", len(self._job.path))
-            reference = self._run.folder / "references" / one.pixel_filter.name.lower()
+            reference = self._reference_folder(one.pixel_filter)
             for name, said in judge(folder, reference, self._job, missing, self._monitor).items():
                 self._run.finish(
                     f"verdict {one.name} {name}", files=[], facts={"verdict": said, "made": made}

@@ -81,7 +81,7 @@ class Spent:
         return cls(stages, round(table["peak_mib"] * 2**20), table["sessions"])
 
 
-def race(task: Any, folder: Path, notes: Path, monitor: Monitor, *, device: Choice = "auto") -> Spent:
+def race(task: Any, folder: Path, notes: Path, monitor: Monitor, *, device: Choice = "cpu") -> Spent:
     """Let a contestant do its task, or go on with it, in a new process.
 
     Parameters

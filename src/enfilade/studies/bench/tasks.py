@@ -23,7 +23,7 @@ from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import initial_segments, survey_path
 from enfilade.pipeline.views import Views
-from enfilade.pipeline.walkthrough import render
+from enfilade.pixels.estimate import PASS
 from enfilade.records import F32, CameraPath, Source
 from enfilade.renderer import PixelFilter, Purpose, Renderer
 from enfilade.store import Run
@@ -70,8 +70,9 @@ class EveryFrame:
     has_layers: bool = False
 
     def warm_up(self) -> None:
-        """Make a few frames."""
-        _warm(lambda job, folder: replace(self, job=job).run(folder, Silence()), self.job)
+        """Make a few frames; none of a reference, whose cost is nobody's concern."""
+        if not self.has_layers:
+            _warm(lambda job, folder: replace(self, job=job).run(folder, Silence()), self.job)
 
     def run(self, folder: Path, monitor: Monitor) -> None:
         """Make the frames that the folder does not hold."""
@@ -190,10 +191,12 @@ class Own:
 
     def warm_up(self) -> None:
         """Render a few frames."""
-        _warm(lambda job, folder: render(job, folder, Silence()), self.job)
+        _warm(lambda job, folder: Own(job).run(folder, Silence()), self.job)
 
     def run(self, folder: Path, monitor: Monitor) -> None:
         """Render the walkthrough."""
+        from enfilade.pipeline.walkthrough import render
+
         render(self.job, folder, monitor)
 
 
@@ -207,8 +210,10 @@ def part_of(path: CameraPath, frames: list[int]) -> CameraPath:
 def _warm(work: Any, job: Job) -> None:
     count = min(WARM_FRAMES, len(job.path))
     frames = sorted({round(i * (len(job.path) - 1) / max(count - 1, 1)) for i in range(count)})
+    trace = replace(job.settings.trace, spp=min(job.settings.trace.spp, PASS))  # more make no other kernel
+    small = replace(job, path=part_of(job.path, frames), settings=replace(job.settings, trace=trace))
     with tempfile.TemporaryDirectory(prefix="enfilade-") as folder:
-        work(replace(job, path=part_of(job.path, frames)), Path(folder) / "run")
+        work(small, Path(folder) / "run")
 
 
 def _between(keyframes: Mapping[int, F32], shot: range, fps: Any) -> Iterator[tuple[int, F32]]:
