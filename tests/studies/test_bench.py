@@ -11,13 +11,14 @@ from enfilade.denoise import why_no_denoiser
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.judges import JUDGES, why_missing
 from enfilade.monitor import Silence
-from enfilade.report.bench import plot_bench, plot_crops
+from enfilade.report.bench import plot_bench, plot_crops, write_differences
 from enfilade.report.bench_tables import bench_tables
 from enfilade.report.tables import as_text
 from enfilade.studies.bench import bench as module
 from enfilade.studies.bench.bench import Terms, bench
 from enfilade.studies.bench.contestants import Preset, chosen, lineup, read_presets
 from enfilade.studies.bench.race import Spent
+from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
 from small_runs import job_of
 
@@ -144,6 +145,9 @@ def test_the_pictures_and_tables(held, tmp_path):
         plot_crops(found, folder, tmp_path / "crops.png"),
     ):
         assert file.read_bytes().startswith(b"\x89PNG")
+    videos = [open_sequence(file) for file in write_differences(found, folder)]
+    assert len(videos) == len(found["contestants"])
+    assert all((len(video), video.width, video.height) == (5, 128, 48) for video in videos)
     text = "".join(as_text(table) for table in bench_tables(found))
     for row in found["contestants"]:
         assert row["name"] in text

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from enfilade.pipeline.job import Job
     from enfilade.studies.bench.contestants import Contestant
 
+JOB_INPUTS = ("scene", "path_file", "size", "frames", "fps")
 SECTIONS = ("viewing", "metric", "keyframes", "warp", "masks", "antialias", "light")
 JUDGES = ("aqm", "flip", "psnr", "temporal")  # `judges.JUDGES`, which --help can't ask: it would load NumPy
 
@@ -116,6 +117,9 @@ class Counts(click.ParamType[tuple[int, ...]]):
     show_default=True,
     help="Run the references on the GPU where there is one, or say on what; contestants run on the CPU.",
 )
+@click.option(
+    "--differences", is_flag=True, help="Encode a video of each contestant beside its differences, too."
+)
 @json_option
 @quiet_option
 @debug_option
@@ -127,10 +131,9 @@ def command(
     *,
     folder: Path,
     reference_spp: int,
-    only: tuple[str, ...],
-    redo: tuple[str, ...],
     judges: tuple[str, ...],
     reference_device: Choice,
+    differences: bool,
     as_json: bool,
     quiet: bool,
     **inputs: Any,
@@ -144,30 +147,26 @@ def command(
     """
     mark_resumable(ctx)
     activate("cpu")
-    job, everybody = _entries(ctx, **inputs)
+    job = _job(ctx, **{name: inputs.pop(name) for name in JOB_INPUTS})
+    takes_part, again = _lineup(job, **inputs)
     from enfilade.cli.progress import watch
     from enfilade.studies.bench.bench import Terms, bench, forecast_s
-    from enfilade.studies.bench.contestants import chosen
 
-    takes_part = chosen(everybody, only)
-    again = tuple(c.name for c in chosen(everybody, redo)) if redo else ()
     terms = Terms(reference_spp, judges, again, reference_device)
     with watch(quiet=quiet) as monitor:
         minutes = forecast_s(job, takes_part, terms, len(os.sched_getaffinity(0))) / 60.0
         monitor.say(f"{len(takes_part)} contestants; some {minutes:.0f} minutes of tracing when begun anew")
         found = bench(job, takes_part, terms, folder, monitor)
-    from enfilade.report.bench import plot_bench, plot_crops
-
-    plots = [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png")]
+    plots = _drawn(found, folder, differences=differences)
     if as_json:
         click.echo(json.dumps(found, indent=2))
         return
     _show(found)
-    for name, file in (("result", folder / "bench.json"), *(("plot", plot) for plot in plots)):
+    for name, file in (("result", folder / "bench.json"), *((_kind(plot), plot) for plot in plots)):
         click.echo(f"{name:7} {file}")
 
 
-def _entries(
+def _job(
     ctx: click.Context,
     *,
     scene: Path,
@@ -175,20 +174,39 @@ def _entries(
     size: tuple[int, int] | None,
     frames: str | None,
     fps: float | None,
-    traced: tuple[int, ...],
-    denoised: tuple[int, ...],
-    presets_file: Path | None,
-) -> tuple[Job, list[Contestant]]:
+) -> Job:
     settings = settings_of(ctx)
     from enfilade.path import load_path, parse_frames
     from enfilade.pipeline.job import Job
-    from enfilade.studies.bench.contestants import PRESETS, lineup, read_presets
 
     selected = None if frames is None else parse_frames(frames)
     path = load_path(path_file, size=size, frames=selected, fps=fps)
-    job = Job(scene=scene, path=path, settings=settings, method="reference")
+    return Job(scene=scene, path=path, settings=settings, method="reference")
+
+
+def _lineup(
+    job: Job,
+    *,
+    traced: tuple[int, ...],
+    denoised: tuple[int, ...],
+    presets_file: Path | None,
+    only: tuple[str, ...],
+    redo: tuple[str, ...],
+) -> tuple[list[Contestant], tuple[str, ...]]:
+    """Who takes part, and who of them begins anew."""
+    from enfilade.studies.bench.contestants import PRESETS, chosen, lineup, read_presets
+
     presets = PRESETS if presets_file is None else read_presets(presets_file)
-    return job, lineup(job, traced=traced, denoised=denoised, presets=presets)
+    everybody = lineup(job, traced=traced, denoised=denoised, presets=presets)
+    again = tuple(c.name for c in chosen(everybody, redo)) if redo else ()
+    return chosen(everybody, only), again
+
+
+def _drawn(found: dict[str, Any], folder: Path, *, differences: bool) -> list[Path]:
+    from enfilade.report.bench import plot_bench, plot_crops, write_differences
+
+    videos = write_differences(found, folder) if differences else []
+    return [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png"), *videos]
 
 
 def _show(found: dict[str, Any]) -> None:
@@ -201,3 +219,7 @@ def _show(found: dict[str, Any]) -> None:
         console.print(table)
     for text in found["left_out"]:
         click.echo(text)
+
+
+def _kind(file: Path) -> str:
+    return "video" if file.suffix == ".mp4" else "plot"

@@ -1,8 +1,8 @@
-"""The chart of a bench, quality over CPU time; and crops of every contestant beside the reference."""
+"""The chart of a bench, quality over CPU time; crops and videos of every contestant beside the reference."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,14 @@ import numpy.typing as npt
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from enfilade.codec import read_exr
-from enfilade.pixels.tone import srgb_encode
+from enfilade.pixels.tone import srgb_decode, srgb_encode
 from enfilade.records import F32
 from enfilade.report.bench_tables import score_text
 from enfilade.report.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
+from enfilade.settings import VideoSettings
+from enfilade.video import encode_video
 
-__all__ = ["plot_bench", "plot_crops"]
+__all__ = ["plot_bench", "plot_crops", "write_differences"]
 
 DPI = 130
 PANEL_IN = (5.6, 4.1)
@@ -39,6 +41,7 @@ STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and lin
     "decoupled": {"color": BLUE, "marker": "D", "linestyle": "-", "label": "enfilade, decoupled"},
 }
 OURS = "decoupled"
+AMPLIFIED = 4.0  # how much larger differences are shown than they are
 CROP_PX = 72  # side of a crop
 SHOWN_FRAMES = 3
 SHOWN_A_FAMILY = 3  # contestants of one family among the crops: cheapest, middle, dearest
@@ -179,13 +182,52 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
         axes[2 * row, 0].text(2, 8, f"frame {number}", color="white", fontsize=7)
         for column, name in enumerate(shown, start=1):
             axes[2 * row, column].imshow(images[name][place], interpolation="nearest")
-            off = 0.5 + 4.0 * (images[name][place] - against[name][place])
-            axes[2 * row + 1, column].imshow(np.clip(off, 0.0, 1.0), interpolation="nearest")
+            off = _difference(images[name][place], against[name][place])
+            axes[2 * row + 1, column].imshow(off, interpolation="nearest")
     first = next(iter(found["judges"]), None)
     for column, name in enumerate(columns):
         text = name if not column or first is None else f"{name}\n{score_text(shown[name]['scores'][first])}"
         axes[0, column].set_title(text, fontsize=7, color=INK)
     return save(figure, file)
+
+
+def write_differences(found: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Encode a video of each contestant: its frames, and beside them four times their difference.
+
+    Parameters
+    ----------
+    found
+        What ``bench.json`` holds.
+    folder
+        Of the bench; the videos go into ``differences/`` there.
+    """
+    width, height = found["size"]
+    files = []
+    for one in found["contestants"]:
+        files.append(folder / "differences" / f"{one['name']}.mp4")
+        encode_video(
+            files[-1],
+            _side_by_side(one, found["frames"], folder),
+            fps=found["fps"],
+            width=2 * width,
+            height=height,
+            settings=VideoSettings(),
+            exposure_ev=0.0,
+        )
+    return files
+
+
+def _side_by_side(one: Mapping[str, Any], numbers: Sequence[int], folder: Path) -> Iterator[F32]:
+    for number in numbers:
+        test = _shown(folder / "contestants" / one["name"], number)
+        reference = _shown(folder / "references" / f"reference-{one['pixel_filter']}", number)
+        yield srgb_decode(np.concatenate([test, _difference(test, reference)], axis=1)).astype(np.float32)
+
+
+def _difference(test: F32, reference: F32) -> F32:
+    """Four times the difference around mid-grey, 0..1."""
+    shown = 0.5 + np.float32(AMPLIFIED) * (test - reference)
+    return np.asarray(np.clip(shown, 0.0, 1.0), np.float32)
 
 
 def _selected(contestants: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:

@@ -119,7 +119,7 @@ def bench(
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
             "machine": machine(),
             "versions": versions(),
-            "scene": job.scene.name,
+            "scene": f"{job.scene.resolve().parent.name}/{job.scene.name}",
             "size": [job.path.width, job.path.height],
             "fps": job.path.fps,
             "frames": list(job.path.numbers),
