@@ -262,6 +262,29 @@ class Keyframe:
 
 
 @dataclass(frozen=True, eq=False)
+class LightPage:
+    """The light that falls on what a frame sees.
+
+    Attributes
+    ----------
+    frame : int
+    geometry : Geometry
+    shading : Shading
+        Radiance that the diffuse lobe would send if the albedo were one; 0 where it is not known.
+    is_known : (H, W) bool
+        Pixels whose light was estimated.
+    """
+
+    frame: int
+    geometry: Geometry
+    shading: Shading
+    is_known: Mask
+
+    def __post_init__(self) -> None:
+        _check(self.is_known, self.shading.variance.shape, np.bool_, "is_known")
+
+
+@dataclass(frozen=True, eq=False)
 class Warped:
     """A keyframe, or what remains of it, seen from another camera (§2.2).
 

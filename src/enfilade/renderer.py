@@ -25,6 +25,7 @@ class Purpose(IntEnum):
     FILL = 2
     LIGHT = 3
     GATHER = 4
+    SCATTER = 5
     GUIDE = 5
 
 
@@ -103,26 +104,44 @@ class Lit:
 
 
 @dataclass(frozen=True)
+class Bounce:
+    """Where rays come from that a lobe sent: what weights the light they find, as lanes.
+
+    Attributes
+    ----------
+    position : Array3f
+        On the surface.
+    pdf : Float
+        Density of the direction, per steradian.
+    is_delta : Bool
+        Whether it was the only one possible, so that sampling lights could not have found it.
+    """
+
+    position: Any
+    pdf: Any
+    is_delta: Any
+
+
+@dataclass(frozen=True)
 class Scattered:
     """One bounce off everything but the diffuse lobe, as lanes.
 
     Attributes
     ----------
     rays : Rays
+    bounce : Bounce
     throughput : Array3f
         Of the bounce; may be negative where a lobe is what remains after the diffuse one.
     direct : Array3f
         Radiance that the lobe sends back from sampled lights.
     is_alive : Bool
-    native : Any
-        What the backend must know to weight the light that the rays find.
     """
 
     rays: Rays
+    bounce: Bounce
     throughput: Any
     direct: Any
     is_alive: Any
-    native: Any
 
 
 @dataclass(frozen=True)
@@ -200,14 +219,19 @@ class LightRenderer(Renderer, Protocol):
     the albedo, plus what ``scatter`` finds, plus the emission, is what ``trace`` converges to.
     """
 
-    def lit(self, rays: Rays, scattered: Scattered | None = None) -> Lit:
+    @property
+    def state(self) -> Any:
+        """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
+        ...
+
+    def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
         Parameters
         ----------
         rays
-        scattered
-            The bounce that the rays come from; None for camera rays.
+        bounce
+            Where the rays come from; None for camera rays.
         """
         ...
 

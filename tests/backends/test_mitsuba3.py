@@ -331,8 +331,9 @@ def test_variance_is_the_spread_over_seeds(corner):
     runs = [traced(renderer, camera, pixels, spp=16, seed=s) for s in range(40)]
     spread = np.var([r.color.astype(float) @ REC709 for r in runs], axis=0, ddof=1).mean()
     claimed = np.mean([r.variance for r in runs])
-    # Forty estimates a pixel, two hundred pixels: a few percent, more for the heavy tail of paths.
-    assert claimed == pytest.approx(spread, rel=0.15)
+    # Forty estimates a pixel, two hundred pixels: a few percent, more for the heavy tail of paths. Positions
+    # in the pixel are stratified, which the claim does not know of: it errs on the safe side.
+    assert 0.85 * spread < claimed < 1.5 * spread
 
 
 def test_one_path_has_no_variance(corner):

@@ -6,9 +6,9 @@ import pytest
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.geometry import find_geometry
-from enfilade.irradiance import LightCache, open_cache, shade
+from enfilade.irradiance import LightCache, Shader, open_cache, open_page
 from enfilade.pixels.estimate import estimate
-from enfilade.records import Keyframe, Shading
+from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import TraceSettings
 
@@ -76,12 +76,17 @@ def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2
     return estimate(
         camera,
         pixels,
-        lambda rays, rng: shade(renderer, cache, rays, rng),
+        _shade(renderer, cache),
         spp=spp,
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random={"seed": seed, "frame": 0, "purpose": int(Purpose.GATHER)},
     )
+
+
+def _shade(renderer, cache: LightCache):
+    shader = Shader(renderer)
+    return lambda rays, rng: shader.seen(cache, cache, rays, rng)[0] + shader.scattered(cache, rays, rng)
 
 
 def _traced(renderer, camera: Camera, spp: int) -> Shading:
@@ -107,15 +112,19 @@ def test_without_a_cache_every_material_keeps_its_energy(tmp_path):
 
 @pytest.fixture(scope="module")
 def diffuse(tmp_path_factory):
-    """Diffuse balls, with the light of two keyframes."""
+    """Diffuse balls, with the light of two pages."""
     renderer = _opened(
         tmp_path_factory.mktemp("diffuse"), {"one": MATERIALS["diffuse"], "two": MATERIALS["diffuse"]}
     )
-    keyframes = [_keyframe(renderer, _camera(x=x)) for x in (-0.5, 0.5)]
-    return renderer, keyframes
+    pages = [_page(renderer, _camera(x=x)) for x in (-0.5, 0.5)]
+    return renderer, pages
 
 
-def _keyframe(renderer, camera: Camera) -> Keyframe:
+def _opened_cache(pages: list[LightPage]) -> LightCache:
+    return open_cache([open_page(page) for page in pages], [1.0] * len(pages))
+
+
+def _page(renderer, camera: Camera) -> LightPage:
     light = estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
@@ -126,41 +135,38 @@ def _keyframe(renderer, camera: Camera) -> Keyframe:
         random={"seed": 3, "frame": 0, "purpose": int(Purpose.LIGHT)},
     )
     size = (camera.height, camera.width)
-    return Keyframe(
-        0,
-        find_geometry(renderer, camera),
-        Shading(light.color.reshape(*size, 3), light.variance.reshape(size)),
-    )
+    shading = Shading(light.color.reshape(*size, 3), light.variance.reshape(size))
+    return LightPage(0, find_geometry(renderer, camera), shading, np.ones(size, bool))
 
 
 def test_with_a_cache_one_sample_is_near_many_paths(diffuse):
-    renderer, keyframes = diffuse
+    renderer, pages = diffuse
     camera = _camera()
-    cached = _shaded(renderer, open_cache(keyframes, [0.5, 0.5]), camera, 1)
+    cached = _shaded(renderer, _opened_cache(pages), camera, 1)
     uncached = _shaded(renderer, LightCache(), camera, 1)
     reference = _traced(renderer, camera, 1024).color
     error, error_uncached = (np.sqrt(((c.color - reference) ** 2).mean()) for c in (cached, uncached))
-    # The light of 512 paths, for one camera ray; what remains are edges of shadows and what no keyframe saw.
+    # The light of 512 paths, for one camera ray; what remains are edges of shadows and what no page saw.
     assert error < 0.25 * error_uncached
     assert abs(cached.color.mean() / reference.mean() - 1.0) < 0.02
 
 
-def test_a_keyframe_knows_its_own_pixels(diffuse):
-    renderer, keyframes = diffuse
-    keyframe = keyframes[0]
-    geometry = keyframe.geometry
-    image = _shaded(renderer, open_cache([keyframe], [1.0]), geometry.camera, 1).color.reshape(36, 48, 3)
-    expected = geometry.albedo * keyframe.shading.color
+def test_a_page_knows_its_own_pixels(diffuse):
+    renderer, pages = diffuse
+    page = pages[0]
+    geometry = page.geometry
+    image = _shaded(renderer, _opened_cache([page]), geometry.camera, 1).color.reshape(36, 48, 3)
+    expected = geometry.albedo * page.shading.color
     # Inside surfaces; at edges a tap may be another surface, and the lamp emits.
     inside = (geometry.item == 3) | (geometry.item == 4)
     wrong = np.abs(image - expected).max(axis=2)[inside] > 0.01
     assert wrong.mean() < 0.02
 
 
-def test_what_no_keyframe_saw_is_traced(diffuse):
-    renderer, keyframes = diffuse
+def test_what_no_page_saw_is_traced(diffuse):
+    renderer, pages = diffuse
     away = Camera(look_at((0, 1.5, 3), (3.5, 0.5, -1.5)), 30, 24, 18)
-    cached = _shaded(renderer, open_cache(keyframes[:1], [1.0]), away, 128)
+    cached = _shaded(renderer, _opened_cache(pages[:1]), away, 128)
     reference = _traced(renderer, away, 128)
     difference = ((cached.color - reference.color) @ LUMINANCE).mean()
     deviation = np.sqrt((cached.variance + reference.variance).sum()) / cached.variance.size
@@ -168,15 +174,15 @@ def test_what_no_keyframe_saw_is_traced(diffuse):
 
 
 def test_same_seed_same_bytes_whatever_the_chunks(diffuse):
-    renderer, keyframes = diffuse
-    camera, cache = _camera(24, 18), open_cache(keyframes, [0.5, 0.5])
+    renderer, pages = diffuse
+    camera, cache = _camera(24, 18), _opened_cache(pages)
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     random = {"seed": 5, "frame": 1, "purpose": int(Purpose.GATHER)}
     images = [
         estimate(
             camera,
             pixels,
-            lambda rays, rng: shade(renderer, cache, rays, rng),
+            _shade(renderer, cache),
             spp=4,
             chunk=chunk,
             pixel_filter=PixelFilter.GAUSSIAN,

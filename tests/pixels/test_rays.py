@@ -6,7 +6,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import Float, UInt, matrix3
+from enfilade.arrays import Array2f, Float, UInt, matrix3
 from enfilade.camera import Camera, look_at
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
@@ -14,8 +14,9 @@ from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directio
 COUNT = 1 << 18
 
 
-def rng(count=COUNT):
-    return streams(dr.arange(UInt, count), UInt(0), seed=1, frame=2, purpose=3)
+def squares(count=COUNT):
+    rng = streams(dr.arange(UInt, count), UInt(0), seed=1, frame=2, purpose=3)
+    return Array2f(rng.next_float32(), rng.next_float32())
 
 
 def test_directions_have_unit_depth_and_pass_through_their_point():
@@ -29,7 +30,7 @@ def test_directions_have_unit_depth_and_pass_through_their_point():
 
 
 def test_box_offsets_are_uniform_over_the_pixel():
-    offsets = np.array(box_offsets(rng())).astype(float)
+    offsets = np.array(box_offsets(squares())).astype(float)
     assert offsets.min() >= -0.5
     assert offsets.max() < 0.5
     error = 5 / math.sqrt(COUNT)  # five standard errors, in standard deviations
@@ -43,7 +44,7 @@ def test_box_offsets_are_uniform_over_the_pixel():
 
 @pytest.mark.parametrize(("sigma", "radius"), [(0.5, 1.5), (0.5, 0.5), (1.5, 4.5)])
 def test_gaussian_offsets_are_a_gaussian_cut_at_the_radius(sigma, radius):
-    offsets = np.array(gaussian_offsets(rng(), sigma=sigma, radius=radius)).astype(float)
+    offsets = np.array(gaussian_offsets(squares(), sigma=sigma, radius=radius)).astype(float)
     assert np.abs(offsets).max() <= radius * (1 + 1e-4)  # erfinv in float32
     edges = np.linspace(-radius, radius, 41)
     cdf = np.array([math.erf(e / sigma / math.sqrt(2)) for e in edges])

@@ -5,8 +5,10 @@ from __future__ import annotations
 from enfilade.codec.exr import read_attributes, read_exr, write_exr
 from enfilade.codec.frames import (
     read_frame,
+    read_light,
     read_shading,
     write_frame,
+    write_light,
     write_result,
     write_shading,
 )
@@ -17,12 +19,14 @@ __all__ = [
     "read_exr",
     "read_frame",
     "read_json",
+    "read_light",
     "read_shading",
     "sweep",
     "whole_file",
     "write_exr",
     "write_frame",
     "write_json",
+    "write_light",
     "write_result",
     "write_shading",
 ]

@@ -10,9 +10,17 @@ import numpy.typing as npt
 
 from enfilade.codec.exr import Array, read_attributes, read_exr, write_exr
 from enfilade.errors import ImageError
-from enfilade.records import F32, U8, Flow, Frame, Geometry, Shading
+from enfilade.records import F32, U8, Flow, Frame, Geometry, Mask, Shading
 
-__all__ = ["read_frame", "read_shading", "write_frame", "write_result", "write_shading"]
+__all__ = [
+    "read_frame",
+    "read_light",
+    "read_shading",
+    "write_frame",
+    "write_light",
+    "write_result",
+    "write_shading",
+]
 
 F16 = npt.NDArray[np.float16]
 HALF_MAX = 65504.0  # largest finite half float, IEEE 754
@@ -49,6 +57,37 @@ def read_shading(file: Path) -> Shading:
     if not dropped.isascii() or not dropped.isdigit():
         raise ImageError(f"{file} doesn't say how many samples were dropped; delete it to make it again")
     return Shading(layers["RGB"], layers["variance"], int(dropped))
+
+
+def write_light(file: Path, shading: Shading, is_known: Mask) -> None:
+    """Write the light of a page, exactly, and where it is known.
+
+    Parameters
+    ----------
+    file
+    shading : Shading
+        Of shape (H, W).
+    is_known : (H, W) bool
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    """
+    layers = {"RGB": shading.color, "variance": shading.variance, "known": is_known.astype(np.uint32)}
+    write_exr(file, layers, attributes={"dropped": str(int(shading.dropped))})
+
+
+def read_light(file: Path) -> tuple[Shading, Mask]:
+    """Read what :func:`write_light` wrote, bit by bit the same.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, damaged, or holds no light.
+    """
+    layers = _required(file, {"known": np.uint32})
+    return read_shading(file), layers["known"] > 0
 
 
 def write_frame(file: Path, frame: Frame) -> None:

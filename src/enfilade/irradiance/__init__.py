@@ -1,6 +1,14 @@
-"""Keyframes as a cache of the light that arrives, looked up from anywhere a path goes."""
+"""Pages of arriving light as a cache, looked up from anywhere a path goes."""
 
-from enfilade.irradiance.cache import LightCache, open_cache
-from enfilade.irradiance.shade import shade
+from enfilade.irradiance.cache import (
+    LightCache,
+    known,
+    open_cache,
+    open_page,
+    pooled,
+    seen_from,
+    smoothed,
+)
+from enfilade.irradiance.shade import Shader
 
-__all__ = ["LightCache", "open_cache", "shade"]
+__all__ = ["LightCache", "Shader", "known", "open_cache", "open_page", "pooled", "seen_from", "smoothed"]

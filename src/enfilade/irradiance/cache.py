@@ -1,4 +1,4 @@
-"""The cache: keyframes of arriving light, ready to be looked up."""
+"""The cache: pages of arriving light, ready to be looked up."""
 
 from __future__ import annotations
 
@@ -7,20 +7,35 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
-from enfilade.arrays import Array3f, Float, lanes, matrix3, opaque, vector3
-from enfilade.pixels.lookup import Page, lookup
-from enfilade.records import Keyframe
+from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
+from enfilade.pixels.lookup import Page, footprint, lookup
+from enfilade.pixels.rays import pinhole_directions
+from enfilade.pixels.wavelet import Guide, smooth
+from enfilade.records import F32, Geometry, LightPage, Mask, Shading
 
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
 
+LEVELS = 4  # of the wavelet that smooths a page
+DEVIATIONS = 3.0  # of the luminance, across which it smooths
+NORMAL_EXPONENT = 64.0  # light on surfaces that are turned by 12 degrees mixes by a quarter
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True)
 class LightCache:
-    """What several keyframes know of the light; empty, it knows nothing, and every lookup is a miss."""
+    """What several pages know of the light; empty, it knows nothing, and every lookup is a miss.
 
-    pages: tuple[tuple[Page, float], ...] = ()
+    Attributes
+    ----------
+    pages : tuple of Page
+    shares : tuple of Float
+        How much each counts where several know a surface.
+    """
+
+    pages: tuple[Page, ...] = ()
+    shares: tuple[Any, ...] = ()
 
     def find(self, position: Any, normal: Any, item: Any) -> tuple[Any, Any]:
         """Light at points of surfaces.
@@ -37,38 +52,130 @@ class LightCache:
         is_known : Bool
         """
         total, weight = Array3f(0), Float(0)
-        for page, share in self.pages:
-            found, agreeing = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
-            total += opaque(share) * found
-            weight += opaque(share) * agreeing
-        is_known = weight > KNOWN
+        known = Float(0)
+        for page, share in zip(self.pages, self.shares, strict=True):
+            found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+            total += share * found.total
+            weight += share * found.weight
+            known += found.weight
+        is_known = known > KNOWN
         return dr.select(is_known, total / weight, 0.0), is_known
 
 
-def open_cache(keyframes: Sequence[Keyframe], weights: Sequence[float]) -> LightCache:
-    """Make keyframes ready to be looked up.
+def open_cache(pages: Sequence[Page], shares: Sequence[float]) -> LightCache:
+    """Pages, and how much each counts where several know a surface."""
+    return LightCache(tuple(pages), tuple(opaque(float(share)) for share in shares))
+
+
+def open_page(page: LightPage) -> Page:
+    """Make a page ready to be looked up."""
+    return _page(page.geometry, lanes(page.is_known), lanes(page.shading.color), lanes(page.shading.variance))
+
+
+def pooled(page: LightPage, around: Sequence[Page]) -> LightPage:
+    """What all pages together know of the surfaces of one, smoothed along them.
+
+    Light that falls on a surface does not depend on who looks: each page that sees a point has an estimate
+    of its own. Those of coarser resolution count less.
 
     Parameters
     ----------
-    keyframes
-        Their shading is the light that arrives, not the colour.
-    weights
-        How much each counts where several know a surface; they sum to about one.
+    page
+    around
+        Pages opened, the one itself among them.
+
+    Returns
+    -------
+    LightPage
+        Known where ``page`` is.
     """
-    return LightCache(tuple((_page(k), w) for k, w in zip(keyframes, weights, strict=True) if w > 0.0))
+    geometry = page.geometry
+    light, variance, _ = _gathered(geometry, around, [1.0] * len(around))
+    light, variance = _smooth(geometry, page.is_known, light, variance)
+    size = page.is_known.shape
+    shading = Shading(image(light, *size), image(variance, *size), page.shading.dropped)
+    return LightPage(page.frame, geometry, shading, page.is_known)
 
 
-def _page(keyframe: Keyframe) -> Page:
-    geometry, camera = keyframe.geometry, keyframe.geometry.camera
-    page = Page(
+def smoothed(geometry: Geometry, shading: Shading) -> F32:
+    """Smooth what surfaces scatter, along them, as far as its noise asks for; (H, W, 3)."""
+    light, _ = _smooth(geometry, geometry.is_hit, lanes(shading.color), lanes(shading.variance))
+    return image(light, *shading.variance.shape)
+
+
+def _smooth(geometry: Geometry, where: Mask, light: Any, variance: Any) -> tuple[Any, Any]:
+    guide = Guide(
         depths=lanes(geometry.depth),
-        items=lanes(geometry.item),
-        values=lanes(keyframe.shading.color),
+        normals=lanes(geometry.normal),
+        items=lanes(np.where(where, geometry.item, np.uint32(0))),
+        direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
+        width=geometry.camera.width,
+        height=geometry.camera.height,
+    )
+    return smooth(
+        light,
+        variance,
+        guide,
+        levels=LEVELS,
+        deviations=DEVIATIONS,
+        plane_tolerance=PLANE_TOLERANCE,
+        normal_exponent=NORMAL_EXPONENT,
+    )
+
+
+def known(geometry: Geometry, pages: Sequence[Page]) -> Mask:
+    """Pixels of a view of which some page knows the light, (H, W)."""
+    _, _, is_known = _gathered(geometry, pages, [1.0] * len(pages))
+    return image(is_known, *geometry.item.shape)
+
+
+def seen_from(geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]) -> Page:
+    """What pages know of all that a view sees: a page of its own, which its camera rays look up."""
+    light, variance, is_known = _gathered(geometry, pages, shares)
+    return _page(geometry, is_known, light, variance)
+
+
+def _gathered(geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]) -> tuple[Any, Any, Any]:
+    """Light at what the pixels' centres of a view see, its variance, and whether it is known."""
+    position, normal, item = _points(geometry), lanes(geometry.normal), lanes(geometry.item)
+    own = footprint(position, normal, vector3(geometry.camera.eye))
+    total, variance, weight, known = Array3f(0), Float(0), Float(0), Float(0)
+    for page, share in zip(pages, shares, strict=True):
+        found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+        counts = opaque(float(share)) * dr.minimum(own / footprint(position, normal, page.eye), 1.0)
+        total += counts * found.total
+        variance += counts * counts * found.variance * found.weight
+        weight += counts * found.weight
+        known += found.weight
+    is_known = known > KNOWN
+    light = dr.select(is_known, total / weight, 0.0)
+    variance = dr.select(is_known, variance / (weight * weight), 0.0)
+    dr.eval(light, variance, is_known)
+    return light, variance, is_known
+
+
+def _points(geometry: Geometry) -> Any:
+    camera = geometry.camera
+    _, column, row = pixel_grid(camera.height, camera.width)
+    direction = pinhole_directions(
+        Float(column) + 0.5, Float(row) + 0.5, direction_from_pixel=matrix3(camera.direction_from_pixel)
+    )
+    return vector3(camera.eye) + lanes(geometry.depth) * direction
+
+
+def _page(geometry: Geometry, is_known: Any, values: Any, variances: Any) -> Page:
+    """A page in memory of Dr.Jit's own: what shares NumPy's can't be freed while a kernel is recorded."""
+    camera = geometry.camera
+    page = Page(
+        depths=dr.select(is_known, lanes(geometry.depth), 0.0),
+        items=dr.select(is_known, lanes(geometry.item), 0),
+        values=dr.select(is_known, values, 0.0),
+        variances=dr.select(is_known, variances, 0.0),
         eye=vector3(camera.eye),
         direction_from_pixel=matrix3(camera.direction_from_pixel),
         pixel_from_direction=matrix3(camera.pixel_from_direction),
         width=camera.width,
         height=camera.height,
     )
-    dr.eval(page.depths, page.items, page.values)
+    dr.eval(page.depths, page.items, page.values, page.variances)
     return page

@@ -7,24 +7,36 @@ lookup alone.
 
 from __future__ import annotations
 
+from collections import OrderedDict
+from typing import TypeVar
+
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import binary_dilation
 
-from enfilade.codec import read_shading, write_shading
+from enfilade.codec import read_light, write_light
 from enfilade.errors import SettingsError
-from enfilade.irradiance import LightCache, open_cache, shade
+from enfilade.irradiance import LightCache, Shader, known, open_cache, open_page, pooled, seen_from, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import estimate
-from enfilade.records import Frame, Keyframe, Segment, Shading, Source
+from enfilade.pixels.estimate import LUMINANCE, Estimate, estimate
+from enfilade.pixels.lookup import Page
+from enfilade.records import Frame, Geometry, LightPage, Mask, Segment, Shading, Source
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 
-REACH = 1.5  # of the keyframes' spacing: how far along the path a keyframe counts
-LEAST_WEIGHT = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
+REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
+LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
+POOL = 4  # keyframes to each side with which a page is pooled
+LEAST_HOLES = 5e-4  # of a frame's pixels: fewer are left to the frames themselves
+LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
+EDGE_CONTRAST = 0.01  # deviation of a pixel's mean, relative to it, above which it takes more camera rays
+KEPT = 24  # pages kept in memory, of each kind
+
+T = TypeVar("T")
 
 
 class LightTable:
-    """The light of the keyframes of a shot, traced when first asked for.
+    """The light of a shot: pages at its keyframes, and smaller ones that fill the holes between them.
 
     Parameters
     ----------
@@ -43,83 +55,203 @@ class LightTable:
             name = workshop.renderer.describe().renderer
             raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
         self.renderer: LightRenderer = workshop.renderer
+        self.shader = Shader(self.renderer)
         self._workshop = workshop
-        self.frames = sorted({s.first for s in segments} | {s.last for s in segments})
-        self._made: dict[int, Keyframe] = {}
+        self.segments = segments
+        self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
+        self._fills: list[int] = []
+        self._traced: _Kept[LightPage] = _Kept()
+        self._opened: _Kept[Page] = _Kept()
+        self._pooled: _Kept[Page] = _Kept()
 
-    def near(self, frame: int) -> LightCache:
-        """The keyframes nearest to a frame, weighted so that none comes or goes abruptly."""
-        count = min(self._workshop.job.settings.light.keyframes, len(self.frames))
-        nearest = sorted(self.frames, key=lambda k: (abs(k - frame), k))[:count]
-        spacing = max((self.frames[-1] - self.frames[0]) / max(len(self.frames) - 1, 1), 1.0)
-        closeness = [max(1.0 - abs(k - frame) / (REACH * spacing), LEAST_WEIGHT) for k in nearest]
-        weights = [c / sum(closeness) for c in closeness]
-        cache = open_cache([self.keyframe(k) for k in nearest], weights)
-        self._made = {k: self._made[k] for k in nearest}
-        return cache
-
-    def keyframe(self, frame: int) -> Keyframe:
-        """Light at what the pixels' centres of a keyframe see."""
-        if frame not in self._made:
-            geometry = self._workshop.views[frame].geometry
-            self._made[frame] = Keyframe(frame, geometry, self._shading(frame))
-        return self._made[frame]
-
-    def _shading(self, frame: int) -> Shading:
+    def prepare(self, segment: Segment) -> None:
+        """Trace the light of a segment's keyframes, and of what they leave open between them."""
         workshop = self._workshop
-        number = workshop.number(frame)
+        first, last = workshop.number(segment.first), workshop.number(segment.last)
+        unit = f"light {first}-{last}"
+        if line := workshop.run.done(unit):
+            fills = [self._frame(number) for number in line["fills"]]
+        else:
+            fills = self._filled(segment.first, segment.last, [])
+            numbers = [workshop.number(frame) for frame in fills]
+            workshop.finish(unit, [], fills=numbers)
+        self._fills = sorted({*self._fills, *fills})
+
+    def around(self, frame: int) -> tuple[LightCache, LightCache]:
+        """What is known of the very view of a frame, and what is known near it.
+
+        Pages are weighted so that none comes or goes abruptly.
+        """
+        settings = self._workshop.job.settings.light
+        frames = [*_nearest(self.keyframes, frame, settings.keyframes)]
+        frames += _nearest(self._fills, frame, settings.fills)
+        pages = [self._page(f) for f in frames]
+        shares = [max(1.0 - abs(f - frame) / (REACH * self._spacing), LEAST_SHARE) for f in frames]
+        view = seen_from(self._workshop.views[frame].geometry, pages, shares)
+        # Always as many pages, so that the kernels which look them up are recorded once.
+        missing = settings.keyframes + settings.fills - len(pages)
+        cache = open_cache([*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing])
+        return open_cache([view], [1.0]), cache
+
+    @property
+    def _spacing(self) -> float:
+        return max((self.keyframes[-1] - self.keyframes[0]) / max(len(self.keyframes) - 1, 1), 1.0)
+
+    def _frame(self, number: int) -> int:
+        return self._workshop.job.path.numbers.index(number)
+
+    def _filled(self, first: int, last: int, fills: list[int]) -> list[int]:
+        """Halve a stretch of frames until nothing new comes into view; returns the frames that fill holes."""
+        middle = (first + last) // 2
+        if middle == first:
+            return fills
+        holes = self._holes(middle, fills)
+        if holes.mean() < LEAST_HOLES:
+            return fills
+        self._trace(middle, holes)
+        fills = [*fills, middle]
+        return self._filled(middle, last, self._filled(first, middle, fills))
+
+    def _holes(self, frame: int, fills: list[int]) -> Mask:
+        geometry = self._workshop.views[frame].geometry
+        frames = _nearest(self.keyframes, frame, self._workshop.job.settings.light.keyframes)
+        pages = [self._open(f) for f in (*frames, *fills)]
+        return _has_light(geometry) & ~known(geometry, pages)
+
+    def _page(self, frame: int) -> Page:
+        """A page with what all around it know of its surfaces."""
+        if frame not in self._pooled:
+            around = _nearest(self.keyframes, frame, 2 * POOL + 1)
+            around += _nearest(self._fills, frame, 2 * POOL + 1)
+            with self._workshop.costs.of("gather"):
+                pages = [self._open(f) for f in sorted({*around, frame})]
+                self._pooled[frame] = open_page(pooled(self._trace(frame), pages))
+        return self._pooled[frame]
+
+    def _open(self, frame: int) -> Page:
+        if frame not in self._opened:
+            self._opened[frame] = open_page(self._trace(frame))
+        return self._opened[frame]
+
+    def _trace(self, frame: int, holes: Mask | None = None) -> LightPage:
+        """Light at what pixels' centres of a frame see: of all of them, or of those in holes."""
+        if frame not in self._traced:
+            self._traced[frame] = self._read_or_trace(frame, holes)
+        return self._traced[frame]
+
+    def _read_or_trace(self, frame: int, holes: Mask | None) -> LightPage:
+        workshop = self._workshop
+        number, geometry = workshop.number(frame), workshop.views[frame].geometry
         unit, file = f"keyframe {number}", workshop.run.file("keyframes", number)
         if workshop.run.done(unit):
             workshop.run.check(file)
-            return read_shading(file)
-        shading = self._trace(frame)
-        write_shading(file, shading)
-        workshop.finish(unit, [file], frame=number, dropped=shading.dropped)
-        return shading
+            return LightPage(frame, geometry, *read_light(file))
+        where = _has_light(geometry) if holes is None else holes
+        shading = self._estimated(frame, where)
+        write_light(file, shading, where)
+        workshop.finish(unit, [file], frame=number, pixels=int(where.sum()), dropped=shading.dropped)
+        return LightPage(frame, geometry, shading, where)
 
-    def _trace(self, frame: int) -> Shading:
+    def _estimated(self, frame: int, where: Mask) -> Shading:
         workshop, renderer = self._workshop, self.renderer
-        path, settings = workshop.job.path, workshop.job.settings.trace
+        settings = workshop.job.settings.trace
         with workshop.costs.of("trace"):
             light = estimate(
-                path.cameras[frame],
-                _all_pixels(path.width, path.height),
+                workshop.job.path.cameras[frame],
+                np.flatnonzero(where).astype(np.uint32),
                 lambda rays, rng: renderer.light(renderer.lit(rays), rng),
                 spp=settings.spp,
                 chunk=settings.chunk,
                 pixel_filter=PixelFilter.CENTRE,
                 random=_random(workshop, frame, Purpose.LIGHT),
             )
-        size = (path.height, path.width)
-        return Shading(light.color.reshape(*size, 3), light.variance.reshape(size), light.dropped)
+        color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
+        color[where], variance[where] = light.color, light.variance
+        return Shading(color, variance, light.dropped)
 
 
 def make_frame(workshop: Workshop, table: LightTable, frame: int) -> None:
-    """Shade a frame from the light of the keyframes around it."""
+    """Shade a frame from the light of the pages around it."""
     if workshop.run.done(result_unit(workshop, frame)):
         return
-    path, settings = workshop.job.path, workshop.job.settings
-    cache = table.near(frame)
-    renderer = table.renderer
-    with workshop.costs.of("gather"):
-        shading = estimate(
-            path.cameras[frame],
-            _all_pixels(path.width, path.height),
-            lambda rays, rng: shade(renderer, cache, rays, rng),
-            spp=settings.light.samples,
-            chunk=settings.trace.chunk,
-            pixel_filter=PixelFilter.GAUSSIAN,
-            random=_random(workshop, frame, Purpose.GATHER),
-        )
     view = workshop.views[frame]
-    kind = Source.KEYFRAME if frame in table.frames else Source.REUSED
-    source = np.full((path.height, path.width), kind, np.uint8)
-    made = Frame(shading.color.reshape(path.height, path.width, 3), source)
-    write_frame_result(workshop, frame, view.geometry, view.flow, made, shading.dropped)
+    with workshop.costs.of("gather"):
+        near, cache = table.around(frame)
+        seen = _seen(workshop, table, frame, near, cache)
+    with workshop.costs.of("scatter"):
+        scattered = _scattered(workshop, table, frame, cache, seen.is_marked)
+    height, width = view.geometry.item.shape
+    color = seen.shading.color.reshape(height, width, 3) + smoothed(view.geometry, scattered)
+    kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
+    made = Frame(color, np.full((height, width), kind, np.uint8))
+    dropped = seen.shading.dropped + scattered.dropped
+    write_frame_result(workshop, frame, view.geometry, view.flow, made, dropped)
 
 
-def _all_pixels(width: int, height: int) -> npt.NDArray[np.uint32]:
-    return np.arange(width * height, dtype=np.uint32)
+def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:
+    """What surfaces emit and scatter diffusely; edges and fine textures get more camera rays."""
+    path, settings = workshop.job.path, workshop.job.settings
+    seen = Estimate(
+        path.cameras[frame],
+        np.arange(path.width * path.height, dtype=np.uint32),
+        lambda rays, rng: table.shader.seen(view, cache, rays, rng),
+        chunk=settings.trace.chunk,
+        pixel_filter=PixelFilter.GAUSSIAN,
+        random=_random(workshop, frame, Purpose.GATHER),
+    )
+    seen.add(settings.light.least_samples)
+    if settings.light.samples > settings.light.least_samples:
+        shading = seen.shading
+        mean = shading.color @ np.array(LUMINANCE, np.float32)
+        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * mean
+        seen.add(settings.light.samples - settings.light.least_samples, _grown(is_edge, path.width))
+    return seen
+
+
+def _scattered(
+    workshop: Workshop, table: LightTable, frame: int, cache: LightCache, has_lobe: npt.NDArray[np.bool_]
+) -> Shading:
+    """What surfaces scatter by all but their diffuse lobes, (H, W)."""
+    path, settings = workshop.job.path, workshop.job.settings
+    where = _grown(has_lobe, path.width)
+    color = np.zeros((path.height * path.width, 3), np.float32)
+    variance = np.zeros(path.height * path.width, np.float32)
+    shading = estimate(
+        path.cameras[frame],
+        np.flatnonzero(where).astype(np.uint32),
+        lambda rays, rng: table.shader.scattered(cache, rays, rng),
+        spp=settings.light.lobe_samples,
+        chunk=settings.trace.chunk,
+        pixel_filter=PixelFilter.GAUSSIAN,
+        random=_random(workshop, frame, Purpose.SCATTER),
+    )
+    color[where], variance[where] = shading.color, shading.variance
+    size = (path.height, path.width)
+    return Shading(color.reshape(*size, 3), variance.reshape(size), shading.dropped)
+
+
+class _Kept(OrderedDict[int, T]):
+    """The pages last made, by frame."""
+
+    def __setitem__(self, frame: int, page: T) -> None:
+        super().__setitem__(frame, page)
+        if len(self) > KEPT:
+            self.popitem(last=False)
+
+
+def _nearest(frames: list[int], frame: int, count: int) -> list[int]:
+    return sorted(frames, key=lambda k: (abs(k - frame), k))[:count]
+
+
+def _has_light(geometry: Geometry) -> Mask:
+    has_light: Mask = geometry.is_hit & (geometry.albedo.max(axis=2) > LEAST_ALBEDO)
+    return has_light
+
+
+def _grown(chosen: npt.NDArray[np.bool_], width: int) -> npt.NDArray[np.bool_]:
+    """Pixels of a flat image, and those around them."""
+    grown: npt.NDArray[np.bool_] = binary_dilation(chosen.reshape(-1, width), np.ones((3, 3), bool)).ravel()
+    return grown
 
 
 def _random(workshop: Workshop, frame: int, purpose: Purpose) -> dict[str, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,11 +118,18 @@ def _render_paper(workshop: Workshop, survey: Survey) -> None:
 
 
 def _render_decoupled(workshop: Workshop, survey: Survey) -> None:
-    path = workshop.job.path
+    path, settings = workshop.job.path, workshop.job.settings
+    spaced = replace(settings, keyframes=replace(settings.keyframes, spacing=settings.light.spacing))
+    shots = initial_segments(path, survey, spaced)
+    tables = [LightTable(workshop, segments) for segments in shots]
+    workshop.monitor.stage("light", sum(len(table.segments) for table in tables))
+    for table in tables:
+        for segment in table.segments:
+            table.prepare(segment)
+            workshop.monitor.advance()
+
     workshop.monitor.stage("frames", len(path))
-    shots = initial_segments(path, survey, workshop.job.settings)
-    for shot, segments in zip(path.shots(), shots, strict=True):
-        table = LightTable(workshop, segments)
+    for shot, table in zip(path.shots(), tables, strict=True):
         for frame in shot:
             make_frame(workshop, table, frame)
             workshop.monitor.advance()

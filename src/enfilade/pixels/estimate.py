@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera import Camera
-from enfilade.pixels.random import streams
+from enfilade.pixels.random import stratified, streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, Rays
@@ -21,6 +21,99 @@ GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 
 Radiance = Callable[[Rays, Any], Any]
+
+
+class Estimate:
+    """Averages of the paths of each pixel of a list, to which paths can be added.
+
+    Parameters
+    ----------
+    camera
+    pixels : (N,) uint32
+    radiance
+        What arrives along rays (:class:`Rays`, any length of direction), given a random number
+        generator for each: an Array3f, or with it a Bool that marks paths. Called once a chunk.
+    chunk
+        Paths in flight at once; changes no result.
+    pixel_filter
+        Where in the image the paths begin.
+    random
+        Seed, frame and purpose of :func:`enfilade.pixels.random.streams`.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        pixels: npt.NDArray[np.uint32],
+        radiance: Radiance,
+        *,
+        chunk: int,
+        pixel_filter: PixelFilter,
+        random: dict[str, int],
+    ) -> None:
+        self._camera = camera
+        self._pixels = pixels
+        self._radiance = radiance
+        self._chunk = chunk
+        self._filter = pixel_filter
+        self._random = random
+        self._paths = 0  # numbers given to paths so far
+        self._asked = 0
+        self._sums = np.zeros((6, len(pixels)))  # r, g, b, squared luminance, finite paths, marked paths
+
+    def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
+        """Trace more paths, for all pixels of the list or for some of them.
+
+        Parameters
+        ----------
+        spp
+            Paths a pixel.
+        where : (N,) bool
+        """
+        chosen = np.arange(len(self._pixels)) if where is None else np.flatnonzero(where)
+        for first in range(self._paths, self._paths + spp, PASS):
+            width = min(PASS, self._paths + spp - first)
+            step = max(self._chunk // width, 1)
+            for start in range(0, len(chosen), step):
+                part = chosen[start : start + step]
+                pixel, path = _numbered(self._pixels[part], first, width)
+                rng = streams(pixel, path, **self._random)
+                rays = self._rays(pixel, path)
+                self._sums[:, part] += _summed(self._radiance(rays, rng), width)
+        self._paths += spp
+        self._asked += spp * len(chosen)
+
+    @property
+    def shading(self) -> Shading:
+        """Mean colour of each pixel over its finite samples, and the variance of its mean luminance."""
+        sums = self._sums
+        count = np.maximum(sums[4], 1.0)
+        mean = sums[:3] / count
+        spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
+        return Shading(
+            color=np.ascontiguousarray(mean.T, np.float32),
+            variance=np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0).astype(np.float32),
+            dropped=int(self._asked - sums[4].sum()),
+        )
+
+    @property
+    def is_marked(self) -> npt.NDArray[np.bool_]:
+        """Pixels that have a marked path, (N,)."""
+        marked: npt.NDArray[np.bool_] = self._sums[5] > 0.0
+        return marked
+
+    def _rays(self, pixel: Any, path: Any) -> Rays:
+        camera = self._camera
+        row = pixel // opaque(camera.width)
+        at = Array2f(pixel - row * opaque(camera.width), row) + 0.5
+        match self._filter:
+            case PixelFilter.BOX:
+                at += box_offsets(stratified(pixel, path, **self._random))
+            case PixelFilter.GAUSSIAN:
+                square = stratified(pixel, path, **self._random)
+                at += gaussian_offsets(square, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
+        matrix = matrix3(camera.direction_from_pixel)
+        return Rays(vector3(camera.eye), pinhole_directions(at.x, at.y, direction_from_pixel=matrix))
 
 
 def estimate(
@@ -33,40 +126,16 @@ def estimate(
     pixel_filter: PixelFilter,
     random: dict[str, int],
 ) -> Shading:
-    """Average the paths of each pixel.
-
-    Parameters
-    ----------
-    camera
-    pixels : (N,) uint32
-    radiance
-        What arrives along rays (:class:`Rays`, any length of direction), given a random number
-        generator for each: an Array3f. Called once a chunk.
-    spp
-        Paths a pixel.
-    chunk
-        Paths in flight at once; changes no result.
-    pixel_filter
-        Where in the image the paths begin.
-    random
-        Seed, frame and purpose of :func:`enfilade.pixels.random.streams`.
+    """Average the paths of each pixel: an :class:`Estimate` with as many paths for all.
 
     Returns
     -------
     Shading
         Of shape (N,), over the finite samples of each pixel.
     """
-    sums = np.zeros((5, len(pixels)))  # r, g, b, squared luminance, number of finite paths
-    for first in range(0, spp, PASS):
-        width = min(PASS, spp - first)
-        step = max(chunk // width, 1)
-        for start in range(0, len(pixels), step):
-            part = slice(start, start + step)
-            pixel, path = _numbered(pixels[part], first, width)
-            rng = streams(pixel, path, **random)
-            rays = _camera_rays(camera, pixel, rng, pixel_filter)
-            sums[:, part] += _summed(radiance(rays, rng), width)
-    return _mean(sums, spp)
+    whole = Estimate(camera, pixels, radiance, chunk=chunk, pixel_filter=pixel_filter, random=random)
+    whole.add(spp)
+    return whole.shading
 
 
 def _numbered(pixels: npt.NDArray[np.uint32], first: int, width: int) -> tuple[Any, Any]:
@@ -76,38 +145,20 @@ def _numbered(pixels: npt.NDArray[np.uint32], first: int, width: int) -> tuple[A
     return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(width) + opaque(first)
 
 
-def _camera_rays(camera: Camera, pixel: Any, rng: Any, pixel_filter: PixelFilter) -> Rays:
-    row = pixel // opaque(camera.width)
-    at = Array2f(pixel - row * opaque(camera.width), row) + 0.5
-    match pixel_filter:
-        case PixelFilter.BOX:
-            at += box_offsets(rng)
-        case PixelFilter.GAUSSIAN:
-            at += gaussian_offsets(rng, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
-    direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    return Rays(origin=vector3(camera.eye), direction=direction)
-
-
-def _summed(radiance: Any, width: int) -> npt.NDArray[np.float32]:
-    """Sums over the finite paths of each pixel: r, g, b, squared luminance, count; (5, N)."""
+def _summed(answer: Any, width: int) -> npt.NDArray[np.float32]:
+    """Sums over the finite paths of each pixel: r, g, b, squared luminance, count, marks; (6, N)."""
+    radiance, is_marked = answer if isinstance(answer, tuple) else (answer, None)
     radiance = Array3f(radiance)
     luminance = dr.dot(radiance, Array3f(*LUMINANCE))
     squared = luminance * luminance
     is_valid = dr.isfinite(squared)  # what overflows when squared is no radiance either
     values = [*radiance, squared, Float(1)]
     values = [dr.select(is_valid, v, 0) for v in values]
+    if is_marked is not None:
+        values.append(dr.select(is_marked, Float(1), 0))
     # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
     dr.eval(values)
-    return np.stack([np.array(dr.block_sum(v, width)) for v in values])
-
-
-def _mean(sums: npt.NDArray[np.float64], spp: int) -> Shading:
-    """Mean colour of each pixel, and the variance of the mean of its luminance."""
-    count = np.maximum(sums[4], 1.0)
-    mean = sums[:3] / count
-    spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
-    return Shading(
-        color=np.ascontiguousarray(mean.T, np.float32),
-        variance=np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0).astype(np.float32),
-        dropped=int(spp * sums.shape[1] - sums[4].sum()),
-    )
+    sums = [np.array(dr.block_sum(v, width)) for v in values]
+    if is_marked is None:
+        sums.append(np.zeros_like(sums[0]))
+    return np.stack(sums)

@@ -21,7 +21,8 @@ class Page:
     depths : Float
     items : UInt
     values : Array3f
-        Images, width * height lanes.
+    variances : Float
+        Images, width * height lanes; where a pixel is not known, its depth is 0.
     eye : Array3f
     direction_from_pixel, pixel_from_direction : Matrix3f
         Of the camera.
@@ -31,6 +32,7 @@ class Page:
     depths: Any
     items: Any
     values: Any
+    variances: Any
     eye: Any
     direction_from_pixel: Any
     pixel_from_direction: Any
@@ -38,7 +40,26 @@ class Page:
     height: int
 
 
-def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance: float) -> tuple[Any, Any]:
+@dataclass(frozen=True)
+class Found:
+    """What a page knows of points, as lanes.
+
+    Attributes
+    ----------
+    total : Array3f
+        Weighted sum of the values.
+    variance : Float
+        Weighted sum of the variances.
+    weight : Float
+        Sum of the weights; 0 where the page does not know the surface, at most about one.
+    """
+
+    total: Any
+    variance: Any
+    weight: Any
+
+
+def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance: float) -> Found:
     """Interpolate a keyframe's values at points in the world.
 
     Of the four pixels around a point's projection those count that see the same item, within a
@@ -56,10 +77,7 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
 
     Returns
     -------
-    total : Array3f
-        Weighted sum of the values.
-    weight : Float
-        Sum of the weights; 0 where the keyframe does not know the surface, at most about one.
+    Found
     """
     # Where the keyframe would see the point.
     seen = page.pixel_from_direction @ (position - page.eye)
@@ -75,7 +93,7 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
     slope = (page.direction_from_pixel.T @ normal) * scale
     tolerance = plane_tolerance * seen.z
 
-    total, weight = Array3f(0), Float(0)
+    total, variance, weight = Array3f(0), Float(0), Float(0)
     for row, weight_y in ((0, 1.0 - down), (1, down)):
         for column, weight_x in ((0, 1.0 - across), (1, across)):
             i = dr.clip(Int(left) + column, 0, page.width - 1)
@@ -87,5 +105,17 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
             is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
             share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
             total += share * dr.gather(Array3f, page.values, lane, is_same)
+            variance += share * dr.gather(Float, page.variances, lane, is_same)
             weight += share
-    return total, weight
+    return Found(total, variance, weight)
+
+
+def footprint(position: Any, normal: Any, eye: Any) -> Any:
+    """Area of a surface that a pixel covers at points, in scene units squared per steradian; Float.
+
+    At grazing angles no more than twenty times that of a surface met head-on.
+    """
+    toward = position - eye
+    squared = dr.squared_norm(toward)
+    cosine = dr.abs(dr.dot(toward, normal)) * dr.rsqrt(squared * dr.squared_norm(normal))
+    return squared / dr.maximum(cosine, 0.05)

@@ -7,7 +7,7 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array2f, Array3f
+from enfilade.arrays import Array3f
 
 
 def pinhole_directions(x: Any, y: Any, *, direction_from_pixel: Any) -> Any:
@@ -28,19 +28,20 @@ def pinhole_directions(x: Any, y: Any, *, direction_from_pixel: Any) -> Any:
     return direction_from_pixel @ Array3f(x, y, 1)
 
 
-def box_offsets(rng: Any) -> Any:
-    """Offsets from a pixel's centre, uniform over the pixel; Array2f of pixels."""
-    return Array2f(rng.next_float32() - 0.5, rng.next_float32() - 0.5)
+def box_offsets(square: Any) -> Any:
+    """Offsets from a pixel's centre, uniform over the pixel, of points of the unit square; Array2f."""
+    return square - 0.5
 
 
-def gaussian_offsets(rng: Any, *, sigma: float, radius: float) -> Any:
+def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
     """Offsets from a pixel's centre, distributed as a pixel filter (Ernst et al. 2006).
 
     Each path then counts for one pixel alone: no weights, no order of adding.
 
     Parameters
     ----------
-    rng : PCG32
+    square : Array2f
+        Points of the unit square.
     sigma
         Standard deviation, pixels.
     radius
@@ -52,5 +53,4 @@ def gaussian_offsets(rng: Any, *, sigma: float, radius: float) -> Any:
     """
     scale = sigma * math.sqrt(2.0)
     kept = math.erf(radius / scale)
-    u = Array2f(rng.next_float32(), rng.next_float32())
-    return scale * dr.erfinv((2.0 * u - 1.0) * kept)
+    return scale * dr.erfinv((2.0 * square - 1.0) * kept)

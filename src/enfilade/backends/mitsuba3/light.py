@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -11,18 +10,9 @@ import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool
 from enfilade.backends.mitsuba3.lobes import LEAST_ALBEDO, Lobes
-from enfilade.renderer import Lit, Rays, Scattered
+from enfilade.renderer import Bounce, Lit, Rays, Scattered
 
 Radiance = Callable[[Rays, Any], Any]
-
-
-@dataclass(frozen=True)
-class Bounce:
-    """Where scattered rays come from, and how likely their direction was."""
-
-    seen: Any
-    pdf: Any
-    is_delta: Any
 
 
 class Light:
@@ -40,13 +30,20 @@ class Light:
         self._radiance = radiance
         self._lobes = Lobes(scene)
 
+    @property
+    def state(self) -> Any:
+        """Arrays that the materials' division reads."""
+        return self._lobes.state
+
     def emission(self, seen: Any, bounce: Bounce | None) -> Any:
         """Radiance that a hit, or the environment, sends back along the ray."""
         emitted = seen.emitter(self._scene).eval(seen)
         if bounce is None:
             return Array3f(emitted)
-        direction = mi.DirectionSample3f(self._scene, seen, bounce.seen)
-        sampled = self._scene.pdf_emitter_direction(bounce.seen, direction, ~bounce.is_delta)
+        origin = dr.zeros(mi.Interaction3f, dr.width(bounce.pdf))
+        origin.p = mi.Point3f(bounce.position)
+        direction = mi.DirectionSample3f(self._scene, seen, origin)
+        sampled = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _balance(bounce.pdf, sampled)))
 
     def has_rest(self, seen: Any) -> Any:
@@ -72,7 +69,7 @@ class Light:
         found = self._radiance(Rays(Array3f(ray.o), Array3f(ray.d)), rng)
         following = self._scene.ray_intersect(ray, active)
         whole = following.emitter(self._scene).eval(following, active)
-        weighted = self.emission(following, Bounce(seen, pdf, Bool(False)))
+        weighted = self.emission(following, Bounce(seen.p, pdf, Bool(False)))
         received += dr.select(active, weight * (found - whole + weighted), 0.0)
 
         albedo = lit.surfaces.albedo
@@ -93,10 +90,10 @@ class Light:
         ray = seen.spawn_ray(seen.to_world(wo))
         return Scattered(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
+            bounce=Bounce(Array3f(seen.p), pdf, Bool(is_delta)),
             throughput=Array3f(weight),
             direct=Array3f(direct),
-            is_alive=lit.has_lobe & (pdf > 0.0),
-            native=Bounce(seen, pdf, is_delta),
+            is_alive=Bool(lit.has_lobe & (pdf > 0.0)),
         )
 
     def _sampled_lights(self, seen: Any, material: Any, evaluate: Any, rng: Any, active: Any) -> Any:

@@ -41,6 +41,11 @@ class Lobes:
         is_undivided[registry] = [_has_undivided(material) for material in materials]
         self._is_undivided = Bool(is_undivided)
 
+    @property
+    def state(self) -> Any:
+        """Arrays that the methods read."""
+        return self._is_undivided
+
     def is_undivided(self, seen: Any, material: Any) -> Any:
         """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
         number: Any = dr.reinterpret_array(UInt, material)

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt
+from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.backends.mitsuba3.light import Light
 from enfilade.backends.mitsuba3.lobes import diffuse_reflectance, has_lobe
 from enfilade.backends.scenefile import fingerprint
@@ -25,7 +25,7 @@ from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import Lit, PixelFilter, Purpose, Rays, Scattered, SceneFacts, Surfaces
+from enfilade.renderer import Bounce, Lit, PixelFilter, Purpose, Rays, Scattered, SceneFacts, Surfaces
 from enfilade.settings import TraceSettings
 
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
@@ -87,17 +87,23 @@ class MitsubaRenderer:
         """
         return self._find(rays)[0]
 
-    def lit(self, rays: Rays, scattered: Scattered | None = None) -> Lit:
+    @property
+    def state(self) -> Any:
+        """See :meth:`enfilade.renderer.LightRenderer.state`."""
+        items = self._items
+        return self._scene, self._integrator, items.number, items.is_passable, self._light.state
+
+    def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
         Camera rays look through masks as :meth:`surfaces` does; scattered ones meet them as Mitsuba's own
         paths do.
         """
-        surfaces, seen = self._find(rays, looks_through=scattered is None)
+        surfaces, seen = self._find(rays, from_camera=bounce is None)
         return Lit(
             surfaces=surfaces,
             position=Array3f(seen.p),
-            emission=self._light.emission(seen, scattered.native if scattered else None),
+            emission=self._light.emission(seen, bounce),
             has_lobe=self._light.has_rest(seen),
             native=seen,
         )
@@ -110,11 +116,11 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
         return self._light.scatter(lit, rng)
 
-    def _find(self, rays: Rays, *, looks_through: bool = True) -> tuple[Surfaces, Any]:
+    def _find(self, rays: Rays, *, from_camera: bool = True) -> tuple[Surfaces, Any]:
         direction = mi.Vector3f(rays.direction)
         length = dr.norm(direction)
         ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
-        if looks_through:
+        if from_camera:
             seen, distance = self._visible(ray)
         else:
             seen = self._scene.ray_intersect(ray)
@@ -161,23 +167,29 @@ class MitsubaRenderer:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         self._sampler.rng = rng
         radiance, _, _ = self._integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
+        # Nothing may be kept that holds NumPy's memory: it can't be let go while a kernel is recorded.
+        self._sampler.rng = None
         return radiance
 
     def _visible(self, ray: Any) -> tuple[Any, Any]:
-        """First interaction whose surface does not let the ray pass, and its distance."""
-        seen = self._scene.ray_intersect(ray)
+        """First interaction of camera rays whose surface does not let the ray pass, and its distance."""
+        seen = self._scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
         distance = Float(seen.t)
         if not self._items.any_passable:
             return seen, distance
-        passing = self._lets_pass(seen)
-        for _ in range(LAYERS):
-            dr.eval(seen, distance, passing)
-            if not dr.any(passing):
-                break
-            behind = self._scene.ray_intersect(seen.spawn_ray(ray.d), passing)
+
+        def look_behind(seen: Any, distance: Any, passing: Any, layer: Any) -> tuple[Any, ...]:
+            behind = self._scene.ray_intersect(seen.spawn_ray(ray.d), mi.RayFlags.All, False, active=passing)
             distance = dr.select(passing, distance + behind.t, distance)
             seen = dr.select(passing, behind, seen)
-            passing = passing & self._lets_pass(seen)
+            return seen, distance, passing & self._lets_pass(seen), layer + 1
+
+        seen, distance, _, _ = dr.while_loop(
+            (seen, distance, self._lets_pass(seen), UInt(0)),
+            lambda _seen, _distance, passing, layer: passing & (layer < LAYERS),
+            look_behind,
+            labels=("seen", "distance", "passing", "layer"),
+        )
         return seen, distance
 
     def _lets_pass(self, seen: Any) -> Any:
@@ -258,7 +270,7 @@ def _lane_sampler() -> Any:
     class LaneSampler(mi.Sampler):
         def __init__(self) -> None:
             super().__init__(mi.Properties())
-            self.rng = PCG32()
+            self.rng: Any = None
 
         def next_1d(self, active: Any = True) -> Any:
             return self.rng.next_float32(active)

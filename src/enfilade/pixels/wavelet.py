@@ -1,0 +1,125 @@
+"""Edge-avoiding wavelets: noise is smoothed along surfaces and not across what is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from enfilade.arrays import Array3f, Float, Int, UInt, opaque, pixel_grid
+
+SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
+TINY = 1e-8
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Surfaces of an image, as lanes.
+
+    Attributes
+    ----------
+    depths : Float
+    normals : Array3f
+    items : UInt
+        Images, width * height lanes; item 0 is nothing.
+    direction_from_pixel : Matrix3f
+        Of the camera.
+    width, height : int
+    """
+
+    depths: Any
+    normals: Any
+    items: Any
+    direction_from_pixel: Any
+    width: int
+    height: int
+
+
+def smooth(
+    color: Any,
+    variance: Any,
+    guide: Guide,
+    *,
+    levels: int,
+    deviations: float,
+    plane_tolerance: float,
+    normal_exponent: float,
+) -> tuple[Any, Any]:
+    """Smooth an image along its surfaces, as far as its noise asks for.
+
+    Edge-avoiding a-trous wavelets (Dammertz et al. 2010), guided by the variance (Schied et al. 2017).
+
+    Parameters
+    ----------
+    color : Array3f
+    variance : Float
+        Of the luminance.
+    guide
+    levels
+        Of the wavelet: the last one reaches 2 ** levels pixels to each side.
+    deviations
+        Difference of luminance, in standard deviations, at which a pixel's weight falls to 1/e.
+    plane_tolerance
+        Distance from the tangent plane, by depth, at which the weight falls to 1/e.
+    normal_exponent
+        Of the cosine between two normals.
+
+    Returns
+    -------
+    color : Array3f
+    variance : Float
+        What is left of it.
+    """
+    for level in range(levels):
+        color, variance = _pass(
+            color, variance, guide, opaque(1 << level, Int), deviations, plane_tolerance, normal_exponent
+        )
+        dr.eval(color, variance)
+    return color, variance
+
+
+def _pass(
+    color: Any, variance: Any, guide: Guide, step: Any, deviations: float, plane: float, exponent: float
+) -> tuple[Any, Any]:
+    lane, column, row = pixel_grid(guide.height, guide.width)
+    width, height = opaque(guide.width, Int), opaque(guide.height, Int)
+    column, row = Int(column), Int(row)
+    luminance = dr.dot(color, Array3f(*LUMINANCE))
+
+    # Deviation, from a variance smoothed over 3x3 pixels: a single one is noise itself.
+    spread = Float(0)
+    for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
+        for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
+            i, j = dr.clip(column + across, 0, width - 1), dr.clip(row + down, 0, height - 1)
+            spread += weight_x * weight_y * dr.gather(Float, variance, UInt(j * width + i))
+    scale = dr.rcp(deviations * dr.sqrt(spread) + TINY)
+
+    normal = dr.gather(Array3f, guide.normals, lane)
+    depth = dr.gather(Float, guide.depths, lane)
+    item = dr.gather(UInt, guide.items, lane)
+    slope = guide.direction_from_pixel.T @ normal
+    offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
+    nearness = dr.rcp(plane * depth + TINY)
+
+    total, total_variance, weight = Array3f(0), Float(0), Float(0)
+    for down, weight_y in zip(range(-2, 3), SPLINE, strict=True):
+        for across, weight_x in zip(range(-2, 3), SPLINE, strict=True):
+            i, j = column + across * step, row + down * step
+            is_inside = (i >= 0) & (j >= 0) & (i < width) & (j < height)
+            tap = UInt(dr.select(is_inside, j * width + i, 0))
+            is_same = is_inside & (dr.gather(UInt, guide.items, tap) == item)
+            other = dr.gather(Array3f, color, tap)
+            difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) * scale
+            beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
+                slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
+            )
+            difference += dr.abs(beyond - offset) * nearness
+            cosine: Any = dr.clip(dr.dot(normal, dr.gather(Array3f, guide.normals, tap)), 0.0, 1.0)
+            share = dr.select(is_same, dr.exp(-difference) * cosine**exponent, 0.0) if across or down else 1.0
+            share = share * Float(weight_x * weight_y)
+            total += share * other
+            total_variance += share * share * dr.gather(Float, variance, tap)
+            weight += share
+    return total / weight, total_variance / (weight * weight)
