@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import scipy.ndimage
 
-from enfilade.metric import Aqm, MetricOptions
+from enfilade.metric import Aqm, Fitted, MetricOptions
 from enfilade.metric.comparison import Pool, PoolingRule
 from enfilade.metric.cortex import bands
-from enfilade.metric.decision import Decision
+from enfilade.metric.decision import Decision, Masking
 from enfilade.metric.spatial import Aperture
 from enfilade.viewing import Viewing
 
@@ -27,23 +27,53 @@ def transducer_twin():
     return module
 
 
-def test_twin(transducer_twin):
+@pytest.mark.parametrize("count", [1, 3])
+def test_twin(transducer_twin, count):
     random = np.random.default_rng(8)
-    smooth = scipy.ndimage.gaussian_filter(random.standard_normal((2, 6, *SHAPE)), (0, 0, 1.5, 1.5))
-    reference = (12.0 * smooth[0]).astype(np.float32)
-    test = (reference + 8.0 * smooth[1] * (np.arange(SHAPE[1]) > 30)).astype(np.float32)
-    finest = bands(PPD, 1.0)[1]
-    assert finest.reduction == 1
-    aperture = Aperture(SHAPE, PPD)
+    ladder = tuple(band for band in bands(PPD, 1.0) if band.reduction == 1)[-count:]
+    shown = []
+    for _ in ladder:
+        smooth = scipy.ndimage.gaussian_filter(random.standard_normal((2, 6, *SHAPE)), (0, 0, 1.5, 1.5))
+        reference = (12.0 * smooth[0]).astype(np.float32)
+        test = (reference + 8.0 * smooth[1] * (np.arange(SHAPE[1]) > 30)).astype(np.float32)
+        shown.append((reference, test))
+    aperture = Aperture(SHAPE, PPD, Fitted().aperture_sigma_deg)
     pool = Pool(bands(PPD, 1.0), np.ones(SHAPE, bool), PoolingRule(1.0, 1.0, True), aperture)
-    channels = ((c.copy(), None, t - c) for c, t in zip(reference, test, strict=True))
-    Decision(MetricOptions.modern(), 0.7, 1.0, aperture).add(pool, finest, channels)
+    decision = Decision(pool, Masking(MetricOptions.modern(), Fitted(), 0.7, 1.0), aperture)
+    for band, images in zip(ladder, shown, strict=True):
+        decision.add(band, ((c.copy(), None, t - c) for c, t in zip(*images, strict=True)))
+    decision.close()
     jnd = pool.comparison().jnd
     places = [(y, x) for y in (0, 13, 24, 40) for x in (8, 30, 41, 56)]
-    expected = [transducer_twin.band_jnd(reference, test, y, x, PPD) for y, x in places]
+    expected = [
+        sum(
+            transducer_twin.band_jnd(images, shown[max(k - 1, 0) : k] + shown[k + 1 : k + 2], y, x, PPD)
+            for k, images in enumerate(shown)
+        )
+        for y, x in places
+    ]
     found = [jnd[place] for place in places]
     # The map is interpolated from every eighth pixel.
     np.testing.assert_allclose(found, expected, rtol=0.06, atol=0.03 * max(expected))
+
+
+def test_a_mask_of_a_neighbouring_band_hides(viewing):
+    y, x = np.mgrid[:120, :160] / viewing.pixels_per_degree
+    grey = np.full(y.shape, 40.0)
+    found = {}
+    for name, options in (
+        ("broad", MetricOptions.modern()),
+        ("narrow", MetricOptions.modern().without("broad_masking")),
+    ):
+        judge = Aqm(viewing.cropped(160, 120), options=options)
+        for mask in (0.0, 0.5):
+            reference = grey * (1 + mask * np.cos(2 * np.pi * 2.0 * x))
+            test = reference + grey * 0.05 * np.cos(2 * np.pi * 5.0 * x)
+            images = (test.astype(np.float32), reference.astype(np.float32))
+            found[name, mask] = judge.compare(*images).score
+    # The two lie in neighbouring bands: only the broad pool lets one hide the other.
+    assert found["broad", 0.5] < 0.5 * found["broad", 0.0]
+    assert found["narrow", 0.5] > 0.75 * found["narrow", 0.0]
 
 
 @pytest.fixture(scope="module")

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from enfilade.metric.spatial import APERTURE_SIGMA_DEG, Aperture, patch_gain
+from enfilade.metric import Fitted
+from enfilade.metric.spatial import Aperture, patch_gain
 
 PPD = 28.0
+APERTURE_SIGMA_DEG = Fitted().aperture_sigma_deg
 SHAPE = (96, 128)
 
 
 def gathered(energy, reduction):
-    aperture = Aperture(SHAPE, PPD)
+    aperture = Aperture(SHAPE, PPD, APERTURE_SIGMA_DEG)
     (on_grid,) = aperture.gather(aperture.coarse(energy, reduction)[None], reduction)
     return aperture.full(on_grid)
 
@@ -44,12 +46,12 @@ def test_gain_makes_the_reference_patch_one():
     patch = np.cos(2 * np.pi * 6 * degrees) * np.exp(-radius2 / (2 * 0.5**2))
     aperture = np.exp(-radius2 / (2 * APERTURE_SIGMA_DEG**2))
     energy = (patch**2 * aperture).sum() / aperture.sum()
-    assert patch_gain() ** 2 * energy == pytest.approx(1.0, rel=0.01)
+    assert patch_gain(APERTURE_SIGMA_DEG) ** 2 * energy == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 50), (37, 5)])
 def test_any_size(shape):
-    aperture = Aperture(shape, PPD)
+    aperture = Aperture(shape, PPD, APERTURE_SIGMA_DEG)
     on_grid = aperture.gather(aperture.coarse(np.ones(shape, np.float32), 1)[None], 1)
     assert aperture.full(on_grid[0]).shape == shape
     assert (on_grid <= 1.001).all()

@@ -29,6 +29,7 @@ DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would l
     "csf_within_bands",
     "ripple_free",
     "transducer",
+    "broad_masking",
     "spatial_pooling",
     "transient",
 )

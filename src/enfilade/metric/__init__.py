@@ -12,7 +12,7 @@
 from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison, Part
 from enfilade.metric.eye import Pursuit
-from enfilade.metric.options import MetricOptions
+from enfilade.metric.options import Fitted, MetricOptions
 from enfilade.metric.sequence import SequenceAqm, sequence_score
 
-__all__ = ["Aqm", "Comparison", "MetricOptions", "Part", "Pursuit", "SequenceAqm", "sequence_score"]
+__all__ = ["Aqm", "Comparison", "Fitted", "MetricOptions", "Part", "Pursuit", "SequenceAqm", "sequence_score"]

@@ -12,13 +12,14 @@ from enfilade.errors import InputError
 from enfilade.metric.borders import MirrorBorder, fill_undefined
 from enfilade.metric.comparison import Comparison, Pool, PoolingRule
 from enfilade.metric.cortex import Band, CortexTransform, Partition, bands
-from enfilade.metric.decision import Channel, Decision
+from enfilade.metric.decision import Channel, Decision, Masking
 from enfilade.metric.eye import Pursuit, held_smear, retinal_velocity
+from enfilade.metric.gathered import BandWeight, Turning
 from enfilade.metric.inputs import check_luminance, check_map, check_valid
 from enfilade.metric.masking import MASK_SLOPE
 from enfilade.metric.noise import NOISE_SIGMAS
 from enfilade.metric.observer import Observer
-from enfilade.metric.options import MetricOptions
+from enfilade.metric.options import Fitted, MetricOptions
 from enfilade.metric.pair import ImagePair, Retina
 from enfilade.metric.pyramid import double, halved_shape
 from enfilade.metric.sensitivity import FINEST_REDUCTION, ChannelSensitivity, SensitivityTable
@@ -29,6 +30,9 @@ __all__ = ["Aqm"]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
+
+
+FITTED = Fitted()
 
 
 class Aqm:
@@ -48,7 +52,10 @@ class Aqm:
     pursuit : Pursuit
         What the eye does while the image moves; `compare` may override it.
     mask_slope : float
-        Slope of visual masking by threshold elevation, 0 to 1 (`metric.masking`).
+        Slope of visual masking by threshold elevation, 0 to 1 (`metric.masking`); a transducer has
+        none.
+    fitted : Fitted
+        Numbers of the modern mode that were fitted; others than the default serve to test them.
     workers : int
         Threads of the FFT, 1 or more.
 
@@ -76,6 +83,7 @@ class Aqm:
         options: MetricOptions | None = None,
         pursuit: Pursuit = Pursuit.BOTH,
         mask_slope: float = MASK_SLOPE,
+        fitted: Fitted = FITTED,
         workers: int = 1,
     ) -> None:
         if not 0.0 <= mask_slope <= 1.0:
@@ -89,7 +97,7 @@ class Aqm:
         self.pursuit = pursuit
         self.mask_slope = mask_slope
         self._shape = (viewing.height_px, viewing.width_px)
-        self._observer = Observer(viewing, self.options)
+        self._observer = Observer(viewing, self.options, fitted)
         density = viewing.pixels_per_degree
         oversampling = self._observer.oversampling
         base = bands(density, oversampling)[-1]
@@ -110,10 +118,14 @@ class Aqm:
             self._observer.csf, self.cortex.bands, density, by_luminance=self._observer.knows_luminance
         )
         self._retina = Retina(self._border, self.cortex, density, is_adaptive=self.options.luminance_adaptive)
-        self._aperture = Aperture(self._shape, density) if self.options.spatial_pooling else None
+        self._aperture = (
+            Aperture(self._shape, density, fitted.aperture_sigma_deg)
+            if self.options.spatial_pooling
+            else None
+        )
         exponent = self._observer.channel_exponent
         self._rule = PoolingRule(exponent, self._observer.spatial_exponent, self.options.transducer)
-        self._decision = Decision(self.options, mask_slope, exponent, self._aperture)
+        self._masking = Masking(self.options, fitted, mask_slope, exponent)
 
     def compare(
         self,
@@ -168,15 +180,17 @@ class Aqm:
         test, reference = fill_undefined(test, reference, valid)
         pair = self._retina.pair(test, reference, is_judged, noise_variance, change)
         movements = (pursuit or self.pursuit).hypotheses
-        planes = [] if velocity is None else [_every_second(velocity, is_judged)] * len(movements)
-        velocities = [retinal_velocity(p, eye) for p, eye in zip(planes, movements, strict=False)]
-        smears = self._smears(planes, movements)
-        sensitivity = ChannelSensitivity(self._table, velocities, pair.light, smears)
+        plane = None if velocity is None else _every_second(velocity, is_judged)
+        sensitivity = self._sensitivity(pair, plane, movements)
+        turning = self._turning(pair, plane, movements)
         pool = Pool(self.cortex.bands, is_judged, self._rule, self._aperture)
+        decision = Decision(pool, self._masking, self._aperture)
         for band in self.cortex.bands:
-            self._decision.add(pool, band, self._channels(pair, band, sensitivity))
+            weight = None if turning is None or band.is_base else turning.of(band)
+            decision.add(band, self._channels(pair, band, sensitivity, weight), weight=weight)
             if change is not None:
-                self._decision.add(pool, band, self._flicker(pair, band), is_transient=True)
+                decision.add(band, self._flicker(pair, band), is_transient=True)
+        decision.close()
         return pool.comparison()
 
     def check(
@@ -201,14 +215,32 @@ class Aqm:
         if velocity is not None:
             check_map("velocity", velocity, (*self._shape, 2), valid, is_signed=True)
 
-    def _smears(self, planes: list[Float32Array], movements: Sequence[Pursuit]) -> list[Float32Array | None]:
-        """How far held frames smear for each eye movement; nothing where displays flash."""
-        if not self.options.hold_blur:
-            return []
-        hold_s = self.viewing.persistence / self.viewing.fps
-        return [held_smear(p, eye, hold_s) for p, eye in zip(planes, movements, strict=False)]
+    def _sensitivity(
+        self, pair: ImagePair, plane: Float32Array | None, movements: Sequence[Pursuit]
+    ) -> ChannelSensitivity:
+        planes = [] if plane is None else [plane] * len(movements)
+        velocities = [retinal_velocity(p, eye) for p, eye in zip(planes, movements, strict=False)]
+        smears = [held_smear(p, eye, self._hold_s) for p, eye in zip(planes, movements, strict=False)]
+        return ChannelSensitivity(self._table, velocities, pair.light, smears if self._hold_s else [])
 
-    def _channels(self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity) -> Iterator[Channel]:
+    def _turning(
+        self, pair: ImagePair, plane: Float32Array | None, movements: Sequence[Pursuit]
+    ) -> Turning | None:
+        """What corrects for directions within channels; None where nothing moves or is gathered."""
+        if plane is None or self._aperture is None or not self._masking.weighs_gathered:
+            return None
+        if not self.options.csf_within_bands:
+            return None
+        return Turning(self._table, self._aperture, pair.light, plane, movements, self._hold_s)
+
+    @property
+    def _hold_s(self) -> float:
+        """How long a frame is held; 0 where displays are taken to flash."""
+        return self.viewing.persistence / self.viewing.fps if self.options.hold_blur else 0.0
+
+    def _channels(
+        self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity, turned: BandWeight | None
+    ) -> Iterator[Channel]:
         """Reference, test and difference of each channel of a band, in units of its threshold."""
         shape = halved_shape(self._shape, band.reduction)
         contrast = pair.contrast.at(sensitivity.reduction(band))
@@ -217,15 +249,19 @@ class Aqm:
         for orientation in self.cortex.orientations(band):
             channel = self.cortex.fan(ring, band, orientation)
             reference, difference = self._border.crop(channel, band.reduction, shape)
-            if weight is None or not sensitivity.is_still:
-                weight = _at_size(sensitivity.map(band, orientation) * contrast, band, shape)
-            test = None if self.options.transducer else (reference + difference) * weight
             uniform = pair.uniform_part(difference, band.reduction) if band.is_base else 0.0
+            test = None if self.options.transducer else reference + difference
             difference -= np.float32(uniform)
             if pair.noise is not None:
                 deviation = pair.noise.deviation(band, orientation)
                 explained = np.float32(NOISE_SIGMAS) * self._border.crop(deviation, band.reduction, shape)
                 difference -= np.clip(difference, -explained, explained)
+            if turned is not None:
+                turned.look(difference)
+            if weight is None or not sensitivity.is_still:
+                weight = _at_size(sensitivity.map(band, orientation) * contrast, band, shape)
+            if test is not None:
+                test *= weight
             reference *= weight
             difference *= weight
             if uniform:

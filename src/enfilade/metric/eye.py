@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from typing import TypeAlias
 
 import numpy as np
@@ -120,15 +119,29 @@ def held_smear(velocity_deg_s: Float32Array, pursuit: Pursuit, hold_s: float) ->
     return smear
 
 
-def smeared_share(smear_deg: Float32Array, theta_deg: float | None, frequency_cpd: float) -> Float32Array:
+def _along(vector: Float32Array, theta_deg: float | Float32Array | None) -> Float32Array:
+    """Component of a field along a direction, signed; its length where there is none."""
+    across, down = vector
+    if theta_deg is None:
+        length: Float32Array = np.hypot(across, down)
+        return length
+    theta = np.radians(np.asarray(theta_deg, dtype=np.float32))
+    along: Float32Array = np.cos(theta) * across
+    along += np.sin(theta) * down
+    return along
+
+
+def smeared_share(
+    smear_deg: Float32Array, theta_deg: float | Float32Array | None, frequency_cpd: float
+) -> Float32Array:
     """Contrast that a smear leaves of a channel: the spectrum of a box as long as the smear.
 
     Parameters
     ----------
     smear_deg : (2, ...) float32
         From `held_smear`.
-    theta_deg : float or None
-        Direction of the frequency vector; None for the base band.
+    theta_deg : float, float32 or None
+        Direction of the frequency vector, the same everywhere or not; None for the base band.
     frequency_cpd : float
         Cycles per degree.
 
@@ -137,17 +150,14 @@ def smeared_share(smear_deg: Float32Array, theta_deg: float | None, frequency_cp
     (...) float32
         0..1.
     """
-    across, down = smear_deg
-    if theta_deg is None:
-        along: Float32Array = np.hypot(across, down)
-    else:
-        theta = math.radians(theta_deg)
-        along = np.float32(math.cos(theta)) * across + np.float32(math.sin(theta)) * down
+    along = _along(smear_deg, theta_deg)
     share: Float32Array = np.abs(np.sinc(along * np.float32(frequency_cpd)))
     return share
 
 
-def channel_speed(retinal_velocity_deg_s: Float32Array, theta_deg: float | None) -> Float32Array:
+def channel_speed(
+    retinal_velocity_deg_s: Float32Array, theta_deg: float | Float32Array | None
+) -> Float32Array:
     """Speed over the retina along the frequency vector of a channel (§3.4).
 
     A pattern blurs along its motion: bars across it lose their detail, bars along it keep theirs.
@@ -157,22 +167,18 @@ def channel_speed(retinal_velocity_deg_s: Float32Array, theta_deg: float | None)
     ----------
     retinal_velocity_deg_s : (2, ...) float32
         From `retinal_velocity`, degrees per second.
-    theta_deg : float or None
+    theta_deg : float, float32 or None
         Direction of the frequency vector (the normal of the bars), degrees from x (right) towards
-        y (down); None for the base band, which has no direction and takes the whole speed.
+        y (down), the same everywhere or not; None for the base band, which has no direction and
+        takes the whole speed.
 
     Returns
     -------
     (...) float32
         Degrees per second, never below the eye's drift of 0.15.
     """
-    across, down = retinal_velocity_deg_s
-    if theta_deg is None:
-        along: Float32Array = np.hypot(across, down)
-    else:
-        theta = math.radians(theta_deg)
-        along = np.float32(math.cos(theta)) * across
-        along += np.float32(math.sin(theta)) * down
+    along = _along(retinal_velocity_deg_s, theta_deg)
+    if theta_deg is not None:
         np.abs(along, out=along)
     np.maximum(along, np.float32(EYE_DRIFT_DEG_S), out=along)
     return along

@@ -11,7 +11,7 @@ from enfilade.metric.castle import castle_sensitivity
 from enfilade.metric.cortex import OVERSAMPLING, Band
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import EYE_DRIFT_DEG_S
-from enfilade.metric.options import MetricOptions
+from enfilade.metric.options import Fitted, MetricOptions
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.metric.spatial import REFERENCE_AREA_DEG2, SPATIAL_EXPONENT, patch_gain
 from enfilade.metric.transient import flicker_sensitivity
@@ -36,6 +36,8 @@ class Observer:
         Screen and distance.
     options : MetricOptions
         Departures from the paper.
+    fitted : Fitted
+        Of which the aperture counts.
 
     Attributes
     ----------
@@ -49,14 +51,14 @@ class Observer:
         Of the bands: energies that are gathered need none.
     """
 
-    def __init__(self, viewing: Viewing, options: MetricOptions) -> None:
+    def __init__(self, viewing: Viewing, options: MetricOptions, fitted: Fitted) -> None:
         self._viewing = viewing
         self._options = options
         # Exponents are of contrast; the transducer's J is of energy already.
         power = ENERGY if options.transducer else 1.0
         self.channel_exponent = (ENERGY if options.ripple_free else POOLING_EXPONENT) / power
         self.spatial_exponent = SPATIAL_EXPONENT / power
-        self.gain = patch_gain() if options.spatial_pooling else 1.0
+        self.gain = patch_gain(fitted.aperture_sigma_deg) if options.spatial_pooling else 1.0
         self._flicker: dict[int, Float64Array] = {}
         gathers = options.transducer and options.spatial_pooling
         self.oversampling = 1.0 if gathers else OVERSAMPLING

@@ -2,12 +2,53 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, Self
 
 from enfilade.errors import InputError
 
-__all__ = ["MetricOptions"]
+__all__ = ["Fitted", "MetricOptions"]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Numbers of the modern mode that were set by looking at what people see; all others are cited.
+
+    `enfilade validate` sets each anew with a part of the data left out, and says what that part then
+    shows.
+
+    Parameters
+    ----------
+    semi_saturation : float
+        z of the transducer, no unit, with broad masking: fitted to the ten masks of Foley 1994, together
+        with `neighbour_share`.
+    narrow_semi_saturation : float
+        z without broad masking, fitted alike.
+    neighbour_share : float
+        How much a neighbouring band masks, against a neighbouring orientation; no unit.
+    aperture_sigma_deg : float
+        Standard deviation of the aperture of spatial pooling, degrees: chosen. Models of detection have
+        0.25 to 0.6 deg (Watson and Ahumada 2005, J. Vis. 5(9): 0.6); ModelFest does not tell these
+        apart, and a small one leaves a sharper map.
+
+    Raises
+    ------
+    InputError
+        A number is not above 0; `neighbour_share` may be 0.
+    """
+
+    semi_saturation: float = 1.3
+    narrow_semi_saturation: float = 0.7
+    neighbour_share: float = 0.5
+    aperture_sigma_deg: float = 0.3
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            number = getattr(self, field.name)
+            if not (math.isfinite(number) and (number > 0 or (number == 0 and "share" in field.name))):
+                msg = f"metric: {field.name} is {number!r}; give a finite number above 0"
+                raise InputError(msg)
 
 
 @dataclass(frozen=True)
@@ -28,13 +69,17 @@ class MetricOptions:
         (`metric.eye`); the paper's screens flashed.
     csf_within_bands : bool
         The CSF varies within a band as it does for still images, instead of being that of the
-        band's centre throughout.
+        band's centre throughout; and what moves is judged by the direction that it has within a
+        channel, where energies are gathered (`metric.direction`).
     ripple_free : bool
         Channels are pooled with exponent 2, so that contrast between the centres of channels
         counts as much as at them, instead of 3.5.
     transducer : bool
         Masking by a transducer, in which a faint mask helps and a strong one hides
         (`metric.transducer`), instead of threshold elevation, in which it only hides.
+    broad_masking : bool
+        Neighbouring bands mask too, as neighbouring orientations do. Without the transducer or
+        spatial pooling it does nothing.
     spatial_pooling : bool
         What the eye gathers around the point that it looks at, instead of each pixel by itself.
     transient : bool
@@ -47,6 +92,7 @@ class MetricOptions:
     csf_within_bands: bool = False
     ripple_free: bool = False
     transducer: bool = False
+    broad_masking: bool = False
     spatial_pooling: bool = False
     transient: bool = False
 
@@ -70,6 +116,7 @@ class MetricOptions:
             csf_within_bands=True,
             ripple_free=True,
             transducer=True,
+            broad_masking=True,
             spatial_pooling=True,
             transient=True,
         )

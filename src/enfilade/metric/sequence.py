@@ -13,6 +13,7 @@ from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import check_map
+from enfilade.metric.masking import MASK_SLOPE
 from enfilade.metric.options import MetricOptions
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.metric.transient import ErrorChange
@@ -38,6 +39,8 @@ class SequenceAqm:
         By default the modern mode.
     pursuit : Pursuit
         What the eye does while the image moves.
+    mask_slope : float
+        As `Aqm`: of threshold elevation.
     workers : int
         Threads of the FFT.
 
@@ -53,10 +56,11 @@ class SequenceAqm:
         *,
         options: MetricOptions | None = None,
         pursuit: Pursuit = Pursuit.BOTH,
+        mask_slope: float = MASK_SLOPE,
         workers: int = 1,
     ) -> None:
         modern = MetricOptions.modern() if options is None else options
-        self.aqm = Aqm(viewing, options=modern, pursuit=pursuit, workers=workers)
+        self.aqm = Aqm(viewing, options=modern, pursuit=pursuit, mask_slope=mask_slope, workers=workers)
         self._changes = ErrorChange()
 
     def judge(

@@ -14,9 +14,6 @@ __all__ = ["REFERENCE_AREA_DEG2", "SPATIAL_EXPONENT", "Aperture", "patch_gain"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 
-# Our choice. Models of detection gather over 0.25 to 0.6 deg (Watson and Ahumada 2005, J. Vis. 5(9),
-# have 0.6); ModelFest does not tell these apart, and a small aperture leaves a sharper map.
-APERTURE_SIGMA_DEG = 0.3
 SPATIAL_EXPONENT = 2.0  # no unit: contrast energy
 COARSEST_SIGMA = 1.0  # samples: the aperture is applied at reduced size, but not more reduced than this
 REACH_SIGMAS = 3.5
@@ -25,7 +22,7 @@ REFERENCE_SIGMA_DEG = 0.5  # of the Gabor patch at which pooling leaves the CSF 
 REFERENCE_AREA_DEG2 = math.pi * REFERENCE_SIGMA_DEG**2  # its area in castleCSF's terms
 
 
-def patch_gain() -> float:
+def patch_gain(sigma_deg: float) -> float:
     """By how much contrasts are multiplied so that a Gabor patch at threshold gathers to energy one.
 
     The CSF is measured with patches, so their area is in it already: with this gain the aperture
@@ -33,16 +30,21 @@ def patch_gain() -> float:
     course of the threshold with size by itself. The energy of the patch at contrast one, seen
     through the aperture of sigma a, is 1 / (2 (1 + 2 a^2 / s^2)).
 
+    Parameters
+    ----------
+    sigma_deg : float
+        Of the aperture, degrees.
+
     Returns
     -------
     float
-        1.86.
+        1.86 for 0.3 deg.
     """
-    return math.sqrt(2.0 * (1.0 + 2.0 * (APERTURE_SIGMA_DEG / REFERENCE_SIGMA_DEG) ** 2))
+    return math.sqrt(2.0 * (1.0 + 2.0 * (sigma_deg / REFERENCE_SIGMA_DEG) ** 2))
 
 
 class Aperture:
-    """Gathers energies under a Gaussian of sigma 0.3 deg, on a coarse grid.
+    """Gathers energies under a Gaussian, on a coarse grid.
 
     Nothing lies beyond the borders: there the eye gathers from one side only.
 
@@ -52,6 +54,8 @@ class Aperture:
         Height and width of the image, pixels.
     pixels_per_degree : float
         Of the viewing conditions.
+    sigma_deg : float
+        Standard deviation, degrees (`metric.options.Fitted`).
 
     Attributes
     ----------
@@ -59,8 +63,8 @@ class Aperture:
         A sample of the grid stands at every `reduction`-th pixel.
     """
 
-    def __init__(self, shape: tuple[int, int], pixels_per_degree: float) -> None:
-        sigma_px = APERTURE_SIGMA_DEG * pixels_per_degree
+    def __init__(self, shape: tuple[int, int], pixels_per_degree: float, sigma_deg: float) -> None:
+        sigma_px = sigma_deg * pixels_per_degree
         self.reduction = 2 ** max(math.floor(math.log2(max(sigma_px / COARSEST_SIGMA, 1.0))), 0)
         self._shape = shape
         self._sigma = sigma_px / self.reduction

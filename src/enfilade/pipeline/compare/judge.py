@@ -171,7 +171,12 @@ def metric_options(mode: str, *, include: Iterable[str] = (), leave_out: Iterabl
 class _Judge:
     def __init__(self, viewing: Viewing, terms: Terms) -> None:
         self._viewing = viewing
-        self._aqm = SequenceAqm(viewing, options=terms.options, pursuit=Pursuit(terms.metric.metering.value))
+        self._aqm = SequenceAqm(
+            viewing,
+            options=terms.options,
+            pursuit=Pursuit(terms.metric.metering.value),
+            mask_slope=terms.metric.mask_slope,
+        )
         density = viewing.pixels_per_degree
         self.bands = tuple(
             Band(band.low_cpp * density, band.high_cpp * density) for band in self._aqm.aqm.cortex.bands

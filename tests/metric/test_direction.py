@@ -1,0 +1,76 @@
+"""Directions within channels: exact for gratings, the centre for noise, and what they do to what moves."""
+
+import numpy as np
+import pytest
+
+from enfilade.metric import Aqm, MetricOptions
+from enfilade.metric.cortex import ORIENTATIONS_DEG, CortexTransform
+from enfilade.metric.direction import channel_directions
+from enfilade.viewing import Viewing
+
+SIZE = 128
+PPD = 28.0
+
+
+def energies(image):
+    transform = CortexTransform(SIZE, SIZE, PPD)
+    band = transform.bands[1]
+    ring = transform.ring(transform.spectra(image[None].astype(np.float32)), band)
+    return np.stack([np.mean(np.square(transform.fan(ring, band, n)[0])) for n in range(6)])[:, None]
+
+
+def grating(theta_deg, cycles=40.0):
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    fx, fy = (round(cycles * part(np.radians(theta_deg))) for part in (np.cos, np.sin))
+    return np.cos(2 * np.pi * (fx * x + fy * y)), np.degrees(np.arctan2(fy, fx))
+
+
+@pytest.mark.parametrize("theta_deg", [0, 10, 30, 45, 52, 75, -20, -45, -88])
+def test_gratings_are_found(theta_deg):
+    image, exact = grating(theta_deg)
+    found = energies(image)
+    directions = channel_directions(found)[:, 0]
+    for direction, energy in zip(directions, found[:, 0], strict=True):
+        if energy > 0.01 * found.sum():
+            away = (direction - exact + 90) % 180 - 90
+            assert abs(away) < 0.5
+
+
+def test_noise_has_the_centre():
+    noise = np.random.default_rng(5).standard_normal((SIZE, SIZE))
+    away = channel_directions(energies(noise))[:, 0] - np.array(ORIENTATIONS_DEG)
+    # 4 % more in one neighbour than in the other, as by chance here, are 7 degrees.
+    assert np.abs(away).max() < 9.0
+
+
+def test_nothing_has_the_centre():
+    found = channel_directions(np.zeros((6, 3), np.float32))
+    np.testing.assert_array_equal(found, np.array(ORIENTATIONS_DEG)[:, None] * np.ones(3))
+
+
+def test_a_half_way_grating_is_as_visible_as_its_own_motion_says():
+    # A grating at 45 degrees that moves to the right changes like an upright one that moves at cos 45
+    # degrees of its speed; by its channels' centres, 30 and 60 degrees, it would be one at cos 60 mostly.
+    viewing = Viewing(640, 480, persistence=0.0).cropped(SIZE, SIZE)
+
+    def score(image, speed_deg_s, *, within):
+        options = MetricOptions.modern() if within else MetricOptions.modern().without("csf_within_bands")
+        reference = np.full(image.shape, 40.0, np.float32)
+        test = (40.0 * (1 + 0.02 * image)).astype(np.float32)
+        velocity = np.zeros((*image.shape, 2), np.float32)
+        velocity[..., 0] = speed_deg_s
+        return Aqm(viewing, options=options).compare(test, reference, velocity=velocity).score
+
+    tilted, upright = grating(45, 24.0)[0], grating(0, 24.0)[0]
+    speed = 20.0
+    # The eye's speed follows the whole motion, so the upright one is given the retinal speed's share.
+    retinal = 0.18 * speed - 0.15
+    slower = (retinal * np.cos(np.pi / 4) + 0.15) / 0.18
+    ratios = [
+        score(tilted, speed, within=within)
+        / score(upright, slower, within=within)
+        / (score(tilted, 0.0, within=within) / score(upright, 0.0, within=within))
+        for within in (True, False)
+    ]
+    assert ratios[0] == pytest.approx(1.0, abs=0.15)
+    assert abs(ratios[1] - 1.0) > 2 * abs(ratios[0] - 1.0)
