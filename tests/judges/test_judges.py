@@ -140,8 +140,14 @@ def test_without_its_package_flip_says_how_to_get_it(monkeypatch):
         Flip(VIEWING)
 
 
+def test_without_its_package_colorvideovdp_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pycvvdp", None)
+    with pytest.raises(SettingsError, match="pip install cvvdp"):
+        open_judge("cvvdp", VIEWING)
+
+
 def test_an_unknown_judge_is_refused_with_the_known_ones():
-    with pytest.raises(SettingsError, match="known are: aqm, flip, psnr, temporal"):
+    with pytest.raises(SettingsError, match="known are: aqm, flip, psnr, temporal, cvvdp"):
         open_judge("taste", VIEWING)
 
 

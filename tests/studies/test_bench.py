@@ -120,7 +120,10 @@ def test_a_contestant_can_be_added_and_one_begun_anew(held):
     terms = dataclasses.replace(TERMS, redo=("traced-1",))
     again = bench(job, [*everybody[:1], *more], terms, folder, told)
     assert [row["name"] for row in again["contestants"]] == ["traced-1", "traced-2"]
-    assert {stage.partition(":")[0] for stage in told.stages} == {"traced-1", "traced-2"}
+    assert {stage.partition(":")[0] for stage in told.stages} - {"noise of the reference"} == {
+        "traced-1",
+        "traced-2",
+    }
     # the same random numbers, so the same frames, and so the same verdicts
     assert again["contestants"][0]["scores"] == found["contestants"][0]["scores"]
 
@@ -233,3 +236,16 @@ def test_sessions_add_up_and_starts_and_videos_are_not_charged():
     both = first + second
     assert (both.cpu_s, both.wall_s, both.peak_bytes, both.sessions) == (11.0, 13.0, 300, 2)
     assert Spent.from_dict(json.loads(json.dumps(both.to_dict()))).stages == both.stages
+
+
+def test_the_floor_is_what_a_perfect_contestant_would_get(held, tmp_path):
+    job, _, _, found, _ = held
+    floor = found["reference"]["floor"]
+    rows = {row["name"]: row["scores"] for row in found["contestants"]}
+    for judge in found["judges"]:
+        assert (floor[judge] > rows["traced-4"][judge]) == found["judges"][judge]["is_more_better"]
+    # Four times the paths in the reference, half the noise: 6 dB, less what clipping takes.
+    more = bench(
+        job, lineup(job, traced=(4,), denoised=(), presets=()), Terms(256, ("psnr",)), tmp_path, Silence()
+    )
+    assert more["reference"]["floor"]["psnr"] - floor["psnr"] == pytest.approx(6.0, abs=1.0)

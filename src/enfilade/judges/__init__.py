@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from enfilade.judges.aqm import AqmJudge
+from enfilade.judges.colorvideovdp import ColorVideoVdp
 from enfilade.judges.flip import Flip
 from enfilade.judges.judge import Judge, Scale
 from enfilade.judges.panel import JUDGES, SCALES, open_judge, why_missing
@@ -24,6 +25,7 @@ __all__ = [
     "JUDGES",
     "SCALES",
     "AqmJudge",
+    "ColorVideoVdp",
     "Flip",
     "Judge",
     "Psnr",

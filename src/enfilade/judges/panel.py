@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 from enfilade.errors import SettingsError
 from enfilade.judges.aqm import AqmJudge
+from enfilade.judges.colorvideovdp import ColorVideoVdp
 from enfilade.judges.flip import Flip
 from enfilade.judges.judge import Judge, Scale
 from enfilade.judges.psnr import Psnr
@@ -15,7 +16,7 @@ from enfilade.viewing import Viewing
 
 __all__ = ["JUDGES", "SCALES", "open_judge", "why_missing"]
 
-SCALES: dict[str, Scale] = {of.SCALE.name: of.SCALE for of in (AqmJudge, Flip, Psnr, Temporal)}
+SCALES: dict[str, Scale] = {of.SCALE.name: of.SCALE for of in (AqmJudge, Flip, Psnr, Temporal, ColorVideoVdp)}
 JUDGES = tuple(SCALES)
 
 
@@ -44,6 +45,8 @@ def open_judge(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) 
             return Psnr()
         case "temporal":
             return Temporal()
+        case "cvvdp":
+            return ColorVideoVdp(viewing)
         case _:
             raise SettingsError(f"there is no judge {name!r}; known are: {', '.join(JUDGES)}")
 
@@ -52,4 +55,6 @@ def why_missing(name: str) -> str:
     """Why a judge can't be had here, and how to get it; empty where it can."""
     if name == "flip" and find_spec("flip_evaluator") is None:
         return "FLIP is left out: pip install 'enfilade[judges]' brings it"
+    if name == "cvvdp" and find_spec("pycvvdp") is None:
+        return "ColorVideoVDP is left out: pip install cvvdp brings it, and PyTorch"
     return ""

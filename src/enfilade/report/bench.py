@@ -88,6 +88,11 @@ def _panel(ax: Any, found: Mapping[str, Any], judge: str, of: Mapping[str, Any])
         ]
         if points:
             _curve(ax, points, family, style)
+    floor = found["reference"]["floor"].get(judge)
+    if floor is not None:
+        ax.axhline(
+            floor, color=GREY, linewidth=1.0, linestyle=(0, (1, 3)), label="noise of the reference", zorder=2
+        )
     ax.set_xscale("log")
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

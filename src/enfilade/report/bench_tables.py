@@ -28,8 +28,8 @@ def _contestants(found: Mapping[str, Any]) -> Table:
     width, height = found["size"]
     judges = found["judges"]
     table = _table(f"{found['scene']}, {len(found['frames'])} frames of {width}x{height}", "contestant")
-    for heading in ("CPU", "wall", "MiB", *(f"{of['title']}, {of['unit']}" for of in judges.values())):
-        table.add_column(heading, justify="right")
+    for heading in ("CPU", "wall", "MiB", *(f"{of['title']}\n{of['unit']}" for of in judges.values())):
+        table.add_column(heading, justify="right", no_wrap=True)
     family = None
     for row in found["contestants"]:
         if family not in (None, row["family"]):
@@ -38,8 +38,11 @@ def _contestants(found: Mapping[str, Any]) -> Table:
         cost = row["cost"]
         cells = [seconds(cost["cpu_s"]), seconds(cost["wall_s"]), f"{cost['peak_mib']:.0f}"]
         table.add_row(row["name"], *cells, *(score_text(row["scores"][judge]) for judge in judges))
+    if floor := found["reference"]["floor"]:
+        table.add_section()
+        table.add_row("noise of reference", "", "", "", *(score_text(floor[judge]) for judge in judges))
     filters = " and ".join(found["reference"]["filters"])
-    table.caption = f"against references of {found['reference']['spp']} paths a pixel, filter {filters}"
+    table.caption = f"references of {found['reference']['spp']} paths a pixel, filter {filters}"
     return table
 
 
@@ -58,8 +61,8 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
             table.caption = f"denoised: geometric mean over the judges {denoised['geometric_mean']:.2f}"
         tables.append(table)
     if verdict["paper"]:
-        table = _table("better than the paper's method by every judge, at less cost", "paper")
-        table.add_column("ours")
+        table = _table("decoupled, better by every judge at less cost", "than")
+        table.add_column("which")
         for rival, names in verdict["paper"].items():
             table.add_row(rival, ", ".join(names) or "none")
         tables.append(table)
@@ -83,5 +86,5 @@ def _table(title: str, first: str, *others: str) -> Table:
     table = Table(title=title, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
     table.add_column(first, no_wrap=True)
     for name in others:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     return table

@@ -114,6 +114,7 @@ def bench(
             if any(c.pixel_filter is f for c in able)
         }
         rows = [race_of.contestant(c, judges) for c in able]
+        floor = race_of.floor(able, judges)
         found = {
             "format": FORMAT,
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -124,7 +125,7 @@ def bench(
             "fps": job.path.fps,
             "frames": list(job.path.numbers),
             "pixels_per_degree": job.viewing.pixels_per_degree,
-            "reference": {"spp": terms.reference_spp, "filters": references},
+            "reference": {"spp": terms.reference_spp, "filters": references, "floor": floor},
             "judges": {
                 j: {
                     "title": SCALES[j].title,
@@ -192,6 +193,32 @@ class _Race:
             "scores": {name: verdicts[name]["score"] for name in judges},
             "per_frame": {name: verdicts[name]["per_frame"] for name in judges},
         }
+
+    def floor(self, contestants: Sequence[Contestant], judges: Sequence[str]) -> dict[str, float | None]:
+        """What the judges would say of a perfect contestant: all of it the noise of the reference.
+
+        A path traced contestant of N paths and the reference of R differ by noise whose variance is
+        1/N + 1/R of a path's; a perfect contestant differs from the reference by 1/R of it.
+        """
+        traced = [c for c in contestants if c.family == "traced"]
+        if not traced:
+            return {}
+        one = max(traced, key=lambda c: c.job.settings.trace.spp)
+        ratio = self._terms.reference_spp / one.job.settings.trace.spp
+        unit = f"floor by {one.name}"
+        made = _ledger_digest(self._run.folder / "contestants" / one.name)
+        line = self._run.done(unit)
+        found = dict(line["scores"]) if line is not None and line["made"] == made else {}
+        missing = [name for name in judges if name not in found]
+        if missing:
+            self._monitor.stage("noise of the reference: judges", len(self._job.path))
+            test = self._run.folder / "contestants" / one.name
+            reference = self._reference_folder(one.pixel_filter)
+            share = (1.0 + ratio) ** -0.5
+            said = judge(test, reference, self._job, missing, self._monitor, share=share)
+            found |= {name: of["score"] for name, of in said.items()}
+            self._run.finish(unit, files=[], facts={"scores": found, "made": made})
+        return {name: found[name] for name in judges}
 
     def forget(self, name: str) -> None:
         """Begin a contestant anew: its frames, its costs and what was said of it go."""

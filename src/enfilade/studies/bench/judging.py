@@ -19,7 +19,9 @@ from enfilade.records import F32, Flow
 __all__ = ["judge", "pairs"]
 
 
-def judge(test: Path, reference: Path, job: Job, names: Sequence[str], monitor: Monitor) -> dict[str, Any]:
+def judge(
+    test: Path, reference: Path, job: Job, names: Sequence[str], monitor: Monitor, *, share: float = 1.0
+) -> dict[str, Any]:
     """Let judges look at two run folders, each frame read once.
 
     Parameters
@@ -32,6 +34,8 @@ def judge(test: Path, reference: Path, job: Job, names: Sequence[str], monitor: 
         Of judges.
     monitor
         Is told of each frame.
+    share
+        Of the test's difference to the reference that is judged: 1 is the test itself.
 
     Returns
     -------
@@ -41,7 +45,7 @@ def judge(test: Path, reference: Path, job: Job, names: Sequence[str], monitor: 
     pursuit = Pursuit(job.settings.metric.metering.value)
     judges = {name: open_judge(name, job.viewing, pursuit=pursuit) for name in names}
     values: dict[str, list[float | None]] = {name: [] for name in names}
-    for pair in pairs(test, reference, job):
+    for pair in pairs(test, reference, job, share=share):
         for name, one in judges.items():
             values[name].append(one.judge(pair))
         monitor.advance()
@@ -59,8 +63,8 @@ def error_of(name: str, score: float | None) -> float:
     return 0.0 if score is None else SCALES[name].error_of(score)
 
 
-def pairs(test: Path, reference: Path, job: Job) -> Iterator[Shown]:
-    """Frames of two run folders side by side, in order."""
+def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[Shown]:
+    """Frames of two run folders side by side, in order; see :func:`judge`."""
     path = job.path
     exposure_ev = job.settings.viewing.exposure_ev
     last: dict[str, Any] | None = None
@@ -69,10 +73,12 @@ def pairs(test: Path, reference: Path, job: Job) -> Iterator[Shown]:
         before, after = path.neighbours(frame)
         flow = Flow(layers["backward"], layers["forward"], before is not None, after is not None)
         seen = seen_before(layers, last) if last is not None and before is not None else None
-        color = read_exr(_file(test, number))["RGB"]
+        color, wanted = _f32(read_exr(_file(test, number))["RGB"]), _f32(layers["RGB"])
+        if share != 1.0:
+            color = wanted + np.float32(share) * (color - wanted)
         yield shown(
-            _f32(color),
-            _f32(layers["RGB"]),
+            color,
+            wanted,
             job.viewing,
             exposure_ev=exposure_ev,
             flow=flow,
