@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 JOB_INPUTS = ("scene", "path_file", "size", "frames", "fps")
 SECTIONS = ("viewing", "metric", "keyframes", "warp", "masks", "antialias", "light")
-JUDGES = ("aqm", "flip", "psnr", "temporal", "cvvdp")  # `judges.JUDGES`, which --help can't ask: it would load NumPy
+JUDGES = ("aqm", "flip", "psnr", "temporal", "cvvdp")  # `judges.JUDGES`; to ask it would load NumPy
 
 
 class Counts(click.ParamType[tuple[int, ...]]):
