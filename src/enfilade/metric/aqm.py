@@ -14,7 +14,7 @@ from enfilade.metric.comparison import Comparison, Pool, PoolingRule
 from enfilade.metric.cortex import Band, CortexTransform, Partition, bands
 from enfilade.metric.decision import Channel, Decision, Masking
 from enfilade.metric.eye import Pursuit, held_smear, retinal_velocity
-from enfilade.metric.gathered import BandWeight, Turning
+from enfilade.metric.gathered import BandWeight, FixedWeight, Turning
 from enfilade.metric.inputs import check_luminance, check_map, check_valid
 from enfilade.metric.masking import MASK_SLOPE
 from enfilade.metric.noise import NOISE_SIGMAS
@@ -187,9 +187,9 @@ class Aqm:
         decision = Decision(pool, self._masking, self._aperture)
         for band in self.cortex.bands:
             weight = None if turning is None or band.is_base else turning.of(band)
-            decision.add(band, self._channels(pair, band, sensitivity, weight), weight=weight)
+            decision.add(band, self._channels(pair, band, sensitivity, weight), weight)
             if change is not None:
-                decision.add(band, self._flicker(pair, band), is_transient=True)
+                decision.add(band, *self._flicker(pair, band), is_transient=True)
         decision.close()
         return pool.comparison()
 
@@ -270,14 +270,18 @@ class Aqm:
                 difference += np.copysign(still, difference)
             yield reference, test, difference
 
-    def _flicker(self, pair: ImagePair, band: Band) -> Iterator[Channel]:
+    def _flicker(self, pair: ImagePair, band: Band) -> tuple[list[Channel], BandWeight | None]:
         """The change of the error in a band, all orientations together; nothing masks it."""
         shape = halved_shape(self._shape, band.reduction)
         ring = self.cortex.ring(pair.spectra[2:], band)
         (change,) = self._border.crop(self.cortex.fan(ring, band, None), band.reduction, shape)
+        if self._aperture is not None and self._masking.weighs_gathered:
+            light = pair.light.at(self._aperture.reduction)
+            fixed = FixedWeight(self._observer.flicker_weight(band, light))
+            return [(np.zeros_like(change), None, change)], fixed
         light = pair.light.at(ChannelSensitivity.reduction(band))
         change *= _at_size(self._observer.flicker_weight(band, light), band, shape)
-        yield np.zeros_like(change), None, change
+        return [(np.zeros_like(change), None, change)], None
 
 
 def _every_second(velocity: Float32Array, is_judged: BoolArray) -> Float32Array:

@@ -88,8 +88,8 @@ class Decision:
         self,
         band: Band,
         channels: Iterable[Channel],
-        *,
         weight: BandWeight | None = None,
+        *,
         is_transient: bool = False,
     ) -> None:
         """Add the channels of one band; bands come finest first.
