@@ -11,6 +11,7 @@ from enfilade.metric import MetricOptions
 from enfilade.monitor import Silence
 from enfilade.studies.people import validate as validation
 from enfilade.studies.people.figures import ASKED, Asked, Figure, Measured
+from enfilade.studies.people.fits import Fit
 from enfilade.studies.people.flicker import Pair
 from enfilade.studies.people.foley import Masking
 from enfilade.studies.people.modelfest import Thresholds
@@ -40,7 +41,8 @@ def made_up(mode, *, error_db=0.5, flicker_jnd=2.0, is_bound=True):
 
 
 def run(monkeypatch, *arguments, **measured):
-    found = Validation((made_up("paper", error_db=9.0, is_bound=False), made_up("modern", **measured)))
+    modes = (made_up("paper", error_db=9.0, is_bound=False), made_up("modern", **measured))
+    found = Validation(modes, (Fit("number", "made up", (0.5,), 1.25, 1.375, (0.25,), (0.5,)),))
     monkeypatch.setattr(validation, "validate", lambda _: found)
     return CliRunner().invoke(main, ["validate", "--quiet", *arguments])
 
@@ -71,6 +73,8 @@ def test_all_met_exits_with_0(monkeypatch):
     assert found.exit_code == 0, found.output
     assert "Missed" not in found.output
     assert "ModelFest Gabors" in found.output
+    assert "0.25 to 0.5" in found.output
+    assert "1.375" in found.output
 
 
 def test_a_missed_figure_is_named_and_exits_with_1(monkeypatch):

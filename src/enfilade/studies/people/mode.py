@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from enfilade.metric import Aqm, MetricOptions, SequenceAqm
+from enfilade.metric import Aqm, Fitted, MetricOptions, SequenceAqm
 from enfilade.metric.castle import castle_sensitivity
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import EYE_DRIFT_DEG_S
 from enfilade.viewing import Viewing
 
 __all__ = ["MODERN", "PAPER", "Mode"]
+
+
+FITTED = Fitted()
 
 
 @dataclass(frozen=True)
@@ -23,14 +26,17 @@ class Mode:
         For tables.
     options : MetricOptions
         What it does otherwise than the paper.
+    fitted : Fitted
+        Numbers that were fitted; others than the metric's own are tried in `fits`.
     """
 
     name: str
     options: MetricOptions
+    fitted: Fitted = FITTED
 
     def image_judge(self, viewing: Viewing) -> Aqm:
         """The metric for single images."""
-        return Aqm(viewing, options=self.options)
+        return Aqm(viewing, options=self.options, fitted=self.fitted)
 
     def sequence_judge(self, viewing: Viewing) -> SequenceAqm:
         """The metric for sequences, as `enfilade compare` has it."""

@@ -7,8 +7,9 @@ from typing import Any
 
 from enfilade.metric import MetricOptions
 from enfilade.monitor import Monitor
-from enfilade.studies.people import flicker, foley, modelfest, moving_texture, sensitivity
+from enfilade.studies.people import fits, flicker, foley, modelfest, moving_texture, sensitivity
 from enfilade.studies.people.figures import Figure, Measured
+from enfilade.studies.people.fits import Fit
 from enfilade.studies.people.mode import MODERN, PAPER, Mode
 
 __all__ = ["Validation", "ablate", "measure", "validate"]
@@ -22,9 +23,12 @@ class Validation:
     ----------
     modes : tuple of Measured
         The paper's and the modern mode, or those of an ablation.
+    fits : tuple of Fit
+        What was fitted, judged by data left out; none for an ablation.
     """
 
     modes: tuple[Measured, ...]
+    fits: tuple[Fit, ...] = ()
 
     @property
     def missed(self) -> tuple[Figure, ...]:
@@ -38,6 +42,7 @@ class Validation:
             "is_met": not self.missed,
             "missed": [figure.name for figure in self.missed],
             "modes": [mode.to_dict() for mode in self.modes],
+            "fits": [found.to_dict() for found in self.fits],
         }
 
 
@@ -69,14 +74,15 @@ def measure(mode: Mode, monitor: Monitor, *, is_bound: bool) -> Measured:
 
 
 def validate(monitor: Monitor) -> Validation:
-    """Both modes; something is asked of the modern one.
+    """Both modes, of which something is asked of the modern one, and what was fitted.
 
     Parameters
     ----------
     monitor : Monitor
         Is told of each stimulus.
     """
-    return Validation((measure(PAPER, monitor, is_bound=False), measure(MODERN, monitor, is_bound=True)))
+    modes = (measure(PAPER, monitor, is_bound=False), measure(MODERN, monitor, is_bound=True))
+    return Validation(modes, fits.measure(MODERN, monitor))
 
 
 def ablate(monitor: Monitor) -> Validation:
