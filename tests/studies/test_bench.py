@@ -163,7 +163,10 @@ def test_who_can_not_take_part_is_named(held, tmp_path, monkeypatch):
     told = Told()
     everybody = lineup(job, traced=(), denoised=(1,), presets=())
     found = bench(job, everybody, TERMS, tmp_path / "bench", told)
-    assert found["left_out"] == ["no FLIP here", "denoised-1: no denoiser here"]
+    assert found["left_out"] == [
+        "no FLIP here",
+        "path tracing, denoised does not take part: no denoiser here",
+    ]
     assert told.said[:2] == found["left_out"]
     assert "flip" not in found["judges"]
     with pytest.raises(SettingsError, match="no FLIP here"):

@@ -43,6 +43,7 @@ STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and lin
 OURS = "decoupled"
 AMPLIFIED = 4.0  # how much larger differences are shown than they are
 CROP_PX = 72  # side of a crop
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 SHOWN_FRAMES = 3
 SHOWN_A_FAMILY = 3  # contestants of one family among the crops: cheapest, middle, dearest
 
@@ -62,9 +63,12 @@ def plot_bench(found: Mapping[str, Any], file: Path) -> Path:
     rows = -(-len(judges) // columns)
     figure = Figure(figsize=(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.9), dpi=DPI, layout="constrained")
     width, height = found["size"]
+    machine, spp = found["machine"], found["reference"]["spp"]
     figure.suptitle(
-        f"{found['scene']}: {len(found['frames'])} frames of {width}x{height}",
-        fontsize=13,
+        f"{found['scene']}, {len(found['frames'])} frames of {width}x{height}\n"
+        f"references of {spp} paths a pixel; {machine['cores']} cores of {machine['processor']}; "
+        f"{found['date'][:10]}",
+        fontsize=11,
         color=INK,
     )
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -87,7 +91,7 @@ def _panel(ax: Any, found: Mapping[str, Any], judge: str, of: Mapping[str, Any])
             if c["family"] == family and c["scores"][judge] is not None
         ]
         if points:
-            _curve(ax, points, family, style)
+            _curve(ax, points, family, style, is_more_better=of["is_more_better"])
     floor = found["reference"]["floor"].get(judge)
     if floor is not None:
         ax.axhline(
@@ -112,23 +116,32 @@ def _panel(ax: Any, found: Mapping[str, Any], judge: str, of: Mapping[str, Any])
 
 
 def _curve(
-    ax: Any, points: Sequence[tuple[float, float, Any]], family: str, style: Mapping[str, Any]
+    ax: Any,
+    points: Sequence[tuple[float, float, Any]],
+    family: str,
+    style: Mapping[str, Any],
+    *,
+    is_more_better: bool,
 ) -> None:
+    """A curve through the contestants that no cheaper one of the family beats; the others beside it, open."""
     is_ours = family == OURS
+    best = _front(points, is_more_better=is_more_better)
+    look = {"color": style["color"], "marker": style["marker"], "markersize": 8 if is_ours else 6.5}
     ax.plot(
-        [p[0] for p in points],
-        [p[1] for p in points],
-        **style,
+        [p[0] for p in best],
+        [p[1] for p in best],
+        **(look | {"linestyle": style["linestyle"], "label": style["label"]}),
         linewidth=2.6 if is_ours else 1.5,
-        markersize=8 if is_ours else 6.5,
         markeredgecolor="white",
         markeredgewidth=0.8,
         zorder=4 if is_ours else 3,
     )
-    for cpu_s, score, contestant in points:
+    for point in points:
+        if point not in best:
+            ax.plot(*point[:2], **look, linestyle="none", markerfacecolor="white", zorder=3)
         ax.annotate(
-            _short(contestant),
-            (cpu_s, score),
+            _short(point[2]),
+            point[:2],
             xytext=(0, 7),
             textcoords="offset points",
             ha="center",
@@ -138,11 +151,21 @@ def _curve(
         )
 
 
+def _front(
+    points: Sequence[tuple[float, float, Any]], *, is_more_better: bool
+) -> list[tuple[float, float, Any]]:
+    kept: list[tuple[float, float, Any]] = []
+    for point in sorted(points, key=lambda p: p[0]):
+        if not kept or (point[1] > kept[-1][1] if is_more_better else point[1] < kept[-1][1]):
+            kept.append(point)
+    return kept
+
+
 def _short(contestant: Mapping[str, Any]) -> str:
     """What tells a point from its neighbours on the curve: paths a pixel, or the end of its name."""
     if contestant["family"] in (OURS, "paper"):
         return str(contestant["name"]).rpartition("-")[2]
-    return str(contestant["spp"])
+    return f"{contestant['spp']}{contestant['variant'][:1] if contestant['variant'] != 'high' else ''}"
 
 
 def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
@@ -184,7 +207,8 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
         if reference is None:
             continue
         axes[2 * row, 0].imshow(reference[place], interpolation="nearest")
-        axes[2 * row, 0].text(2, 8, f"frame {number}", color="white", fontsize=7)
+        axes[2 * row + 1, 0].text(0.5, 0.9, f"↑ frame {number}", fontsize=8, color=INK, **CENTRED)
+        axes[2 * row + 1, 0].text(0.5, 0.5, "4 × difference →", fontsize=7, color=INK, **CENTRED)
         for column, name in enumerate(shown, start=1):
             axes[2 * row, column].imshow(images[name][place], interpolation="nearest")
             off = _difference(images[name][place], against[name][place])

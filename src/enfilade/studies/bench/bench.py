@@ -29,7 +29,7 @@ from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job
 from enfilade.renderer import PixelFilter
 from enfilade.settings import Settings
 from enfilade.store import Run
-from enfilade.studies.bench.contestants import Contestant
+from enfilade.studies.bench.contestants import FAMILIES, Contestant
 from enfilade.studies.bench.judging import judge
 from enfilade.studies.bench.machine import machine, versions
 from enfilade.studies.bench.race import race
@@ -98,7 +98,8 @@ def bench(
         A judge that was asked for by name can't be had here.
     """
     judges, left_out = _judges(terms.judges)
-    left_out += [f"{c.name}: {why}" for c in contestants if (why := _why_unable(c))]
+    reasons = {c.family: why for c in contestants if (why := _why_unable(c))}
+    left_out += [f"{FAMILIES[family]} does not take part: {why}" for family, why in reasons.items()]
     able = [c for c in contestants if not _why_unable(c)]
     for text in left_out:
         monitor.say(text)
@@ -188,6 +189,7 @@ class _Race:
             "name": one.name,
             "family": one.family,
             "spp": one.job.settings.trace.spp,
+            "variant": one.variant,
             "pixel_filter": one.pixel_filter.name.lower(),
             "cost": cost,
             "scores": {name: verdicts[name]["score"] for name in judges},

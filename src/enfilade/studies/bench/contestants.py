@@ -26,6 +26,7 @@ __all__ = [
 
 TRACED_SPP = (4, 16, 64, 256)
 DENOISED_SPP = (1, 2, 4, 8, 16, 32)
+DENOISER_QUALITIES = ("high", "fast")  # its best, and five times cheaper, which pays at few paths
 FAMILIES = {  # in the order in which they are shown: name, for people
     "traced": "path tracing",
     "denoised": "path tracing, denoised",
@@ -76,19 +77,22 @@ class Contestant:
     job : Job
     pixel_filter : PixelFilter
         That of its reference.
+    variant : str
+        What sets it apart from another of its family with as many paths: the denoiser's quality.
     """
 
     name: str
     family: str
     job: Job
     pixel_filter: PixelFilter = PixelFilter.GAUSSIAN
+    variant: str = ""
 
     def setting(self) -> dict[str, Any]:
         """What its frames depend on, beside scene and path: plain values for JSON."""
         tables = self.job.settings.to_tables()
         if self.family in METHODS:
             return {"method": self.job.method, **tables}
-        kept = {"trace": tables["trace"]}
+        kept = {"trace": tables["trace"], "variant": self.variant}
         return {**kept, "keyframes": tables["keyframes"]} if self.family == "interpolated" else kept
 
     def task(self) -> Any:
@@ -99,7 +103,7 @@ class Contestant:
             case "traced":
                 return EveryFrame(self.job, self.pixel_filter)
             case "denoised":
-                return EveryFrame(self.job, self.pixel_filter, is_denoised=True)
+                return EveryFrame(self.job, self.pixel_filter, self.variant)
             case "interpolated":
                 return Interpolated(self.job)
             case _:
@@ -126,10 +130,10 @@ def lineup(
     """
     spps = sorted(set(traced))
     found = [Contestant(f"traced-{n}", "traced", _with_spp(job, n)) for n in spps]
-    found += [
-        Contestant(f"denoised-{n}", "denoised", _with_spp(job, n), PixelFilter.BOX)
-        for n in sorted(set(denoised))
-    ]
+    for n in sorted(set(denoised)):
+        for quality in DENOISER_QUALITIES:
+            name = f"denoised-{n}" if quality == DENOISER_QUALITIES[0] else f"denoised-{n}-{quality}"
+            found.append(Contestant(name, "denoised", _with_spp(job, n), PixelFilter.BOX, quality))
     if spps:
         found.append(Contestant(f"minterpolate-{spps[-1]}", "interpolated", _with_spp(job, spps[-1])))
     return found + [Contestant(p.name, p.method, _preset_job(job, p)) for p in presets]

@@ -58,15 +58,15 @@ class EveryFrame:
     job : Job
         Paths, seed and longest path of its ``trace`` settings count, and its path.
     pixel_filter : PixelFilter
-    is_denoised : bool
-        By Open Image Denoise, with guides without noise.
+    denoiser : {"", "high", "balanced", "fast"}
+        Quality of Open Image Denoise, with guides without noise; empty: none.
     has_layers : bool
         Whether the frames carry geometry and flow, for those who judge: of references.
     """
 
     job: Job
     pixel_filter: PixelFilter
-    is_denoised: bool = False
+    denoiser: str = ""
     has_layers: bool = False
 
     def warm_up(self) -> None:
@@ -110,12 +110,12 @@ class EveryFrame:
                 pixel_filter=self.pixel_filter,
             )
         color = traced.color.reshape(path.height, path.width, 3)
-        if not self.is_denoised:
+        if not self.denoiser:
             return color
         with costs.of("guides"):
             albedo, normal = guides(renderer, camera, seed=settings.seed, frame=number, chunk=settings.chunk)
         with costs.of("denoise"):
-            return denoise(color, albedo, normal)
+            return denoise(color, albedo, normal, quality=self.denoiser)
 
     def _write(self, file: Path, renderer: Renderer, frame: int, color: F32) -> None:
         if not self.has_layers:
@@ -128,10 +128,12 @@ class EveryFrame:
         write_result(file, color, source, geometry, flow, position=positions(geometry))
 
     def _identity(self, renderer: Renderer) -> dict[str, Any]:
-        facts = {"filter": self.pixel_filter.name.lower(), "has_layers": self.has_layers}
-        return _identity(
-            self.job, renderer, {**facts, "denoiser": denoiser_name() if self.is_denoised else None}
-        )
+        facts = {
+            "filter": self.pixel_filter.name.lower(),
+            "has_layers": self.has_layers,
+            "denoiser": f"{denoiser_name()}, {self.denoiser}" if self.denoiser else None,
+        }
+        return _identity(self.job, renderer, facts)
 
 
 @dataclass(frozen=True, eq=False)
