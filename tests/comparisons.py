@@ -50,8 +50,15 @@ def write_sequence(
     return folder
 
 
-def terms(*, mode: str = "modern", flow: str = "auto", metering: str = "both", **fields: Any) -> Terms:
-    metric = MetricSettings.from_table({"metering": metering})
+def terms(
+    *,
+    mode: str = "modern",
+    flow: str = "auto",
+    metering: str = "both",
+    mask_slope: float = 0.7,
+    **fields: Any,
+) -> Terms:
+    metric = MetricSettings.from_table({"metering": metering, "mask_slope": mask_slope})
     return Terms(metric=metric, options=metric_options(mode), flow=FlowChoice(flow), **fields)
 
 

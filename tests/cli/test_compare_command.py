@@ -166,3 +166,21 @@ def test_nothing_unfinished_stands_under_a_final_name(run, folders, tmp_path, ta
     assert result.exit_code == 2
     assert "test/3.png" in result.stderr
     assert [f for f in out.rglob("*") if f.is_file()] == []
+
+
+@pytest.mark.parametrize(("transfer", "name"), [("smpte2084", "PQ"), ("arib-std-b67", "HLG")])
+def test_hdr_video_is_refused(run, folders, tmp_path, transfer, name):
+    # As cameras and streaming services have it: HEVC of 10 bits, BT.2020, the transfer in its own headers.
+    file = tmp_path / "hdr.mp4"
+    tags = f"colorprim=bt2020:transfer={transfer}:colormatrix=bt2020nc:log-level=error"
+    with av.open(file, "w") as container:
+        stream = container.add_stream("libx265", rate=30, options={"x265-params": tags})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p10le"
+        for _ in range(2):
+            container.mux(stream.encode(av.VideoFrame(64, 48, "yuv420p10le")))
+        container.mux(stream.encode(None))
+    result = run("compare", file, folders[1])
+    assert result.exit_code != 0
+    assert "hdr.mp4" in result.stderr
+    assert name in result.stderr
+    assert "convert" in result.stderr

@@ -1,6 +1,8 @@
 """Sequences are judged frame by frame, with the flow that comes with them."""
 
+import json
 import math
+import shutil
 
 import numpy as np
 import pytest
@@ -11,7 +13,6 @@ from comparisons import SIZE, Notes, judged, terms, textured
 from enfilade.errors import ImageError, InputError
 from enfilade.metric import MetricOptions
 from enfilade.pipeline.compare import compare, metric_options
-from enfilade.settings import ViewingSettings
 from enfilade.viewing import display_named
 
 
@@ -97,9 +98,44 @@ def test_exposure_is_for_scene_linear_frames_alone(sequence, tmp_path):
     dark = sequence("dark", [np.full((*SIZE, 3), 0.25, np.float32)])
     shown = np.full((*SIZE, 3), 188, np.uint8)  # sRGB of 0.5
     Image.fromarray(shown).save(tmp_path / "shown.png")
-    found = judged(tmp_path / "shown.png", dark, viewing=ViewingSettings(exposure_ev=1.0))
+    found = judged(tmp_path / "shown.png", dark, exposure_ev=1.0)
     assert found.frames[0].percent_visible == 0.0
     assert found.psnr_db > 45.0
+
+
+def run_of(folder, exposure_ev):
+    """The folder's frames as those of a run that is shown at so many stops."""
+    run = folder.with_name(f"run{exposure_ev:+g}")
+    shutil.copytree(folder, run / "frames")
+    settings = {"viewing": {"exposure_ev": exposure_ev}}
+    (run / "run.json").write_text(json.dumps({"identity": {"path": {"fps": 30.0}, "settings": settings}}))
+    return run
+
+
+def test_a_run_is_shown_at_its_own_exposure(sequence, tmp_path):
+    dark = sequence("dark", [np.full((*SIZE, 3), 0.25, np.float32)])
+    brighter, same = run_of(dark, 1.0), run_of(dark, 0.0)
+    Image.fromarray(np.full((*SIZE, 3), 188, np.uint8)).save(tmp_path / "shown.png")  # sRGB of 0.5
+    assert judged(tmp_path / "shown.png", brighter).psnr_db > 45.0
+    assert judged(brighter, dark).psnr_db == math.inf  # scene-linear frames beside a run take its exposure
+    assert judged(tmp_path / "shown.png", same).psnr_db < 20.0
+    assert judged(tmp_path / "shown.png", brighter, exposure_ev=0.0).psnr_db < 20.0
+    with pytest.raises(ImageError, match=r"\+1 stops.*\+0.*--viewing-exposure-ev"):
+        judged(brighter, same)
+    assert judged(brighter, same, exposure_ev=0.0).psnr_db == math.inf
+
+
+def test_the_slope_of_masking_counts_where_thresholds_are_elevated(sequence):
+    random = np.random.default_rng(3)
+    texture = random.uniform(0.1, 0.9, (*SIZE, 1)).repeat(3, axis=2).astype(np.float32)
+    folder, other = sequence("a", [texture]), sequence("b", [np.roll(texture, 1, axis=0)])
+    scores = {
+        (mode, slope): judged(folder, other, mode=mode, mask_slope=slope).score
+        for mode in ("paper", "modern")
+        for slope in (0.0, 0.7)
+    }
+    assert scores["paper", 0.0] > 2.0 * scores["paper", 0.7]
+    assert scores["modern", 0.0] == scores["modern", 0.7]
 
 
 def test_maps_are_shown_as_they_come(sequence):

@@ -161,6 +161,7 @@ def _terms(
         options=metric_options(mode, include=include, leave_out=leave_out),
         flow=FlowChoice(flow),
         fps=fps,
+        exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
     )
 
 

@@ -60,6 +60,8 @@ class VideoFile:
         It can't be read, has no picture, or is HDR or wide-gamut.
     """
 
+    exposure_ev: float | None = None  # frames are as shown
+
     def __init__(self, file: Path) -> None:
         self.file = file
         with _failures(file), _opened(file) as container:

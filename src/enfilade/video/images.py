@@ -41,13 +41,15 @@ class ImageFiles:
         In order, at least one.
     fps
         Frames per second, None if unknown.
+    exposure_ev
+        Stops with which a run's frames are shown, None if it is no run.
 
     Attributes
     ----------
     files : list of Path
     width, height : int
         Of the first image, pixels.
-    fps : float or None
+    fps, exposure_ev : float or None
 
     Raises
     ------
@@ -55,9 +57,10 @@ class ImageFiles:
         The first image can't be read.
     """
 
-    def __init__(self, files: list[Path], fps: float | None = None) -> None:
+    def __init__(self, files: list[Path], fps: float | None = None, exposure_ev: float | None = None) -> None:
         self.files = files
         self.fps = fps
+        self.exposure_ev = exposure_ev
         self._held: tuple[Path, dict[str, Any]] | None = None  # of the frame last read, once layers are used
         if files[0].suffix.lower() == ".exr":
             _check_primaries(files[0])

@@ -24,6 +24,7 @@ class Sequence(Protocol):
     width: int
     height: int
     fps: float | None
+    exposure_ev: float | None  # of a run, whose frames are scene-linear
 
     def __len__(self) -> int:
         """Count the frames."""
@@ -83,7 +84,7 @@ def open_sequence(source: Path | str) -> Sequence:
 
 def _from_folder(folder: Path) -> ImageFiles:
     run = folder / "run.json"
-    fps = _fps_of_run(run) if run.is_file() else None
+    fps, exposure_ev = _shown_by_run(run) if run.is_file() else (None, None)
     place = folder / "frames" if run.is_file() else folder
     files = _images(place.iterdir()) if place.is_dir() else []
     if not files:
@@ -94,7 +95,7 @@ def _from_folder(folder: Path) -> ImageFiles:
             f"{place} has images of several kinds ({', '.join(sorted(kinds))}); give a pattern such as "
             f"{place}/*{min(kinds)}"
         )
-    return ImageFiles(files, fps)
+    return ImageFiles(files, fps, exposure_ev)
 
 
 def _matching(pattern: Path) -> list[Path]:
@@ -120,8 +121,15 @@ def _natural(file: Path) -> tuple[list[tuple[int, int, str]], str]:
     return key, file.name
 
 
-def _fps_of_run(file: Path) -> float | None:
-    value = read_json(file)
-    for key in ("identity", "path", "fps"):
+def _shown_by_run(file: Path) -> tuple[float | None, float | None]:
+    """Frames per second and stops of exposure with which a run is shown."""
+    identity = read_json(file)
+    fps = _number_at(identity, "identity", "path", "fps")
+    exposure_ev = _number_at(identity, "identity", "settings", "viewing", "exposure_ev")
+    return (fps if fps is not None and fps > 0 else None), exposure_ev
+
+
+def _number_at(value: Any, *keys: str) -> float | None:
+    for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
-    return float(value) if isinstance(value, int | float) and value > 0 else None
+    return float(value) if isinstance(value, int | float) else None

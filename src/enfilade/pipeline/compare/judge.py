@@ -59,7 +59,8 @@ class Terms:
     Attributes
     ----------
     viewing, metric
-        Exposure is applied to OpenEXR frames alone: others are as shown.
+        Of `viewing` the exposure does not count; of `metric` the slope of masking counts where the
+        transducer is off.
     display
         In place of the screen of `viewing`, which an image fills whatever its size.
     options
@@ -68,6 +69,8 @@ class Terms:
         Where image flow comes from.
     fps
         Frames per second shown; by default the reference's, the test's, or 30.
+    exposure_ev
+        Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
@@ -76,6 +79,7 @@ class Terms:
     options: MetricOptions = field(default_factory=MetricOptions.modern)
     flow: FlowChoice = FlowChoice.AUTO
     fps: float | None = None
+    exposure_ev: float | None = None
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
@@ -119,8 +123,10 @@ def compare(
         A sequence can't be read, the two differ in length, size or frame rate, or pixels are NaN or
         infinite. The message names the frame.
     """
-    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.viewing.exposure_ev)
+    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev)
     conditions = terms.conditions(pairs.size, pairs.fps)
+    if pairs.exposure_ev:
+        monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     motion = open_motion(pairs.test, pairs.reference, terms.flow)
     monitor.say(motion.text)
     judge = _Judge(conditions, terms)

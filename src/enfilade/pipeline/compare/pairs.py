@@ -56,24 +56,27 @@ class Pairs:
     fps
         Frames per second that are shown; None takes the reference's, the test's, or 30.
     exposure_ev
-        Of OpenEXR frames; others are as shown.
+        Stops, of OpenEXR frames; others are as shown. None takes what the run folders say, else 0.
 
     Attributes
     ----------
     test, reference : Sequence
-    fps : float
+    fps, exposure_ev : float
 
     Raises
     ------
     ImageError
-        They differ in length, size or frame rate.
+        They differ in length, size or frame rate, or are runs of different exposure.
     """
 
-    def __init__(self, test: Sequence, reference: Sequence, *, fps: float | None, exposure_ev: float) -> None:
+    def __init__(
+        self, test: Sequence, reference: Sequence, *, fps: float | None, exposure_ev: float | None
+    ) -> None:
         _check_alike(test, reference)
         self.test, self.reference = test, reference
         self.fps = _common_fps(test, reference) if fps is None else fps
-        self._exposures_ev = [exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
+        self.exposure_ev = _common_exposure_ev(test, reference) if exposure_ev is None else exposure_ev
+        self._exposures_ev = [self.exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
 
     def __len__(self) -> int:
         return len(self.test)
@@ -120,7 +123,9 @@ class Pairs:
         return Pair(index, self.test.name(index), test, reference, relative[1], error)
 
 
-def open_pairs(test: Path | str, reference: Path | str, *, fps: float | None, exposure_ev: float) -> Pairs:
+def open_pairs(
+    test: Path | str, reference: Path | str, *, fps: float | None, exposure_ev: float | None
+) -> Pairs:
     """Open two sequences to be compared.
 
     Parameters
@@ -133,7 +138,7 @@ def open_pairs(test: Path | str, reference: Path | str, *, fps: float | None, ex
     Raises
     ------
     ImageError
-        One can't be read, or they differ in length, size or frame rate.
+        One can't be read, they differ in length, size or frame rate, or are runs of different exposure.
     """
     return Pairs(open_sequence(test), open_sequence(reference), fps=fps, exposure_ev=exposure_ev)
 
@@ -178,6 +183,16 @@ def _common_fps(test: Sequence, reference: Sequence) -> float:
             f"{reference.fps:g} ({reference.name(0)}); say with --fps at which both are shown"
         )
     return reference.fps or test.fps or DEFAULT_FPS
+
+
+def _common_exposure_ev(test: Sequence, reference: Sequence) -> float:
+    known = [s.exposure_ev for s in (test, reference) if s.exposure_ev is not None]
+    if known and known[0] != known[-1]:
+        raise ImageError(
+            f"the test's run is shown at {known[0]:+g} stops ({test.name(0)}) and the reference's at "
+            f"{known[-1]:+g} ({reference.name(0)}); say with --viewing-exposure-ev at which both are shown"
+        )
+    return known[0] if known else 0.0
 
 
 def _is_exr(sequence: Sequence) -> bool:
