@@ -195,7 +195,10 @@ class _Meter:
         cpu, wall = self._stages.get(self._now, (0.0, 0.0))
         self._stages[self._now] = cpu + now[0] - self._since[0], wall + now[1] - self._since[1]
         self._since = now
-        self._connection.send((kind, arguments, Spent(dict(self._stages), _peak_bytes(), 1)))
+        try:
+            self._connection.send((kind, arguments, Spent(dict(self._stages), _peak_bytes(), 1)))
+        except BrokenPipeError as error:
+            raise SystemExit(1) from error  # the bench was killed: this process has nothing to say to anybody
 
 
 def _cpu_s() -> float:
