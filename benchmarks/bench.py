@@ -95,7 +95,7 @@ def judge(scene: str, found: dict) -> list[str]:
         missed += [
             f"no slower than denoised by any judge; by {name} {_text(ratio)}"
             for name, ratio in denoised["by_judge"].items()
-            if ratio["least"] < 1.0 or ratio["kind"] == "at most"
+            if ratio["times"] < 1.0 or ratio["kind"] == "at most"
         ]
     missed += [f"better than {name} at less cost" for name, ours in verdict["paper"].items() if not ours]
     return missed

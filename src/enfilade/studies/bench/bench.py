@@ -238,7 +238,10 @@ class _Race:
             cost: dict[str, Any] = line["cost"]
             return cost
         notes = self._run.folder / "spent" / folder.name
-        spent = race(task, folder, notes, _Named(self._monitor, folder.name), device=device)
+        try:
+            spent = race(task, folder, notes, _Named(self._monitor, folder.name), device=device)
+        except RunFolderError as error:
+            raise RunFolderError(f"{error}\nOr begin it anew: --redo {folder.name}") from error
         self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting})
         return spent.to_dict()
 
