@@ -241,7 +241,8 @@ class _Race:
         try:
             spent = race(task, folder, notes, _Named(self._monitor, folder.name), device=device)
         except RunFolderError as error:
-            raise RunFolderError(f"{error}\nOr begin it anew: --redo {folder.name}") from error
+            remedy = f"\nOr begin it anew: --redo {folder.name}" if setting else ""
+            raise RunFolderError(f"{error}{remedy}") from error
         self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting})
         return spent.to_dict()
 
