@@ -1,7 +1,8 @@
-"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5] [--workers 1]`.
+"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5] [--workers 1] [--device gpu]`.
 
 One table: CPU and wall time of a pair, set-up included once beside it, and the peak memory of a
 process that does nothing else. Each row runs in a process of its own. All sizes have 27.93 px/deg;
+The modern mode comes twice, with NumPy and with Dr.Jit kernels;
 "sequence" adds image flow and the change since the last frame to what moves.
 """
 
@@ -15,15 +16,18 @@ import time
 from pathlib import Path
 
 SIZES = ((640, 480), (1920, 1080), (3840, 2160))
-MODES = ("paper", "modern")
+MODES = ("paper", "modern", "kernels")  # the last is the modern mode in Dr.Jit kernels
 CASES = ("still", "moving", "moving and noisy", "sequence")
 KIB_PER_MIB = 1024
 
 
-def measure(width: int, height: int, mode: str, case: str, repeats: int, workers: int) -> dict[str, float]:
+def measure(
+    width: int, height: int, mode: str, case: str, repeats: int, workers: int, device: str
+) -> dict[str, float]:
     """Compare one pair `repeats` times; the best time counts, since others use the machine too."""
     import numpy as np
 
+    from enfilade.device import activate
     from enfilade.metric import MetricOptions, SequenceAqm
     from enfilade.viewing import Viewing
 
@@ -40,7 +44,14 @@ def measure(width: int, height: int, mode: str, case: str, repeats: int, workers
 
     started = time.process_time()
     viewing = Viewing(640, 480).cropped(width, height)
-    judge = SequenceAqm(viewing, options=getattr(MetricOptions, mode)(), workers=workers)
+    has_kernels = mode == "kernels"
+    if has_kernels:
+        activate(device)
+        import drjit as dr
+
+        dr.set_thread_count(workers - 1)  # besides the one that asks
+    options = MetricOptions.paper() if mode == "paper" else MetricOptions.modern()
+    judge = SequenceAqm(viewing, options=options, workers=workers, has_kernels=has_kernels)
 
     def pair() -> None:
         if case == "sequence":
@@ -68,25 +79,27 @@ def main() -> None:
     """Run every row in a process of its own and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--workers", type=int, default=1, help="threads of the FFT")
+    parser.add_argument("--workers", type=int, default=1, help="threads of the FFT and of kernels")
+    parser.add_argument("--device", default="cpu", help="where kernels run: cpu or gpu")
     parser.add_argument("--row", type=json.loads, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.row is not None:
-        print(json.dumps(measure(*options.row, options.repeats, options.workers)))
+        print(json.dumps(measure(*options.row, options.repeats, options.workers, options.device)))
         return
     print(
-        f"{'size':>10}  {'mode':<6}  {'case':<16}  {'CPU s':>7}  {'wall s':>7}  {'first CPU s':>11}  peak MiB"
+        f"{'size':>10}  {'mode':<7}  {'case':<16}  {'CPU s':>7}  {'wall s':>7}  {'first CPU s':>11}  peak MiB"
     )
     for width, height in SIZES:
         for mode, case in itertools.product(MODES, CASES):
             command = [sys.executable, str(Path(__file__).resolve())]
             command += ["--row", json.dumps([width, height, mode, case])]
             command += ["--repeats", str(options.repeats), "--workers", str(options.workers)]
+            command += ["--device", options.device]
             output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
             row = json.loads(output)
             print(
                 f"{width}x{height:<5}".rjust(10)
-                + f"  {mode:<6}  {case:<16}  {row['cpu_s']:7.3f}  {row['wall_s']:7.3f}"
+                + f"  {mode:<7}  {case:<16}  {row['cpu_s']:7.3f}  {row['wall_s']:7.3f}"
                 + f"  {row['first_cpu_s']:11.3f}  {row['peak_mib']:8.0f}"
             )
 

@@ -184,3 +184,12 @@ def test_hdr_video_is_refused(run, folders, tmp_path, transfer, name):
     assert "hdr.mp4" in result.stderr
     assert name in result.stderr
     assert "convert" in result.stderr
+
+
+def test_kernels_say_the_same(run, folders):
+    found = [
+        json.loads(run("compare", *folders, "--json", "--device", device).stdout)
+        for device in ("none", "cpu")
+    ]
+    assert found[0]["score_jnd"] > 1.0
+    assert found[1]["score_jnd"] == pytest.approx(found[0]["score_jnd"], rel=1e-3)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
@@ -89,6 +89,14 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     "layers.",
 )
 @click.option(
+    "--device",
+    type=click.Choice(("none", "auto", "cpu", "gpu")),
+    default="none",
+    show_default=True,
+    help="Where the modern mode's per-pixel part runs: in NumPy (none), or in Dr.Jit kernels, which are "
+    "faster and take a second to start; auto is the GPU where there is one.",
+)
+@click.option(
     "--heatmap",
     type=click.Path(path_type=Path),
     help="Write heat maps: a video (.mp4, .mkv, .mov), or a folder of PNGs.",
@@ -150,8 +158,13 @@ def _terms(
     include: tuple[str, ...],
     leave_out: tuple[str, ...],
     flow: str,
+    device: str,
 ) -> Terms:
     settings = settings_of(ctx)
+    if device != "none":
+        from enfilade.device import activate
+
+        activate(cast('Literal["auto", "cpu", "gpu"]', device))
     from enfilade.pipeline.compare import FlowChoice, Terms, metric_options
 
     return Terms(
@@ -162,6 +175,7 @@ def _terms(
         flow=FlowChoice(flow),
         fps=fps,
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
+        has_kernels=device != "none",
     )
 
 

@@ -12,7 +12,7 @@ from enfilade.errors import InputError
 from enfilade.metric.borders import MirrorBorder, fill_undefined
 from enfilade.metric.comparison import Comparison, Pool, PoolingRule
 from enfilade.metric.cortex import Band, CortexTransform, Partition, bands
-from enfilade.metric.decision import Channel, Decision, Masking
+from enfilade.metric.decision import Channel, Decision, Masking, RawChannel
 from enfilade.metric.eye import Pursuit, held_smear, retinal_velocity
 from enfilade.metric.gathered import BandWeight, FixedWeight, Turning
 from enfilade.metric.inputs import check_luminance, check_map, check_valid
@@ -58,6 +58,10 @@ class Aqm:
         Numbers of the modern mode that were fitted; others than the default serve to test them.
     workers : int
         Threads of the FFT, 1 or more.
+    has_kernels : bool
+        Whether the modern mode's per-pixel part runs in Dr.Jit kernels (`metric.kernels`), on the
+        device that `device.activate` chose, instead of in NumPy. Images with pixels that are not
+        judged take NumPy.
 
     Raises
     ------
@@ -85,6 +89,7 @@ class Aqm:
         mask_slope: float = MASK_SLOPE,
         fitted: Fitted = FITTED,
         workers: int = 1,
+        has_kernels: bool = False,
     ) -> None:
         if not 0.0 <= mask_slope <= 1.0:
             msg = f"metric: mask_slope is {mask_slope!r}; give a number from 0 to 1"
@@ -125,6 +130,7 @@ class Aqm:
         )
         exponent = self._observer.channel_exponent
         self._rule = PoolingRule(exponent, self._observer.spatial_exponent, self.options.transducer)
+        self._has_kernels = has_kernels
         self._masking = Masking(self.options, fitted, mask_slope, exponent)
 
     def compare(
@@ -187,7 +193,8 @@ class Aqm:
         decision = Decision(pool, self._masking, self._aperture)
         for band in self.cortex.bands:
             weight = None if turning is None or band.is_base else turning.of(band)
-            decision.add(band, self._channels(pair, band, sensitivity, weight), weight)
+            channels = self._raw_channels if self._is_raw(pair, band) else self._channels
+            decision.add(band, channels(pair, band, sensitivity, weight), weight)
             if change is not None:
                 decision.add(band, *self._flicker(pair, band), is_transient=True)
         decision.close()
@@ -269,6 +276,40 @@ class Aqm:
                 still = still * np.float32(abs(uniform))
                 difference += np.copysign(still, difference)
             yield reference, test, difference
+
+    def _is_raw(self, pair: ImagePair, band: Band) -> bool:
+        """Whether a band's channels go to the kernel as they are."""
+        return (
+            self._has_kernels
+            and self._masking.weighs_gathered
+            and not band.is_base
+            and bool(pair.is_judged.all())
+        )
+
+    def _raw_channels(
+        self, pair: ImagePair, band: Band, sensitivity: ChannelSensitivity, turned: BandWeight | None
+    ) -> Iterator[RawChannel]:
+        """What `_channels` gives, with the weights beside the responses."""
+        shape = halved_shape(self._shape, band.reduction)
+        contrast = pair.contrast.at(sensitivity.reduction(band))
+        ring = self.cortex.ring(pair.spectra[:2], band)
+        for orientation in self.cortex.orientations(band):
+            channel = self.cortex.fan(ring, band, orientation)
+            _, difference = self._border.crop(channel, band.reduction, shape)
+            if pair.noise is not None:
+                deviation = pair.noise.deviation(band, orientation)
+                explained = np.float32(NOISE_SIGMAS) * self._border.crop(deviation, band.reduction, shape)
+                difference -= np.clip(difference, -explained, explained)
+            if turned is not None:
+                turned.look(difference)
+            yield RawChannel(
+                channel[0],
+                channel[1],
+                weight=np.asarray(sensitivity.map(band, orientation) * contrast),
+                weight_step=sensitivity.reduction(band) // band.reduction,
+                start=self._border.margin_px // band.reduction,
+                shape=shape,
+            )
 
     def _flicker(self, pair: ImagePair, band: Band) -> tuple[list[Channel], BandWeight | None]:
         """The change of the error in a band, all orientations together; nothing masks it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +15,59 @@ from enfilade.metric.gathered import BandWeight
 from enfilade.metric.masking import masked_difference_squared
 from enfilade.metric.options import Fitted, MetricOptions
 from enfilade.metric.pooling import raised
+from enfilade.metric.pyramid import halved_shape
 from enfilade.metric.spatial import Aperture
 from enfilade.metric.transducer import energy_difference, transduced_difference
 
-__all__ = ["Channel", "Decision", "Masking"]
+__all__ = ["Channel", "Decision", "Masking", "RawChannel"]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 
 
 Channel: TypeAlias = tuple[Float32Array, Float32Array | None, Float32Array]
+
+
+@dataclass(frozen=True, eq=False)
+class RawChannel:
+    """A channel as the transform gives it, for the kernel (`metric.kernels`).
+
+    Attributes
+    ----------
+    reference, difference : (padded height, padded width) float32
+        Of the reference and of test - reference.
+    weight : () or (h', w') float32
+        From responses to contrasts in units of the threshold.
+    weight_step : int
+        1 where the map has every sample, 2 where it has every second.
+    start : int
+        First row and column that count.
+    shape : tuple of int
+        Height and width that count.
+    """
+
+    reference: Float32Array
+    difference: Float32Array
+    weight: Float32Array
+    weight_step: int
+    start: int
+    shape: tuple[int, int]
+
+    def error(self, step: int) -> Float32Array:
+        """What differs in energy, at every `step`-th sample, a multiple of `weight_step`.
+
+        The last samples may lie one beyond the image, in its border.
+        """
+        rows, columns = halved_shape(self.shape, step)
+        weight = self.weight
+        if weight.ndim:
+            apart = step // self.weight_step
+            weight = weight[::apart, ::apart][:rows, :columns]
+        down, across = (slice(self.start, self.start + step * count, step) for count in (rows, columns))
+        reference, difference = (
+            np.multiply(plane[down, across], weight) for plane in (self.reference, self.difference)
+        )
+        return energy_difference(reference, np.add(difference, reference, out=difference))[2]
 
 
 @dataclass(frozen=True)
@@ -87,7 +130,7 @@ class Decision:
     def add(
         self,
         band: Band,
-        channels: Iterable[Channel],
+        channels: Iterable[Channel | RawChannel],
         weight: BandWeight | None = None,
         *,
         is_transient: bool = False,
@@ -108,8 +151,8 @@ class Decision:
             Whether this is the change since the last frame, which nothing masks.
         """
         if not self._masking.options.transducer:
-            for reference, test, difference in channels:
-                elevated = self._elevated(reference, test, difference)
+            for channel in channels:
+                elevated = self._elevated(*cast(Channel, channel))
                 self._pool.add(band.level, elevated, band.reduction, is_transient=is_transient)
             return
         stacks = self._energies(band, channels, weight)
@@ -165,20 +208,16 @@ class Decision:
     def _energies(
         self,
         band: Band,
-        channels: Iterable[Channel],
+        channels: Iterable[Channel | RawChannel],
         weight: BandWeight | None,
     ) -> list[Float32Array]:
         """Energies of reference and test and their difference, gathered, each (n, h, w)."""
         stacks: tuple[list[Float32Array], ...] = ([], [], [])
-        for reference, _, difference in channels:
-            maps = energy_difference(reference, np.add(difference, reference, out=difference))
-            if self._aperture is not None:
-                area = self._pool.area(band.reduction)
-                if area is not None:
-                    maps[2][...] *= area
-                if weight is not None:
-                    weight.note(maps[2])
-                maps = tuple(self._aperture.coarse(energy, band.reduction) for energy in maps)
+        for channel in channels:
+            if isinstance(channel, RawChannel):
+                maps = self._summed(band, channel, weight)
+            else:
+                maps = self._compared(band, channel, weight)
             for stack, energy in zip(stacks, maps, strict=True):
                 stack.append(energy)
         if self._aperture is None:
@@ -188,6 +227,38 @@ class Decision:
             power = weight.power()
             gathered = [energies * power for energies in gathered]
         return gathered
+
+    def _compared(self, band: Band, channel: Channel, weight: BandWeight | None) -> tuple[Float32Array, ...]:
+        """Energies of one channel, on the aperture's grid if there is one."""
+        reference, _, difference = channel
+        maps = energy_difference(reference, np.add(difference, reference, out=difference))
+        if self._aperture is None:
+            return maps
+        area = self._pool.area(band.reduction)
+        if area is not None:
+            maps[2][...] *= area
+        if weight is not None:
+            weight.note(maps[2])
+        return tuple(self._aperture.coarse(energy, band.reduction) for energy in maps)
+
+    def _summed(self, band: Band, channel: RawChannel, weight: BandWeight | None) -> tuple[Float32Array, ...]:
+        """The same by the kernel, for images that are judged whole."""
+        from enfilade.metric.kernels import MOST_SUMMED, gathered_energies
+
+        aperture = cast(Aperture, self._aperture)
+        if weight is not None:
+            weight.note(channel.error(weight.samples_apart), weight.samples_apart)
+        summed = min(max(aperture.reduction // band.reduction, 1), MOST_SUMMED)
+        maps = gathered_energies(
+            channel.reference,
+            channel.difference,
+            channel.weight,
+            weight_step=channel.weight_step,
+            start=channel.start,
+            shape=channel.shape,
+            summed=summed,
+        )
+        return tuple(aperture.coarse(energy, band.reduction * summed) for energy in maps)
 
 
 def _spread(energies: Float32Array, orientations: int, share: float) -> Float32Array:

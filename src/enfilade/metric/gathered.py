@@ -31,8 +31,16 @@ class BandWeight(Protocol):
         """Look at the difference of a channel before sensitivity, at the band's size."""
         ...
 
-    def note(self, error: Float32Array) -> None:
-        """Look at the energy of the same difference in units of the threshold's, before it is gathered."""
+    def note(self, error: Float32Array, step: int = 1) -> None:
+        """Look at the energy of the same difference in units of the threshold's, before it is gathered.
+
+        It is given at every `step`-th sample of the band, `step` being at most `samples_apart`.
+        """
+        ...
+
+    @property
+    def samples_apart(self) -> int:
+        """How far apart the samples are that count, in samples of the band."""
         ...
 
     def power(self) -> Float32Array:
@@ -55,8 +63,13 @@ class FixedWeight:
     def look(self, difference: Float32Array) -> None:
         """Nothing to look at."""
 
-    def note(self, error: Float32Array) -> None:
+    def note(self, error: Float32Array, step: int = 1) -> None:
         """Nothing to look at."""
+
+    @property
+    def samples_apart(self) -> int:
+        """One."""
+        return 1
 
     def power(self) -> Float32Array:
         """The square of the weight."""
@@ -130,9 +143,14 @@ class _Turned:
         energy = np.square(self._thinned(difference))
         self._seen.append(self._of.aperture.coarse(energy, self._reduction))
 
-    def note(self, error: Float32Array) -> None:
+    def note(self, error: Float32Array, step: int = 1) -> None:
         """Add to the errors by which velocities are weighed."""
-        self._errors = self._errors + self._thinned(error)
+        self._errors = self._errors + (self._thinned(error) if step == 1 else error)
+
+    @property
+    def samples_apart(self) -> int:
+        """Two in fine bands: errors are looked at as coarsely as velocity."""
+        return self._step
 
     def _thinned(self, channel: Float32Array) -> Float32Array:
         shape = halved_shape(channel.shape, self._step)

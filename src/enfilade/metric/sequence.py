@@ -43,6 +43,8 @@ class SequenceAqm:
         As `Aqm`: of threshold elevation.
     workers : int
         Threads of the FFT.
+    has_kernels : bool
+        As `Aqm`.
 
     Raises
     ------
@@ -58,9 +60,17 @@ class SequenceAqm:
         pursuit: Pursuit = Pursuit.BOTH,
         mask_slope: float = MASK_SLOPE,
         workers: int = 1,
+        has_kernels: bool = False,
     ) -> None:
         modern = MetricOptions.modern() if options is None else options
-        self.aqm = Aqm(viewing, options=modern, pursuit=pursuit, mask_slope=mask_slope, workers=workers)
+        self.aqm = Aqm(
+            viewing,
+            options=modern,
+            pursuit=pursuit,
+            mask_slope=mask_slope,
+            workers=workers,
+            has_kernels=has_kernels,
+        )
         self._changes = ErrorChange()
 
     def judge(

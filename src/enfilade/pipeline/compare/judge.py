@@ -71,6 +71,8 @@ class Terms:
         Frames per second shown; by default the reference's, the test's, or 30.
     exposure_ev
         Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
+    has_kernels
+        Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
@@ -80,6 +82,7 @@ class Terms:
     flow: FlowChoice = FlowChoice.AUTO
     fps: float | None = None
     exposure_ev: float | None = None
+    has_kernels: bool = False
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
@@ -182,6 +185,7 @@ class _Judge:
             options=terms.options,
             pursuit=Pursuit(terms.metric.metering.value),
             mask_slope=terms.metric.mask_slope,
+            has_kernels=terms.has_kernels,
         )
         density = viewing.pixels_per_degree
         self.bands = tuple(
