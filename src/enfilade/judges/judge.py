@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -34,12 +33,6 @@ class Scale:
     unit: str
     is_more_better: bool = False
     error_of: Callable[[float], float] = float
-
-    def text(self, score: float | None) -> str:
-        """A score in about three digits; None and infinity are ``identical``."""
-        if score is None or math.isinf(score):
-            return "identical"
-        return f"{score:.1f}" if score >= 10.0 else f"{score:.2f}" if score >= 1.0 else f"{score:.4f}"
 
 
 class Judge(Protocol):

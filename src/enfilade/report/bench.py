@@ -41,6 +41,9 @@ STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and lin
     "decoupled": {"color": BLUE, "marker": "D", "linestyle": "-", "label": "enfilade, decoupled"},
 }
 OURS = "decoupled"
+BELOW = ("traced", "denoised")  # families whose labels stand below their points, out of the others' way
+LABELLED = ("", "high")  # variants that are labelled: the others lie beside them
+TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 AMPLIFIED = 4.0  # how much larger differences are shown than they are
 CROP_PX = 72  # side of a crop
 CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
@@ -66,7 +69,7 @@ def plot_bench(found: Mapping[str, Any], file: Path) -> Path:
     machine, spp = found["machine"], found["reference"]["spp"]
     figure.suptitle(
         f"{found['scene']}, {len(found['frames'])} frames of {width}x{height}\n"
-        f"references of {spp} paths a pixel; {machine['cores']} cores of {machine['processor']}; "
+        f"references of {spp} paths a pixel; {machine['processor']}, cores: {machine['cores']}; "
         f"{found['date'][:10]}",
         fontsize=11,
         color=INK,
@@ -103,7 +106,7 @@ def _panel(ax: Any, found: Mapping[str, Any], judge: str, of: Mapping[str, Any])
     ax.xaxis.set_minor_locator(NullLocator())
     if not of["is_more_better"]:
         ax.set_yscale("log")
-        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_locator(LogLocator(subs=TICKS))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.yaxis.set_minor_locator(NullLocator())
         ax.invert_yaxis()
@@ -139,12 +142,15 @@ def _curve(
     for point in points:
         if point not in best:
             ax.plot(*point[:2], **look, linestyle="none", markerfacecolor="white", zorder=3)
+        if point[2]["variant"] not in LABELLED:
+            continue
         ax.annotate(
             _short(point[2]),
             point[:2],
-            xytext=(0, 7),
+            xytext=(0, -7 if family in BELOW else 7),
             textcoords="offset points",
             ha="center",
+            va="top" if family in BELOW else "bottom",
             fontsize=7,
             color=style["color"],
             zorder=5,
@@ -165,7 +171,7 @@ def _short(contestant: Mapping[str, Any]) -> str:
     """What tells a point from its neighbours on the curve: paths a pixel, or the end of its name."""
     if contestant["family"] in (OURS, "paper"):
         return str(contestant["name"]).rpartition("-")[2]
-    return f"{contestant['spp']}{contestant['variant'][:1] if contestant['variant'] != 'high' else ''}"
+    return str(contestant["spp"])
 
 
 def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:

@@ -8,8 +8,6 @@ from typing import Any
 from rich import box
 from rich.table import Table
 
-from enfilade.report.tables import seconds
-
 SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ "}
 
 
@@ -28,7 +26,7 @@ def _contestants(found: Mapping[str, Any]) -> Table:
     width, height = found["size"]
     judges = found["judges"]
     table = _table(f"{found['scene']}, {len(found['frames'])} frames of {width}x{height}", "contestant")
-    for heading in ("CPU", "wall", "MiB", *(f"{of['title']}\n{of['unit']}" for of in judges.values())):
+    for heading in ("CPU\ns", "wall\ns", "MiB", *(f"{of['title']}\n{of['unit']}" for of in judges.values())):
         table.add_column(heading, justify="right", no_wrap=True)
     family = None
     for row in found["contestants"]:
@@ -36,7 +34,7 @@ def _contestants(found: Mapping[str, Any]) -> Table:
             table.add_section()
         family = row["family"]
         cost = row["cost"]
-        cells = [seconds(cost["cpu_s"]), seconds(cost["wall_s"]), f"{cost['peak_mib']:.0f}"]
+        cells = [number_text(cost[key]) for key in ("cpu_s", "wall_s", "peak_mib")]
         table.add_row(row["name"], *cells, *(score_text(row["scores"][judge]) for judge in judges))
     if floor := found["reference"]["floor"]:
         table.add_section()
@@ -71,19 +69,27 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
 
 def ratio_text(ratio: Mapping[str, Any]) -> str:
     """A ratio for people: ``≥ 3.12``."""
-    times = ratio["times"]
-    return SIGNS[ratio["kind"]] + (f"{times:.2f}" if times < 10.0 else f"{times:.1f}")
+    return SIGNS[ratio["kind"]] + number_text(ratio["times"])
+
+
+def number_text(value: float) -> str:
+    """A positive number in three digits, without an exponent."""
+    if value >= 100.0:
+        return f"{value:.0f}"
+    digits = 1 if value >= 10.0 else 2 if value >= 1.0 else 3 if value >= 0.1 else 4
+    return f"{value:.{digits}f}"
 
 
 def score_text(score: float | None) -> str:
     """A score in about three digits."""
     if score is None:
         return "identical"
-    return f"{score:.1f}" if score >= 10.0 else f"{score:.2f}" if score >= 1.0 else f"{score:.4f}"
+    return number_text(score)
 
 
 def _table(title: str, first: str, *others: str) -> Table:
     table = Table(title=title, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
+    table.min_width = len(title)
     table.add_column(first, no_wrap=True)
     for name in others:
         table.add_column(name, justify="right", no_wrap=True)
