@@ -22,7 +22,18 @@ ASKED_OF_TRACED_ELSEWHERE = 15.0
 ASKED_OF_DENOISED = 3.0  # geometric mean over the judges, at equal quality; by no judge slower
 OTHERS_SPP = 400  # paths a pixel of all contestants that trace every frame, roughly
 CPU_S_PER_PATH = 2.5e-6  # on one busy hyperthread
-KEPT = ("date", "machine", "versions", "scene", "size", "fps", "frames", "pixels_per_degree", "reference")
+KEPT = (
+    "date",
+    "machine",
+    "versions",
+    "scene",
+    "size",
+    "fps",
+    "frames",
+    "pixels_per_degree",
+    "reference",
+    "judges",
+)
 
 
 def main() -> int:
