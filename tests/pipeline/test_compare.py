@@ -154,6 +154,14 @@ def test_maps_are_shown_as_they_come(sequence):
     assert second.difference.steady.score == 0.0
 
 
+def test_the_screen_is_said_where_none_is_named(sequence):
+    folder = sequence("a", [textured()])
+    for display, said in ((None, True), (display_named("phone"), False)):
+        notes = Notes()
+        judged(folder, folder, notes, display=display)
+        assert any("fills a diagonal of 0.25 m" in line for line in notes.said) == said
+
+
 def test_a_display_shows_pixel_for_pixel(sequence):
     folder = sequence("a", [textured()])
     display = display_named("desktop-24-fhd")

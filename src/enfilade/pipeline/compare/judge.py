@@ -128,10 +128,16 @@ def compare(
     """
     pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev)
     conditions = terms.conditions(pairs.size, pairs.fps)
-    if pairs.exposure_ev:
-        monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     motion = open_motion(pairs.test, pairs.reference, terms.flow)
     monitor.say(motion.text)
+    if pairs.exposure_ev:
+        monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
+    if terms.display is None:
+        monitor.say(
+            f"screen: the image fills a diagonal of {conditions.diagonal_m:g} m, seen from "
+            f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; "
+            "--display names others"
+        )
     judge = _Judge(conditions, terms)
     monitor.stage("compare", len(pairs))
     found: list[FrameDifference] = []
