@@ -56,7 +56,7 @@ def lanes(values: npt.NDArray[Any]) -> Any:
     Parameters
     ----------
     values : (H, W) or (H, W, 2) or (H, W, 3) or (N,)
-        float32, int32, uint32, uint8 (widened to uint32) or bool. Other sizes are not taken.
+        float32, int32, uint32, uint64, uint8 (widened to uint32) or bool. Other sizes are not taken.
 
     Returns
     -------
@@ -70,6 +70,8 @@ def lanes(values: npt.NDArray[Any]) -> Any:
             scalar = Int
         case "u", 4:
             scalar = UInt
+        case "u", 8:
+            scalar = UInt64
         case "u", 1:
             return UInt(_aligned(values.astype(np.uint32)))
         case "b", _:

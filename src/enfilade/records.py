@@ -269,19 +269,21 @@ class LightPage:
     ----------
     frame : int
     geometry : Geometry
-    shading : Shading
-        Radiance that the diffuse lobe would send if the albedo were one; 0 where it is not known.
+    direct, indirect : Shading
+        Radiance that the diffuse lobe would send if the albedo were one, by light straight from emitters and
+        by all other; 0 where it is not known.
     is_known : (H, W) bool
         Pixels whose light was estimated.
     """
 
     frame: int
     geometry: Geometry
-    shading: Shading
+    direct: Shading
+    indirect: Shading
     is_known: Mask
 
     def __post_init__(self) -> None:
-        _check(self.is_known, self.shading.variance.shape, np.bool_, "is_known")
+        _check(self.is_known, self.direct.variance.shape, np.bool_, "is_known")
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ class Purpose(IntEnum):
     LIGHT = 3
     GATHER = 4
     SCATTER = 5
+    SCOUT = 6
     GUIDE = 5
 
 
@@ -235,11 +236,16 @@ class LightRenderer(Renderer, Protocol):
         """
         ...
 
-    def light(self, lit: Lit, rng: Any) -> Any:
-        """Estimate the radiance that the diffuse lobe would send if the albedo were one; Array3f.
+    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
+        """Estimate the radiance that the diffuse lobe would send if the albedo were one.
 
         One path, with lights sampled at its first vertex: irradiance over pi, as the material's own
         diffuse lobe weights it.
+
+        Returns
+        -------
+        direct, indirect : Array3f
+            By light straight from emitters, and by all other.
         """
         ...
 

@@ -7,7 +7,7 @@ from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.geometry import find_geometry
 from enfilade.irradiance import LightCache, Shader, open_cache, open_page
-from enfilade.pixels.estimate import estimate
+from enfilade.pixels.estimate import Estimate, Samples, estimate
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import TraceSettings
@@ -85,8 +85,12 @@ def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2
 
 
 def _shade(renderer, cache: LightCache):
-    shader = Shader(renderer)
-    return lambda rays, rng: shader.seen(cache, cache, rays, rng)[0] + shader.scattered(cache, rays, rng)
+    shader = Shader(renderer, pixel_angle=0.02)
+
+    def radiance(rays, rng):
+        return shader.seen(cache, cache, rays, rng).layers[0] + shader.scattered(cache, rays, rng)
+
+    return radiance
 
 
 def _traced(renderer, camera: Camera, spp: int) -> Shading:
@@ -125,18 +129,19 @@ def _opened_cache(pages: list[LightPage]) -> LightCache:
 
 
 def _page(renderer, camera: Camera) -> LightPage:
-    light = estimate(
+    light = Estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng: renderer.light(renderer.lit(rays), rng),
-        spp=256,
+        lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random={"seed": 3, "frame": 0, "purpose": int(Purpose.LIGHT)},
+        layers=2,
     )
+    light.add(256)
     size = (camera.height, camera.width)
-    shading = Shading(light.color.reshape(*size, 3), light.variance.reshape(size))
-    return LightPage(0, find_geometry(renderer, camera), shading, np.ones(size, bool))
+    direct, indirect = (Shading(s.color.reshape(*size, 3), s.variance.reshape(size)) for s in light.shadings)
+    return LightPage(0, find_geometry(renderer, camera), direct, indirect, np.ones(size, bool))
 
 
 def test_with_a_cache_one_sample_is_near_many_paths(diffuse):
@@ -156,7 +161,7 @@ def test_a_page_knows_its_own_pixels(diffuse):
     page = pages[0]
     geometry = page.geometry
     image = _shaded(renderer, _opened_cache([page]), geometry.camera, 1).color.reshape(36, 48, 3)
-    expected = geometry.albedo * page.shading.color
+    expected = geometry.albedo * (page.direct.color + page.indirect.color)
     # Inside surfaces; at edges a tap may be another surface, and the lamp emits.
     inside = (geometry.item == 3) | (geometry.item == 4)
     wrong = np.abs(image - expected).max(axis=2)[inside] > 0.01

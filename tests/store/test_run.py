@@ -74,7 +74,7 @@ def test_files_are_named_by_the_frame(folder, number, name):
     with Run.open(folder, IDENTITY) as run:
         for kind in KINDS:
             assert run.file(kind, number) == folder / kind / f"{name}.exr"
-        with pytest.raises(ValueError, match="known are: keyframes, raw, frames"):
+        with pytest.raises(ValueError, match="known are: keyframes, cells, raw, frames"):
             run.file("plots", number)
 
 

@@ -12,9 +12,11 @@ from enfilade.codec.frames import (
     write_result,
     write_shading,
 )
+from enfilade.codec.tables import read_arrays, write_arrays
 from enfilade.codec.whole import read_json, sweep, whole_file, write_json
 
 __all__ = [
+    "read_arrays",
     "read_attributes",
     "read_exr",
     "read_frame",
@@ -23,6 +25,7 @@ __all__ = [
     "read_shading",
     "sweep",
     "whole_file",
+    "write_arrays",
     "write_exr",
     "write_frame",
     "write_json",

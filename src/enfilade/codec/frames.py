@@ -59,14 +59,14 @@ def read_shading(file: Path) -> Shading:
     return Shading(layers["RGB"], layers["variance"], int(dropped))
 
 
-def write_light(file: Path, shading: Shading, is_known: Mask) -> None:
+def write_light(file: Path, direct: Shading, indirect: Shading, is_known: Mask) -> None:
     """Write the light of a page, exactly, and where it is known.
 
     Parameters
     ----------
     file
-    shading : Shading
-        Of shape (H, W).
+    direct, indirect : Shading
+        Of shape (H, W); their samples are dropped together.
     is_known : (H, W) bool
 
     Raises
@@ -74,11 +74,17 @@ def write_light(file: Path, shading: Shading, is_known: Mask) -> None:
     RunFolderError
         The file can't be written.
     """
-    layers = {"RGB": shading.color, "variance": shading.variance, "known": is_known.astype(np.uint32)}
-    write_exr(file, layers, attributes={"dropped": str(int(shading.dropped))})
+    layers = {
+        "RGB": direct.color,
+        "variance": direct.variance,
+        "indirect": indirect.color,
+        "indirect variance": indirect.variance,
+        "known": is_known.astype(np.uint32),
+    }
+    write_exr(file, layers, attributes={"dropped": str(int(direct.dropped))})
 
 
-def read_light(file: Path) -> tuple[Shading, Mask]:
+def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
     """Read what :func:`write_light` wrote, bit by bit the same.
 
     Raises
@@ -86,8 +92,11 @@ def read_light(file: Path) -> tuple[Shading, Mask]:
     ImageError
         The file is missing, damaged, or holds no light.
     """
-    layers = _required(file, {"known": np.uint32})
-    return read_shading(file), layers["known"] > 0
+    kinds = {"indirect": np.float32, "indirect variance": np.float32, "known": np.uint32}
+    layers = _required(file, kinds)
+    direct = read_shading(file)
+    indirect = Shading(layers["indirect"], layers["indirect variance"], direct.dropped)
+    return direct, indirect, layers["known"] > 0
 
 
 def write_frame(file: Path, frame: Frame) -> None:

@@ -9,6 +9,17 @@ from enfilade.irradiance.cache import (
     seen_from,
     smoothed,
 )
+from enfilade.irradiance.cells import Estimates
 from enfilade.irradiance.shade import Shader
 
-__all__ = ["LightCache", "Shader", "known", "open_cache", "open_page", "pooled", "seen_from", "smoothed"]
+__all__ = [
+    "Estimates",
+    "LightCache",
+    "Shader",
+    "known",
+    "open_cache",
+    "open_page",
+    "pooled",
+    "seen_from",
+    "smoothed",
+]

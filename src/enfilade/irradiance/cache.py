@@ -10,14 +10,16 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
+from enfilade.irradiance.cells import Cells
 from enfilade.pixels.lookup import Page, footprint, lookup
 from enfilade.pixels.rays import pinhole_directions
-from enfilade.pixels.wavelet import Guide, smooth
-from enfilade.records import F32, Geometry, LightPage, Mask, Shading
+from enfilade.pixels.wavelet import Guide, smooth, without_speckles
+from enfilade.records import Geometry, LightPage, Mask, Shading
 
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
 
+SPECKLE = 2.0  # times the brightest of its neighbours that a pixel may be
 LEVELS = 4  # of the wavelet that smooths a page
 DEVIATIONS = 3.0  # of the luminance, across which it smooths
 NORMAL_EXPONENT = 64.0  # light on surfaces that are turned by 12 degrees mixes by a quarter
@@ -32,10 +34,13 @@ class LightCache:
     pages : tuple of Page
     shares : tuple of Float
         How much each counts where several know a surface.
+    cells : Cells or None
+        What is known of surfaces that no page sees.
     """
 
     pages: tuple[Page, ...] = ()
     shares: tuple[Any, ...] = ()
+    cells: Cells | None = None
 
     def find(self, position: Any, normal: Any, item: Any) -> tuple[Any, Any]:
         """Light at points of surfaces.
@@ -55,24 +60,25 @@ class LightCache:
         known = Float(0)
         for page, share in zip(self.pages, self.shares, strict=True):
             found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
-            total += share * found.total
+            total += share * sum(found.totals, Array3f(0))
             weight += share * found.weight
             known += found.weight
         is_known = known > KNOWN
         return dr.select(is_known, total / weight, 0.0), is_known
 
 
-def open_cache(pages: Sequence[Page], shares: Sequence[float]) -> LightCache:
-    """Pages, and how much each counts where several know a surface."""
-    return LightCache(tuple(pages), tuple(opaque(float(share)) for share in shares))
+def open_cache(pages: Sequence[Page], shares: Sequence[float], cells: Cells | None = None) -> LightCache:
+    """Pages, and how much each counts where several know a surface; and cells for what none sees."""
+    return LightCache(tuple(pages), tuple(opaque(float(share)) for share in shares), cells)
 
 
 def open_page(page: LightPage) -> Page:
     """Make a page ready to be looked up."""
-    return _page(page.geometry, lanes(page.is_known), lanes(page.shading.color), lanes(page.shading.variance))
+    layers = [(_even(of), lanes(of.variance)) for of in (page.direct, page.indirect)]
+    return _page(page.geometry, lanes(page.is_known), layers)
 
 
-def pooled(page: LightPage, around: Sequence[Page]) -> LightPage:
+def pooled(page: LightPage, around: Sequence[Page]) -> Page:
     """What all pages together know of the surfaces of one, smoothed along them.
 
     Light that falls on a surface does not depend on who looks: each page that sees a point has an estimate
@@ -84,23 +90,30 @@ def pooled(page: LightPage, around: Sequence[Page]) -> LightPage:
     around
         Pages opened, the one itself among them.
 
+    Direct light, which has edges, is smoothed apart from indirect light, which has more noise.
+
     Returns
     -------
-    LightPage
-        Known where ``page`` is.
+    Page
+        Opened, of one layer; known where ``page`` is.
     """
-    geometry = page.geometry
-    light, variance, _ = _gathered(geometry, around, [1.0] * len(around))
-    light, variance = _smooth(geometry, page.is_known, light, variance)
-    size = page.is_known.shape
-    shading = Shading(image(light, *size), image(variance, *size), page.shading.dropped)
-    return LightPage(page.frame, geometry, shading, page.is_known)
+    layers, _ = _gathered(page.geometry, around, [1.0] * len(around))
+    smoothed = [_smooth(page.geometry, page.is_known, light, variance) for light, variance in layers]
+    light = sum((light for light, _ in smoothed), Array3f(0))
+    variance = sum((variance for _, variance in smoothed), Float(0))
+    return _page(page.geometry, lanes(page.is_known), [(light, variance)])
 
 
-def smoothed(geometry: Geometry, shading: Shading) -> F32:
-    """Smooth what surfaces scatter, along them, as far as its noise asks for; (H, W, 3)."""
-    light, _ = _smooth(geometry, geometry.is_hit, lanes(shading.color), lanes(shading.variance))
-    return image(light, *shading.variance.shape)
+def smoothed(geometry: Geometry, shading: Shading) -> Shading:
+    """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left."""
+    light, variance = _smooth(geometry, geometry.is_hit, _even(shading), lanes(shading.variance))
+    size = shading.variance.shape
+    return Shading(image(light, *size), image(variance, *size), shading.dropped)
+
+
+def _even(shading: Shading) -> Any:
+    height, width = shading.variance.shape
+    return without_speckles(lanes(shading.color), width=width, height=height, times=SPECKLE)
 
 
 def _smooth(geometry: Geometry, where: Mask, light: Any, variance: Any) -> tuple[Any, Any]:
@@ -125,33 +138,38 @@ def _smooth(geometry: Geometry, where: Mask, light: Any, variance: Any) -> tuple
 
 def known(geometry: Geometry, pages: Sequence[Page]) -> Mask:
     """Pixels of a view of which some page knows the light, (H, W)."""
-    _, _, is_known = _gathered(geometry, pages, [1.0] * len(pages))
+    _, is_known = _gathered(geometry, pages, [1.0] * len(pages))
     return image(is_known, *geometry.item.shape)
 
 
 def seen_from(geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]) -> Page:
     """What pages know of all that a view sees: a page of its own, which its camera rays look up."""
-    light, variance, is_known = _gathered(geometry, pages, shares)
-    return _page(geometry, is_known, light, variance)
+    layers, is_known = _gathered(geometry, pages, shares)
+    return _page(geometry, is_known, layers)
 
 
-def _gathered(geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]) -> tuple[Any, Any, Any]:
-    """Light at what the pixels' centres of a view see, its variance, and whether it is known."""
+def _gathered(
+    geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]
+) -> tuple[list[tuple[Any, Any]], Any]:
+    """Light at what the pixels' centres of a view see, with its variance, by layer; and where it is known."""
     position, normal, item = _points(geometry), lanes(geometry.normal), lanes(geometry.item)
     own = footprint(position, normal, vector3(geometry.camera.eye))
-    total, variance, weight, known = Array3f(0), Float(0), Float(0), Float(0)
+    layers = range(len(pages[0].values))
+    totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
+    weight, known = Float(0), Float(0)
     for page, share in zip(pages, shares, strict=True):
         found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
         counts = opaque(float(share)) * dr.minimum(own / footprint(position, normal, page.eye), 1.0)
-        total += counts * found.total
-        variance += counts * counts * found.variance * found.weight
+        for layer in layers:
+            totals[layer] += counts * found.totals[layer]
+            variances[layer] += counts * counts * found.variances[layer] * found.weight
         weight += counts * found.weight
         known += found.weight
     is_known = known > KNOWN
-    light = dr.select(is_known, total / weight, 0.0)
-    variance = dr.select(is_known, variance / (weight * weight), 0.0)
+    light = [dr.select(is_known, total / weight, 0.0) for total in totals]
+    variance = [dr.select(is_known, v / (weight * weight), 0.0) for v in variances]
     dr.eval(light, variance, is_known)
-    return light, variance, is_known
+    return list(zip(light, variance, strict=True)), is_known
 
 
 def _points(geometry: Geometry) -> Any:
@@ -163,14 +181,14 @@ def _points(geometry: Geometry) -> Any:
     return vector3(camera.eye) + lanes(geometry.depth) * direction
 
 
-def _page(geometry: Geometry, is_known: Any, values: Any, variances: Any) -> Page:
+def _page(geometry: Geometry, is_known: Any, layers: Sequence[tuple[Any, Any]]) -> Page:
     """A page in memory of Dr.Jit's own: what shares NumPy's can't be freed while a kernel is recorded."""
     camera = geometry.camera
     page = Page(
         depths=dr.select(is_known, lanes(geometry.depth), 0.0),
         items=dr.select(is_known, lanes(geometry.item), 0),
-        values=dr.select(is_known, values, 0.0),
-        variances=dr.select(is_known, variances, 0.0),
+        values=tuple(dr.select(is_known, light, 0.0) for light, _ in layers),
+        variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
         eye=vector3(camera.eye),
         direction_from_pixel=matrix3(camera.direction_from_pixel),
         pixel_from_direction=matrix3(camera.pixel_from_direction),

@@ -6,19 +6,27 @@ kernels are recorded once and replayed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt
+from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, opaque
 from enfilade.irradiance.cache import LightCache
+from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
+from enfilade.pixels.estimate import Samples
 from enfilade.renderer import Bounce, LightRenderer, Lit, Rays
 
 BOUNCES = 16  # most bounces off lobes before a path is given up
 ROULETTE_FROM = 1  # bounce after which faint paths are ended at random
 LEAST_CHANCE = 0.05  # of a faint path to go on
 BLACK = 1e-4  # albedo below which no light is looked up
+LEAST_LANES = 1021  # of a kernel; fewer might be as many as some array of the scene: another recording
+CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
+CELL_BLUR = 0.25  # ... and at what is seen through a lobe, of the lobe's width
+UNRELATED = 0x9E3779B97F4A7C15  # makes other random numbers of those with which a path goes on
 
 
 @dataclass(frozen=True)
@@ -33,6 +41,8 @@ class _Path:
     bounce : Bounce or None
         None for camera rays.
     throughput : Array3f
+    width, spread : Float
+        Of the path where the ray begins, scene units, and what it gains by unit of length.
     rng : PCG32
     """
 
@@ -40,6 +50,8 @@ class _Path:
     rays: Rays
     bounce: Bounce | None
     throughput: Any
+    width: Any
+    spread: Any
     rng: Any
 
 
@@ -53,14 +65,15 @@ class _Step:
         Radiance that reaches the camera: emitted, or known to be scattered by the diffuse lobe.
     is_missing : Bool
         Where the diffuse lobe's light is not known.
-    has_lobe : Bool
+    goes_on : Bool
+        Where there are other lobes.
     path : _Path
         On their way to the surface that was met.
     """
 
     sent: Any
     is_missing: Any
-    has_lobe: Any
+    goes_on: Any
     path: _Path
 
 
@@ -75,16 +88,19 @@ class Shader:
     Parameters
     ----------
     renderer
+    pixel_angle
+        Of the camera, radians: what is seen sharply is cached in finer cells.
     """
 
-    def __init__(self, renderer: LightRenderer) -> None:
+    def __init__(self, renderer: LightRenderer, pixel_angle: float) -> None:
         self._renderer = renderer
+        self._pixel_angle = pixel_angle
         self._meet = self._recorded(self._meet_kernel)
         self._look_up = self._recorded(self._look_up_kernel)
         self._go_on = self._recorded(self._go_on_kernel)
         self._estimate = self._recorded(self._estimate_kernel)
 
-    def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> tuple[Any, Any]:
+    def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> Samples:
         """Radiance that the surfaces seen send by emission and by their diffuse lobes.
 
         Parameters
@@ -100,112 +116,199 @@ class Shader:
 
         Returns
         -------
-        radiance : Array3f
-        has_lobe : Bool
-            Whether the surface does more: where :meth:`scattered` must be asked.
+        Samples
+            Marked where the surface does more: there :meth:`scattered` must be asked.
         """
         step = self._meet(view, self._begun(rays, rng))
         radiance = Array3f(step.sent)
-        missing = _chosen(step.path, dr.compress(step.is_missing))
-        if dr.width(missing.lane):
-            self._add_unknown(radiance, self._look_up(cache, missing))
-        return radiance, step.has_lobe
+        self._add_missing(radiance, cache, step)
+        return Samples((radiance,), step.goes_on)
 
-    def scattered(self, cache: LightCache, rays: Rays, rng: Any) -> Any:
+    def scattered(
+        self,
+        cache: LightCache,
+        rays: Rays,
+        rng: Any,
+        heard: Callable[[Estimates], None] | None = None,
+    ) -> Any:
         """Radiance that the surfaces seen send by all their other lobes.
 
         Parameters and random numbers are those of :meth:`seen`.
+
+        Parameters
+        ----------
+        heard
+            Told of the light that was not known and had to be estimated.
 
         Returns
         -------
         Array3f
         """
         radiance = dr.zeros(Array3f, dr.width(rng.state))
-        path, bounce = self._begun(rays, rng), 0
-        while bounce < BOUNCES and dr.width(path.lane):
-            is_faint = UInt(dr.opaque(UInt, int(bounce >= ROULETTE_FROM)))
-            direct, step, is_alive = self._go_on(cache, path, is_faint)
+        path = self._begun(rays, rng)
+        path = _chosen(path, dr.compress(self._meet(LightCache(), path).goes_on))
+        for bounce in range(BOUNCES):
+            if not dr.width(path.lane):
+                break
+            is_faint = opaque(int(bounce >= ROULETTE_FROM), UInt)
+            direct, step = self._go_on(cache, path, is_faint)
             _scatter_add(radiance, direct, path.lane)
-            self._add_unknown(radiance, step)
-            path = _chosen(step.path, dr.compress(is_alive & step.has_lobe))
-            bounce += 1
+            _scatter_add(radiance, step.sent, step.path.lane)
+            self._add_missing(radiance, cache, step, heard)
+            path = _chosen(step.path, dr.compress(step.goes_on))
         return radiance
 
     def _begun(self, rays: Rays, rng: Any) -> _Path:
         count = dr.width(rng.state)
-        origin = rays.origin + dr.zeros(Array3f, count)
         path = _Path(
-            dr.arange(UInt, count), Rays(origin, rays.direction), None, dr.full(Array3f, 1, count), rng
+            lane=dr.arange(UInt, count),
+            rays=Rays(rays.origin + dr.zeros(Array3f, count), rays.direction),
+            bounce=None,
+            throughput=dr.opaque(Array3f, 1.0, count),
+            width=dr.opaque(Float, 0.0, count),
+            spread=dr.opaque(Float, CELL_PX * self._pixel_angle, count),
+            rng=rng,
         )
         # Now, and not while a kernel is recorded: then no memory of NumPy's can be let go.
         dr.eval(path)
         return path
 
-    def _add_unknown(self, radiance: Any, step: _Step) -> None:
-        """Add what a step sent; where the light is not known, estimate it first."""
-        _scatter_add(radiance, step.sent, step.path.lane)
-        lanes = dr.compress(step.is_missing)
-        if dr.width(lanes):
-            missing = _chosen(step.path, lanes)
-            estimated, rng = self._estimate(missing)
-            _scatter_add(radiance, estimated, missing.lane)
-            # The paths go on with other random numbers than the estimates were made with.
-            dr.scatter(step.path.rng.state, rng.state, lanes)
+    def _add_missing(
+        self,
+        radiance: Any,
+        cache: LightCache,
+        step: _Step,
+        heard: Callable[[Estimates], None] | None = None,
+    ) -> None:
+        """Add what diffuse lobes send whose light was not found: look further, or estimate it."""
+        path = step.path
+        missing: Any = dr.compress(step.is_missing)
+        if cache.pages and dr.width(missing):
+            further = self._look_up(cache, _chosen(path, missing))
+            _scatter_add(radiance, further.sent, further.path.lane)
+            still: Any = dr.compress(further.is_missing)
+            missing = dr.gather(UInt, _padded(missing)[0], still)
+        if not dr.width(missing):
+            return
+        unknown = _chosen(path, missing)
+        weight, light, keys, rng = self._estimate(unknown)
+        _scatter_add(radiance, weight * light, unknown.lane)
+        # The paths go on with other random numbers than the estimates were made with.
+        dr.scatter(path.rng.state, rng.state, _padded(missing)[0])
+        if heard:
+            count = dr.width(missing)
+            values = np.array(light).T[:count]
+            for key in keys:
+                heard(Estimates.of(np.array(key)[:count], values))
 
     def _meet_kernel(self, cache: LightCache, path: _Path) -> _Step:
+        return self._met(cache, path)
+
+    def _met(self, cache: LightCache, path: _Path) -> _Step:
         lit = self._renderer.lit(path.rays, path.bounce)
-        sent, is_missing = _diffuse(cache, lit)
-        return _Step(Array3f(path.throughput * (lit.emission + sent)), is_missing, Bool(lit.has_lobe), path)
+        albedo, is_diffuse = _diffuse(lit)
+        found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
+        sent = path.throughput * (lit.emission + dr.select(is_diffuse & is_known, albedo * found, 0.0))
+        carries = _carries(path)
+        return _Step(
+            Array3f(sent), Bool(is_diffuse & ~is_known & carries), Bool(lit.has_lobe & carries), path
+        )
 
     def _look_up_kernel(self, cache: LightCache, path: _Path) -> _Step:
-        """What the diffuse lobes alone send."""
-        sent, is_missing = _diffuse(cache, self._renderer.lit(path.rays, path.bounce))
-        return _Step(Array3f(path.throughput * sent), is_missing, Bool(False), path)
+        """What the diffuse lobes send, by pages and cells."""
+        lit = self._renderer.lit(path.rays, path.bounce)
+        albedo, is_diffuse = _diffuse(lit)
+        found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
+        if cache.cells:
+            rng = PCG32(path.rng)
+            rng.state ^= UNRELATED
+            jitter = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+            light, is_in_cell = cache.cells.find(lit.position, lit.surfaces.normal, _width(path, lit), jitter)
+            found = dr.select(is_known, found, light)
+            is_known |= is_in_cell
+        sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
+        return _Step(Array3f(sent), Bool(is_diffuse & ~is_known & _carries(path)), Bool(False), path)
 
-    def _go_on_kernel(self, cache: LightCache, path: _Path, is_faint: Any) -> tuple[Any, _Step, Any]:
+    def _go_on_kernel(self, cache: LightCache, path: _Path, is_faint: Any) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
-        scattered = self._renderer.scatter(self._renderer.lit(path.rays, path.bounce), rng)
+        lit = self._renderer.lit(path.rays, path.bounce)
+        scattered = self._renderer.scatter(lit, rng)
         throughput = path.throughput * scattered.throughput
         chance = dr.select(is_faint != 0, dr.clip(dr.max(dr.abs(throughput)), LEAST_CHANCE, 1.0), 1.0)
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
-        ahead = _Path(path.lane, scattered.rays, scattered.bounce, Array3f(throughput / chance), rng)
-        step = self._meet_kernel(cache, ahead)
-        step = _Step(
+        blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
+        ahead = _Path(
+            lane=path.lane,
+            rays=scattered.rays,
+            bounce=scattered.bounce,
+            throughput=Array3f(throughput / chance),
+            width=_width(path, lit),
+            spread=dr.maximum(path.spread, blur),
+            rng=rng,
+        )
+        step = self._met(cache, ahead)
+        return Array3f(path.throughput * scattered.direct), _Step(
             sent=dr.select(is_alive, step.sent, 0.0),
             is_missing=Bool(step.is_missing & is_alive),
-            has_lobe=step.has_lobe,
+            goes_on=Bool(step.goes_on & is_alive),
             path=ahead,
         )
-        return Array3f(path.throughput * scattered.direct), step, Bool(is_alive)
 
-    def _estimate_kernel(self, path: _Path) -> tuple[Any, Any]:
-        """Radiance that the diffuse lobes send where rays meet a surface, by path tracing."""
+    def _estimate_kernel(self, path: _Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
+        """Light where rays meet a surface, by path tracing, with its weight in the image and its cells."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
-        return Array3f(path.throughput * lit.surfaces.albedo * self._renderer.light(lit, rng)), rng
+        width = _width(path, lit)
+        direct, indirect = self._renderer.light(lit, rng)
+        light = Array3f(direct + indirect)
+        keys = tuple(cell_key(lit.position, lit.surfaces.normal, width, level) for level in range(LEVELS))
+        return Array3f(path.throughput * lit.surfaces.albedo), light, keys, rng
 
     def _recorded(self, kernel: Any) -> Any:
         renderer = self._renderer
-        return dr.freeze(kernel, state_fn=lambda *_: renderer.state)
+        return dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: renderer.state)
 
 
-def _diffuse(cache: LightCache, lit: Lit) -> tuple[Any, Any]:
-    """Radiance of the diffuse lobes with the light that is known, and where it is not."""
+def _diffuse(lit: Lit) -> tuple[Any, Any]:
+    """Albedo, and where it is worth looking up light."""
     albedo = lit.surfaces.albedo
-    is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
-    found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
-    return dr.select(is_diffuse & is_known, albedo * found, 0.0), Bool(is_diffuse & ~is_known)
+    return albedo, lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
+
+
+def _carries(path: _Path) -> Any:
+    """Whether a path brings anything: those that only fill up a list do not."""
+    return dr.max(dr.abs(path.throughput)) > 0.0
+
+
+def _width(path: _Path, lit: Lit) -> Any:
+    """Of paths where they meet a surface, scene units."""
+    return path.width + path.spread * lit.surfaces.distance * dr.norm(path.rays.direction)
+
+
+def _padded(lanes: Any) -> tuple[Any, Any]:
+    """Lanes of a list, repeated until they are enough for a kernel, and which are no repetitions."""
+    count = dr.width(lanes)
+    index = dr.arange(UInt, max(count, LEAST_LANES))
+    return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)
 
 
 def _chosen(path: _Path, lanes: Any) -> _Path:
-    return _Path(
+    """Paths of some lanes; what is added to have enough of them carries nothing."""
+    if not dr.width(lanes):
+        return _Path(UInt(), path.rays, path.bounce, path.throughput, path.width, path.spread, path.rng)
+    lanes, is_real = _padded(lanes)
+    chosen = _Path(
         lane=dr.gather(UInt, path.lane, lanes),
         rays=dr.gather(Rays, path.rays, lanes),
         bounce=dr.gather(Bounce, path.bounce, lanes) if path.bounce else None,
-        throughput=dr.gather(Array3f, path.throughput, lanes),
+        throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, lanes), 0.0),
+        width=dr.gather(Float, path.width, lanes),
+        spread=dr.gather(Float, path.spread, lanes),
         rng=dr.gather(PCG32, path.rng, lanes),
     )
+    dr.eval(chosen)
+    return chosen
 
 
 def _scatter_add(radiance: Any, sent: Any, lane: Any) -> None:

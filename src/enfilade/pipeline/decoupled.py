@@ -14,12 +14,23 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_dilation
 
-from enfilade.codec import read_light, write_light
+from enfilade.codec import read_arrays, read_light, write_arrays, write_light
 from enfilade.errors import SettingsError
-from enfilade.irradiance import LightCache, Shader, known, open_cache, open_page, pooled, seen_from, smoothed
+from enfilade.irradiance import (
+    Estimates,
+    LightCache,
+    Shader,
+    known,
+    open_cache,
+    open_page,
+    pooled,
+    seen_from,
+    smoothed,
+)
+from enfilade.irradiance.cells import Cells
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import LUMINANCE, Estimate, estimate
+from enfilade.pixels.estimate import LUMINANCE, Estimate, Samples, estimate
 from enfilade.pixels.lookup import Page
 from enfilade.records import Frame, Geometry, LightPage, Mask, Segment, Shading, Source
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
@@ -27,9 +38,12 @@ from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
 LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
 POOL = 4  # keyframes to each side with which a page is pooled
-LEAST_HOLES = 5e-4  # of a frame's pixels: fewer are left to the frames themselves
+LEAST_HOLES = 2e-3  # of a frame's pixels: fewer are left to the frames themselves
 LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
 EDGE_CONTRAST = 0.01  # deviation of a pixel's mean, relative to it, above which it takes more camera rays
+SCOUT_SPP = 8  # rays of a pixel that look for what no page sees
+SCOUTS = 8  # keyframes whose estimates of what no page sees a frame shares
+NOISE_CONTRAST = 0.1  # the same of what lobes scatter, once it is smoothed
 KEPT = 24  # pages kept in memory, of each kind
 
 T = TypeVar("T")
@@ -55,7 +69,8 @@ class LightTable:
             name = workshop.renderer.describe().renderer
             raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
         self.renderer: LightRenderer = workshop.renderer
-        self.shader = Shader(self.renderer)
+        first = workshop.job.path.cameras[segments[0].first]
+        self.shader = Shader(self.renderer, pixel_angle=1.0 / first.focal_px)
         self._workshop = workshop
         self.segments = segments
         self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
@@ -63,6 +78,8 @@ class LightTable:
         self._traced: _Kept[LightPage] = _Kept()
         self._opened: _Kept[Page] = _Kept()
         self._pooled: _Kept[Page] = _Kept()
+        self._scouted: _Kept[Estimates] = _Kept()
+        self._cells: tuple[list[int], Cells | None] = ([], None)
 
     def prepare(self, segment: Segment) -> None:
         """Trace the light of a segment's keyframes, and of what they leave open between them."""
@@ -77,7 +94,7 @@ class LightTable:
             workshop.finish(unit, [], fills=numbers)
         self._fills = sorted({*self._fills, *fills})
 
-    def around(self, frame: int) -> tuple[LightCache, LightCache]:
+    def around(self, frame: int, *, with_cells: bool = True) -> tuple[LightCache, LightCache]:
         """What is known of the very view of a frame, and what is known near it.
 
         Pages are weighted so that none comes or goes abruptly.
@@ -90,8 +107,47 @@ class LightTable:
         view = seen_from(self._workshop.views[frame].geometry, pages, shares)
         # Always as many pages, so that the kernels which look them up are recorded once.
         missing = settings.keyframes + settings.fills - len(pages)
-        cache = open_cache([*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing])
-        return open_cache([view], [1.0]), cache
+        pages, shares = [*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing]
+        return open_cache([view], [1.0]), open_cache(
+            pages, shares, self._cells_near(frame) if with_cells else None
+        )
+
+    def scout(self, frame: int) -> Estimates:
+        """Estimate the light where lobes lead from a frame and no page sees: frames near it share that."""
+        if frame not in self._scouted:
+            self._scouted[frame] = self._read_or_scout(frame)
+        return self._scouted[frame]
+
+    def _read_or_scout(self, frame: int) -> Estimates:
+        workshop = self._workshop
+        number = workshop.number(frame)
+        unit, file = f"cells {number}", workshop.run.file("cells", number).with_suffix(".npz")
+        if workshop.run.done(unit):
+            workshop.run.check(file)
+            return Estimates(*read_arrays(file, "keys", "sums", "counts"))
+        job = workshop.job
+        parts: list[Estimates] = []
+        _, cache = self.around(frame, with_cells=False)
+        with workshop.costs.of("scout"):
+            estimate(
+                job.path.cameras[frame],
+                np.arange(job.path.width * job.path.height, dtype=np.uint32),
+                lambda rays, rng: self.shader.scattered(cache, rays, rng, parts.append),
+                spp=SCOUT_SPP,
+                chunk=job.settings.trace.chunk,
+                pixel_filter=PixelFilter.BOX,
+                random=_random(workshop, frame, Purpose.SCOUT),
+            )
+            estimates = Estimates.joined(parts)
+        write_arrays(file, {"keys": estimates.keys, "sums": estimates.sums, "counts": estimates.counts})
+        workshop.finish(unit, [file], frame=number, cells=len(estimates.keys))
+        return estimates
+
+    def _cells_near(self, frame: int) -> Cells | None:
+        near = _nearest(self.keyframes, frame, SCOUTS)
+        if self._cells[0] != near:
+            self._cells = near, Estimates.joined([self.scout(k) for k in near]).opened()
+        return self._cells[1]
 
     @property
     def _spacing(self) -> float:
@@ -125,7 +181,7 @@ class LightTable:
             around += _nearest(self._fills, frame, 2 * POOL + 1)
             with self._workshop.costs.of("gather"):
                 pages = [self._open(f) for f in sorted({*around, frame})]
-                self._pooled[frame] = open_page(pooled(self._trace(frame), pages))
+                self._pooled[frame] = pooled(self._trace(frame), pages)
         return self._pooled[frame]
 
     def _open(self, frame: int) -> Page:
@@ -147,27 +203,28 @@ class LightTable:
             workshop.run.check(file)
             return LightPage(frame, geometry, *read_light(file))
         where = _has_light(geometry) if holes is None else holes
-        shading = self._estimated(frame, where)
-        write_light(file, shading, where)
-        workshop.finish(unit, [file], frame=number, pixels=int(where.sum()), dropped=shading.dropped)
-        return LightPage(frame, geometry, shading, where)
+        direct, indirect = self._estimated(frame, where)
+        write_light(file, direct, indirect, where)
+        workshop.finish(unit, [file], frame=number, pixels=int(where.sum()), dropped=direct.dropped)
+        return LightPage(frame, geometry, direct, indirect, where)
 
-    def _estimated(self, frame: int, where: Mask) -> Shading:
+    def _estimated(self, frame: int, where: Mask) -> tuple[Shading, Shading]:
+        """Direct and indirect light."""
         workshop, renderer = self._workshop, self.renderer
         settings = workshop.job.settings.trace
+        light = Estimate(
+            workshop.job.path.cameras[frame],
+            np.flatnonzero(where).astype(np.uint32),
+            lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
+            chunk=settings.chunk,
+            pixel_filter=PixelFilter.CENTRE,
+            random=_random(workshop, frame, Purpose.LIGHT),
+            layers=2,
+        )
         with workshop.costs.of("trace"):
-            light = estimate(
-                workshop.job.path.cameras[frame],
-                np.flatnonzero(where).astype(np.uint32),
-                lambda rays, rng: renderer.light(renderer.lit(rays), rng),
-                spp=settings.spp,
-                chunk=settings.chunk,
-                pixel_filter=PixelFilter.CENTRE,
-                random=_random(workshop, frame, Purpose.LIGHT),
-            )
-        color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
-        color[where], variance[where] = light.color, light.variance
-        return Shading(color, variance, light.dropped)
+            light.add(settings.spp)
+        direct, indirect = (_spread(shading, where) for shading in light.shadings)
+        return direct, indirect
 
 
 def make_frame(workshop: Workshop, table: LightTable, frame: int) -> None:
@@ -179,9 +236,9 @@ def make_frame(workshop: Workshop, table: LightTable, frame: int) -> None:
         near, cache = table.around(frame)
         seen = _seen(workshop, table, frame, near, cache)
     with workshop.costs.of("scatter"):
-        scattered = _scattered(workshop, table, frame, cache, seen.is_marked)
+        scattered = _scattered(workshop, table, frame, cache, seen)
     height, width = view.geometry.item.shape
-    color = seen.shading.color.reshape(height, width, 3) + smoothed(view.geometry, scattered)
+    color = seen.shading.color.reshape(height, width, 3) + scattered.color
     kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
     made = Frame(color, np.full((height, width), kind, np.uint8))
     dropped = seen.shading.dropped + scattered.dropped
@@ -202,32 +259,53 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
     seen.add(settings.light.least_samples)
     if settings.light.samples > settings.light.least_samples:
         shading = seen.shading
-        mean = shading.color @ np.array(LUMINANCE, np.float32)
-        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * mean
+        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * _luminance(shading)
         seen.add(settings.light.samples - settings.light.least_samples, _grown(is_edge, path.width))
     return seen
 
 
 def _scattered(
-    workshop: Workshop, table: LightTable, frame: int, cache: LightCache, has_lobe: npt.NDArray[np.bool_]
+    workshop: Workshop, table: LightTable, frame: int, cache: LightCache, seen: Estimate
 ) -> Shading:
-    """What surfaces scatter by all but their diffuse lobes, (H, W)."""
+    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed.
+
+    Pixels where noise is left get more rays.
+    """
     path, settings = workshop.job.path, workshop.job.settings
-    where = _grown(has_lobe, path.width)
-    color = np.zeros((path.height * path.width, 3), np.float32)
-    variance = np.zeros(path.height * path.width, np.float32)
-    shading = estimate(
+    where = _grown(seen.is_marked, path.width)
+    scattered = Estimate(
         path.cameras[frame],
         np.flatnonzero(where).astype(np.uint32),
         lambda rays, rng: table.shader.scattered(cache, rays, rng),
-        spp=settings.light.lobe_samples,
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=_random(workshop, frame, Purpose.SCATTER),
     )
+    least, most = settings.light.least_lobe_samples, settings.light.lobe_samples
+    scattered.add(least)
+
+    def image() -> Shading:
+        whole = _spread(scattered.shading, where.reshape(path.height, path.width))
+        return smoothed(workshop.views[frame].geometry, whole)
+
+    if most > least:
+        left = image()
+        whole = _luminance(seen.shading) + _luminance(left).ravel()
+        is_noisy = np.sqrt(left.variance).ravel() > NOISE_CONTRAST * whole
+        scattered.add(most - least, _grown(is_noisy, path.width)[where])
+    return image()
+
+
+def _luminance(shading: Shading) -> npt.NDArray[np.float32]:
+    mean: npt.NDArray[np.float32] = shading.color @ np.array(LUMINANCE, np.float32)
+    return mean
+
+
+def _spread(shading: Shading, where: Mask) -> Shading:
+    """An image of what was estimated for a list of its pixels."""
+    color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
     color[where], variance[where] = shading.color, shading.variance
-    size = (path.height, path.width)
-    return Shading(color.reshape(*size, 3), variance.reshape(size), shading.dropped)
+    return Shading(color, variance, shading.dropped)
 
 
 class _Kept(OrderedDict[int, T]):

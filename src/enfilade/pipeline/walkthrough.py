@@ -127,6 +127,9 @@ def _render_decoupled(workshop: Workshop, survey: Survey) -> None:
         for segment in table.segments:
             table.prepare(segment)
             workshop.monitor.advance()
+    for table in tables:
+        for keyframe in table.keyframes:
+            table.scout(keyframe)
 
     workshop.monitor.stage("frames", len(path))
     for shot, table in zip(path.shots(), tables, strict=True):

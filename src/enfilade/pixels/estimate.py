@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -23,6 +24,22 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 Radiance = Callable[[Rays, Any], Any]
 
 
+@dataclass(frozen=True)
+class Samples:
+    """What paths bring, where that is more than one colour, as lanes.
+
+    Attributes
+    ----------
+    layers : tuple of Array3f
+        Averaged apart; a path counts only where all of them are finite.
+    is_marked : Bool or None
+        Marks paths, and so their pixels.
+    """
+
+    layers: tuple[Any, ...]
+    is_marked: Any = None
+
+
 class Estimate:
     """Averages of the paths of each pixel of a list, to which paths can be added.
 
@@ -32,13 +49,15 @@ class Estimate:
     pixels : (N,) uint32
     radiance
         What arrives along rays (:class:`Rays`, any length of direction), given a random number
-        generator for each: an Array3f, or with it a Bool that marks paths. Called once a chunk.
+        generator for each: an Array3f or :class:`Samples`. Called once a chunk.
     chunk
         Paths in flight at once; changes no result.
     pixel_filter
         Where in the image the paths begin.
     random
         Seed, frame and purpose of :func:`enfilade.pixels.random.streams`.
+    layers
+        How many ``radiance`` answers with.
     """
 
     def __init__(
@@ -50,6 +69,7 @@ class Estimate:
         chunk: int,
         pixel_filter: PixelFilter,
         random: dict[str, int],
+        layers: int = 1,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
@@ -59,7 +79,8 @@ class Estimate:
         self._random = random
         self._paths = 0  # numbers given to paths so far
         self._asked = 0
-        self._sums = np.zeros((6, len(pixels)))  # r, g, b, squared luminance, finite paths, marked paths
+        self._layers = layers
+        self._sums = np.zeros((2 + 4 * layers, len(pixels)))  # paths that are finite, and marked; see _summed
 
     def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
         """Trace more paths, for all pixels of the list or for some of them.
@@ -86,20 +107,26 @@ class Estimate:
     @property
     def shading(self) -> Shading:
         """Mean colour of each pixel over its finite samples, and the variance of its mean luminance."""
-        sums = self._sums
-        count = np.maximum(sums[4], 1.0)
-        mean = sums[:3] / count
-        spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
-        return Shading(
-            color=np.ascontiguousarray(mean.T, np.float32),
-            variance=np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0).astype(np.float32),
-            dropped=int(self._asked - sums[4].sum()),
-        )
+        return self.shadings[0]
+
+    @property
+    def shadings(self) -> list[Shading]:
+        """The same of every layer."""
+        count = np.maximum(self._sums[0], 1.0)
+        dropped = int(self._asked - self._sums[0].sum())
+        shadings = []
+        for sums in np.split(self._sums[2:], self._layers):
+            mean = sums[:3] / count
+            spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
+            variance = np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0)
+            color = np.ascontiguousarray(mean.T, np.float32)
+            shadings.append(Shading(color, variance.astype(np.float32), dropped))
+        return shadings
 
     @property
     def is_marked(self) -> npt.NDArray[np.bool_]:
         """Pixels that have a marked path, (N,)."""
-        marked: npt.NDArray[np.bool_] = self._sums[5] > 0.0
+        marked: npt.NDArray[np.bool_] = self._sums[1] > 0.0
         return marked
 
     def _rays(self, pixel: Any, path: Any) -> Rays:
@@ -146,19 +173,20 @@ def _numbered(pixels: npt.NDArray[np.uint32], first: int, width: int) -> tuple[A
 
 
 def _summed(answer: Any, width: int) -> npt.NDArray[np.float32]:
-    """Sums over the finite paths of each pixel: r, g, b, squared luminance, count, marks; (6, N)."""
-    radiance, is_marked = answer if isinstance(answer, tuple) else (answer, None)
-    radiance = Array3f(radiance)
-    luminance = dr.dot(radiance, Array3f(*LUMINANCE))
-    squared = luminance * luminance
-    is_valid = dr.isfinite(squared)  # what overflows when squared is no radiance either
-    values = [*radiance, squared, Float(1)]
-    values = [dr.select(is_valid, v, 0) for v in values]
-    if is_marked is not None:
-        values.append(dr.select(is_marked, Float(1), 0))
+    """Sums over the paths of each pixel: finite, marked, then r, g, b, squared luminance a layer."""
+    samples = answer if isinstance(answer, Samples) else Samples((answer,))
+    values = []
+    for layer in samples.layers:
+        color = Array3f(layer)
+        luminance = dr.dot(color, Array3f(*LUMINANCE))
+        values += [*color, luminance * luminance]
+    # What overflows when squared is no radiance either.
+    is_valid = dr.isfinite(sum(values[3::4], Float(0)))
+    values = [dr.select(is_valid, v, 0) for v in (Float(1), *values)]
+    if samples.is_marked is not None:
+        values.append(dr.select(samples.is_marked, Float(1), 0))
     # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
     dr.eval(values)
-    sums = [np.array(dr.block_sum(v, width)) for v in values]
-    if is_marked is None:
-        sums.append(np.zeros_like(sums[0]))
-    return np.stack(sums)
+    count, *sums = (np.array(dr.block_sum(v, width)) for v in values)
+    marked = sums.pop() if samples.is_marked is not None else np.zeros_like(count)
+    return np.stack([count, marked, *sums])

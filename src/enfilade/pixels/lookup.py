@@ -20,9 +20,10 @@ class Page:
     ----------
     depths : Float
     items : UInt
-    values : Array3f
-    variances : Float
         Images, width * height lanes; where a pixel is not known, its depth is 0.
+    values : tuple of Array3f
+    variances : tuple of Float
+        The same, one a layer.
     eye : Array3f
     direction_from_pixel, pixel_from_direction : Matrix3f
         Of the camera.
@@ -31,8 +32,8 @@ class Page:
 
     depths: Any
     items: Any
-    values: Any
-    variances: Any
+    values: tuple[Any, ...]
+    variances: tuple[Any, ...]
     eye: Any
     direction_from_pixel: Any
     pixel_from_direction: Any
@@ -46,16 +47,16 @@ class Found:
 
     Attributes
     ----------
-    total : Array3f
-        Weighted sum of the values.
-    variance : Float
-        Weighted sum of the variances.
+    totals : tuple of Array3f
+        Weighted sums of the values, one a layer.
+    variances : tuple of Float
+        Weighted sums of the variances.
     weight : Float
         Sum of the weights; 0 where the page does not know the surface, at most about one.
     """
 
-    total: Any
-    variance: Any
+    totals: tuple[Any, ...]
+    variances: tuple[Any, ...]
     weight: Any
 
 
@@ -64,12 +65,12 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
 
     Of the four pixels around a point's projection those count that see the same item, within a
     tolerance of the point's own tangent plane: surfaces that hide it, or that meet it at an edge,
-    do not.
+    do not. A page that looked at the other side of the surface knows nothing.
 
     Parameters
     ----------
     position, normal : Array3f
-        Points in the world, and the normals of their surfaces, of any length and side.
+        Points in the world, and the normals of their surfaces on the side that is asked about, of any length.
     item : UInt
     page
     plane_tolerance
@@ -92,8 +93,10 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
     offset = dr.dot(normal, page.eye - position) * scale
     slope = (page.direction_from_pixel.T @ normal) * scale
     tolerance = plane_tolerance * seen.z
+    is_inside &= offset > 0.0  # the page saw the same side
 
-    total, variance, weight = Array3f(0), Float(0), Float(0)
+    totals, variances = [Array3f(0) for _ in page.values], [Float(0) for _ in page.values]
+    weight = Float(0)
     for row, weight_y in ((0, 1.0 - down), (1, down)):
         for column, weight_x in ((0, 1.0 - across), (1, across)):
             i = dr.clip(Int(left) + column, 0, page.width - 1)
@@ -104,10 +107,11 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
             is_same = is_inside & (dr.gather(UInt, page.items, lane, is_inside) == item)
             is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
             share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
-            total += share * dr.gather(Array3f, page.values, lane, is_same)
-            variance += share * dr.gather(Float, page.variances, lane, is_same)
+            for layer, (value, variance) in enumerate(zip(page.values, page.variances, strict=True)):
+                totals[layer] += share * dr.gather(Array3f, value, lane, is_same)
+                variances[layer] += share * dr.gather(Float, variance, lane, is_same)
             weight += share
-    return Found(total, variance, weight)
+    return Found(tuple(totals), tuple(variances), weight)
 
 
 def footprint(position: Any, normal: Any, eye: Any) -> Any:

@@ -86,15 +86,9 @@ def _pass(
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
+    spread = _blurred(variance, column, row, width, height)
+    dr.eval(spread)
     luminance = dr.dot(color, Array3f(*LUMINANCE))
-
-    # Deviation, from a variance smoothed over 3x3 pixels: a single one is noise itself.
-    spread = Float(0)
-    for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
-        for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
-            i, j = dr.clip(column + across, 0, width - 1), dr.clip(row + down, 0, height - 1)
-            spread += weight_x * weight_y * dr.gather(Float, variance, UInt(j * width + i))
-    scale = dr.rcp(deviations * dr.sqrt(spread) + TINY)
 
     normal = dr.gather(Array3f, guide.normals, lane)
     depth = dr.gather(Float, guide.depths, lane)
@@ -111,7 +105,10 @@ def _pass(
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.items, tap) == item)
             other = dr.gather(Array3f, color, tap)
-            difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) * scale
+            # By the deviation of the difference: the same seen from both sides, so that no light is lost
+            # where what is noisy meets what is not.
+            deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
+            difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) / deviation
             beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
@@ -123,3 +120,43 @@ def _pass(
             total_variance += share * share * dr.gather(Float, variance, tap)
             weight += share
     return total / weight, total_variance / (weight * weight)
+
+
+def without_speckles(color: Any, *, width: int, height: int, times: float) -> Any:
+    """An image without pixels that outshine all their neighbours; Array3f.
+
+    A rare path that finds much light makes one pixel glare. No smoothing spreads so much over so few pixels:
+    it becomes a blot. A little light is lost.
+
+    Parameters
+    ----------
+    color : Array3f
+        Image, width * height lanes.
+    width, height
+    times
+        The brightest neighbour's luminance: where more is cut to that.
+    """
+    _, column, row = pixel_grid(height, width)
+    columns, rows = opaque(width, Int), opaque(height, Int)
+    luminance = dr.dot(color, Array3f(*LUMINANCE))
+    dr.eval(luminance)
+    brightest = Float(0)
+    for down in (-1, 0, 1):
+        for across in (-1, 0, 1):
+            if across or down:
+                i = dr.clip(Int(column) + across, 0, columns - 1)
+                j = dr.clip(Int(row) + down, 0, rows - 1)
+                around = dr.gather(Float, dr.abs(luminance), UInt(j * columns + i))
+                brightest = dr.maximum(brightest, around)
+    limit = times * brightest
+    return color * dr.select(dr.abs(luminance) > limit, limit / dr.maximum(dr.abs(luminance), TINY), 1.0)
+
+
+def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
+    """Variance over 3x3 pixels: that of a single one is noise itself."""
+    spread = Float(0)
+    for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
+        for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
+            i, j = dr.clip(column + across, 0, width - 1), dr.clip(row + down, 0, height - 1)
+            spread += weight_x * weight_y * dr.gather(Float, variance, UInt(j * width + i))
+    return spread

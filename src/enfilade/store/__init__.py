@@ -3,7 +3,7 @@
 ::
 
     run.json         identity: scene fingerprint, path, settings, versions, method
-    keyframes/NNNN.exr   raw/NNNN.exr   frames/NNNN.exr   by frame number, four digits or more
+    keyframes/NNNN.exr   cells/NNNN.npz   raw/NNNN.exr   frames/NNNN.exr   by frame number, 4 digits or more
     ledger.jsonl     one line for each finished unit of work
     summary.json     plots/     video.mp4
     run.lock         who is writing here

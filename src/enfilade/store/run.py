@@ -17,7 +17,7 @@ from enfilade.store.lock import LOCK_NAME, Lock
 
 __all__ = ["KINDS", "Run"]
 
-KINDS = ("keyframes", "raw", "frames")
+KINDS = ("keyframes", "cells", "raw", "frames")
 FORMAT = 1  # of the folder; another number is refused
 RUN_FILE, LEDGER_FILE = "run.json", "ledger.jsonl"
 RESERVED = frozenset({"unit", "files"})  # keys of a ledger line that are ours

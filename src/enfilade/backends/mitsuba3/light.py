@@ -40,7 +40,7 @@ class Light:
         emitted = seen.emitter(self._scene).eval(seen)
         if bounce is None:
             return Array3f(emitted)
-        origin = dr.zeros(mi.Interaction3f, dr.width(bounce.pdf))
+        origin = dr.zeros(mi.Interaction3f)
         origin.p = mi.Point3f(bounce.position)
         direction = mi.DirectionSample3f(self._scene, seen, origin)
         sampled = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
@@ -53,14 +53,14 @@ class Light:
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
         return seen.is_valid() & (((flags & beyond) != 0) | self._lobes.is_undivided(seen, material))
 
-    def light(self, lit: Lit, rng: Any) -> Any:
+    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
         seen = lit.native
         active = seen.is_valid() & (dr.max(lit.surfaces.albedo) > LEAST_ALBEDO)
         material = seen.bsdf()
 
         # Lights, sampled.
-        received = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active)
+        direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active)
 
         # One direction of the lobe: what the path tracer finds there, its first emitter weighted.
         wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
@@ -69,17 +69,9 @@ class Light:
         found = self._radiance(Rays(Array3f(ray.o), Array3f(ray.d)), rng)
         following = self._scene.ray_intersect(ray, active)
         whole = following.emitter(self._scene).eval(following, active)
-        weighted = self.emission(following, Bounce(seen.p, pdf, Bool(False)))
-        received += dr.select(active, weight * (found - whole + weighted), 0.0)
-
-        albedo = lit.surfaces.albedo
-        received = Array3f(received)
-        return Array3f(
-            *(
-                dr.select(a > LEAST_ALBEDO, r / dr.maximum(a, LEAST_ALBEDO), 0.0)
-                for r, a in zip(received, albedo, strict=True)
-            )
-        )
+        direct += dr.select(active, weight * self.emission(following, Bounce(seen.p, pdf, Bool(False))), 0.0)
+        indirect = dr.select(active, weight * (found - whole), 0.0)
+        return _divided(direct, lit.surfaces.albedo), _divided(indirect, lit.surfaces.albedo)
 
     def scatter(self, lit: Lit, rng: Any) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
@@ -104,6 +96,12 @@ class Light:
         value, pdf = evaluate(seen, material, seen.to_local(light.d), active)
         share = dr.select(light.delta, 1.0, _balance(light.pdf, pdf))
         return dr.select(active, value * radiance * share, 0.0)
+
+
+def _divided(received: Any, albedo: Any) -> Any:
+    """By the albedo, 0 where it is none; Array3f."""
+    channels = zip(Array3f(received), albedo, strict=True)
+    return Array3f(*(dr.select(a > LEAST_ALBEDO, r / dr.maximum(a, LEAST_ALBEDO), 0.0) for r, a in channels))
 
 
 def _balance(this: Any, other: Any) -> Any:

@@ -63,8 +63,7 @@ class Lobes:
         undivided = self.is_undivided(seen, material)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
         own, weight = material.sample(self._diffuse, seen, first, second, active & ~undivided)
-        up = mi.warp.square_to_cosine_hemisphere(second)
-        up = mi.Vector3f(up.x, up.y, dr.copysign(up.z, seen.wi.z))
+        up = _cosine(seen, second)
         albedo = diffuse_reflectance(seen, material, active & undivided)
         wo = dr.select(undivided, up, own.wo)
         pdf = dr.select(undivided, dr.abs(up.z) / dr.pi, own.pdf)
@@ -74,22 +73,38 @@ class Lobes:
         """Everything but the diffuse lobe, times cosine, and the density of :meth:`sample_rest`."""
         undivided = self.is_undivided(seen, material)
         own, own_pdf = material.eval_pdf(self._rest, seen, wo, active & ~undivided)
-        whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active & undivided)
-        lambert, _ = _lambert(seen, material, wo, active & undivided)
-        return dr.select(undivided, whole - lambert, own), dr.select(undivided, whole_pdf, own_pdf)
+        beyond, mixed_pdf = self._beyond(seen, material, wo, active & undivided)
+        return dr.select(undivided, beyond, own), dr.select(undivided, mixed_pdf, own_pdf)
 
     def sample_rest(self, seen: Any, material: Any, rng: Any) -> tuple[Any, Any, Any, Any]:
-        """Direction, density, weight, and whether the direction is the only one (a delta lobe)."""
+        """Direction, density, weight, and whether the direction is the only one (a delta lobe).
+
+        What a whole BSDF has beyond Lambert's lobe is sampled by both in turn: where only the one or the
+        other is large, the weight stays bounded.
+        """
         undivided = self.is_undivided(seen, material)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        is_turn = rng.next_float32() < 0.5
         own, weight = material.sample(self._rest, seen, first, second, ~undivided)
         whole, whole_weight = material.sample(self._all, seen, first, second, undivided)
         kind = dr.select(undivided, whole.sampled_type, own.sampled_type)
         is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) | mi.has_flag(kind, mi.BSDFFlags.Null)
-        lambert, _ = _lambert(seen, material, whole.wo, undivided)
-        beyond = whole_weight - dr.select(is_delta | (whole.pdf <= 0.0), 0.0, lambert / whole.pdf)
-        wo, pdf = dr.select(undivided, whole.wo, own.wo), dr.select(undivided, whole.pdf, own.pdf)
+        is_delta &= ~undivided | is_turn
+
+        mixed_wo = dr.select(is_turn, whole.wo, _cosine(seen, second))
+        beyond, mixed_pdf = self._beyond(seen, material, mixed_wo, undivided & ~is_delta)
+        beyond = dr.select(mixed_pdf > 0.0, beyond / mixed_pdf, 0.0)
+        beyond = dr.select(is_delta, 2.0 * whole_weight, beyond)
+        mixed_pdf = dr.select(is_delta, whole.pdf, mixed_pdf)
+
+        wo, pdf = dr.select(undivided, mixed_wo, own.wo), dr.select(undivided, mixed_pdf, own.pdf)
         return wo, pdf, dr.select(undivided, beyond, weight), is_delta
+
+    def _beyond(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """What a whole BSDF has beyond Lambert's lobe, and the mean density of sampling the two."""
+        whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active)
+        lambert, lambert_pdf = _lambert(seen, material, wo, active)
+        return whole - lambert, 0.5 * (whole_pdf + lambert_pdf)
 
 
 def _has_undivided(material: Any) -> bool:
@@ -112,6 +127,12 @@ def diffuse_reflectance(seen: Any, material: Any, active: Any) -> Any:
 def has_lobe(flags: Any, *lobes: str) -> Any:
     """Whether a material has any of these lobes, by Mitsuba's names of them."""
     return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
+
+
+def _cosine(seen: Any, square: Any) -> Any:
+    """Direction on the side from which a surface is seen, as likely as its cosine."""
+    up = mi.warp.square_to_cosine_hemisphere(square)
+    return mi.Vector3f(up.x, up.y, dr.copysign(up.z, seen.wi.z))
 
 
 def _lambert(seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:

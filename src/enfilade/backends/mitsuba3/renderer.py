@@ -28,6 +28,7 @@ from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import Bounce, Lit, PixelFilter, Purpose, Rays, Scattered, SceneFacts, Surfaces
 from enfilade.settings import TraceSettings
 
+UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
 
@@ -66,8 +67,9 @@ class MitsubaRenderer:
         self._scene = scene
         self._chunk = settings.chunk
         self._integrator = _integrator(scene, settings.max_depth)
+        self._onward = _one_edge_less(self._integrator)
         self._sampler = _lane_sampler()
-        self._light = Light(scene, self._radiance)
+        self._light = Light(scene, lambda rays, rng: self._radiance(rays, rng, self._onward))
         self._items = _items(scene)
         self._file = file
 
@@ -91,7 +93,7 @@ class MitsubaRenderer:
     def state(self) -> Any:
         """See :meth:`enfilade.renderer.LightRenderer.state`."""
         items = self._items
-        return self._scene, self._integrator, items.number, items.is_passable, self._light.state
+        return self._scene, self._integrator, self._onward, items.number, items.is_passable, self._light.state
 
     def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
         """Find the first surface along rays, and the light it emits.
@@ -108,7 +110,7 @@ class MitsubaRenderer:
             native=seen,
         )
 
-    def light(self, lit: Lit, rng: Any) -> Any:
+    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
         return self._light.light(lit, rng)
 
@@ -163,23 +165,26 @@ class MitsubaRenderer:
             random={"seed": seed, "frame": frame, "purpose": int(purpose)},
         )
 
-    def _radiance(self, rays: Rays, rng: Any) -> Any:
+    def _radiance(self, rays: Rays, rng: Any, integrator: Any = None) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         self._sampler.rng = rng
-        radiance, _, _ = self._integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
+        integrator = integrator or self._integrator
+        radiance, _, _ = integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
         # Nothing may be kept that holds NumPy's memory: it can't be let go while a kernel is recorded.
         self._sampler.rng = None
         return radiance
 
     def _visible(self, ray: Any) -> tuple[Any, Any]:
         """First interaction of camera rays whose surface does not let the ray pass, and its distance."""
-        seen = self._scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+        seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), coherent=True)
         distance = Float(seen.t)
         if not self._items.any_passable:
             return seen, distance
 
         def look_behind(seen: Any, distance: Any, passing: Any, layer: Any) -> tuple[Any, ...]:
-            behind = self._scene.ray_intersect(seen.spawn_ray(ray.d), mi.RayFlags.All, False, active=passing)
+            behind = self._scene.ray_intersect(
+                seen.spawn_ray(ray.d), int(mi.RayFlags.All), False, active=passing
+            )
             distance = dr.select(passing, distance + behind.t, distance)
             seen = dr.select(passing, behind, seen)
             return seen, distance, passing & self._lets_pass(seen), layer + 1
@@ -262,6 +267,17 @@ def _integrator(scene: Any, max_depth: int) -> Any:
     if max_depth:
         return mi.load_dict({"type": "path", "max_depth": max_depth})
     return own if isinstance(own, mi.SamplingIntegrator) else mi.load_dict({"type": "path"})
+
+
+def _one_edge_less(integrator: Any) -> Any:
+    """The path tracer for paths that have one edge behind them; itself where its paths have no limit."""
+    described = re.search(r"max_depth = (\d+),\s*rr_depth = (\d+)", str(integrator))
+    if integrator.class_name() != "PathIntegrator" or not described:
+        return integrator
+    longest, roulette = (int(number) for number in described.groups())
+    if not 1 < longest < UNLIMITED:
+        return integrator
+    return mi.load_dict({"type": "path", "max_depth": longest - 1, "rr_depth": max(roulette - 1, 1)})
 
 
 def _lane_sampler() -> Any:
