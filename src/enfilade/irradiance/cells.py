@@ -145,7 +145,7 @@ class Estimates:
     @staticmethod
     def _summed(keys: Any, sums: Any, counts: Any) -> Estimates:
         unique, place = np.unique(keys, return_inverse=True)
-        total = np.stack([np.bincount(place, s, len(unique)) for s in sums.T], axis=1)
+        total: Any = np.stack([np.bincount(place, s, len(unique)) for s in sums.T], axis=1)
         return Estimates(unique, total, np.bincount(place, counts, len(unique)).astype(np.int64))
 
     def opened(self) -> Cells | None:

@@ -12,17 +12,24 @@ class Costs:
 
     def __init__(self) -> None:
         self._stages: dict[str, dict[str, float]] = {}
+        self._inner = [0.0, 0.0]  # wall and CPU time of the stages inside the one that is counted
 
     @contextmanager
     def of(self, stage: str) -> Iterator[None]:
-        """Count what happens inside for a stage. CPU time is that of all threads of this process."""
+        """Count what happens inside for a stage, but for what is counted for another one in there.
+
+        CPU time is that of all threads of this process.
+        """
+        outer, self._inner = self._inner, [0.0, 0.0]
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             yield
         finally:
+            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
             spent = self._stages.setdefault(stage, {"wall_s": 0.0, "cpu_s": 0.0})
-            spent["wall_s"] += time.perf_counter() - wall
-            spent["cpu_s"] += time.process_time() - cpu
+            spent["wall_s"] += wall - self._inner[0]
+            spent["cpu_s"] += cpu - self._inner[1]
+            self._inner = [outer[0] + wall, outer[1] + cpu]
 
     def take(self) -> dict[str, dict[str, float]]:
         """What was spent since the last call, by stage: one unit of work's share."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from enfilade.camera import Camera
 from enfilade.geometry import find_geometry, image_flow
 from enfilade.pipeline.cost import Costs
 from enfilade.records import F32, CameraPath, Flow, Geometry
@@ -16,24 +17,53 @@ from enfilade.viewing import Viewing
 KEPT = 4  # views kept in memory; finding one again costs a ray a pixel
 
 
-@dataclass(frozen=True, eq=False)
 class View:
     """What one frame sees, and how it moves.
+
+    Parameters
+    ----------
+    geometry
+    previous, following
+        Cameras of the frames beside it in the same shot; None where there is none.
+    viewing
+    costs
 
     Attributes
     ----------
     geometry : Geometry
-    flow : Flow
-    speed_deg_s : (H, W) float32
-        Velocity of each pixel's pattern (§3.3); 0 also where a rest of the camera begins and ends.
-    velocity_deg_s : (H, W, 2) float32
-        The same with its direction.
     """
 
-    geometry: Geometry
-    flow: Flow
-    speed_deg_s: F32
-    velocity_deg_s: F32
+    def __init__(
+        self,
+        geometry: Geometry,
+        previous: Camera | None,
+        following: Camera | None,
+        viewing: Viewing,
+        costs: Costs,
+    ) -> None:
+        self.geometry = geometry
+        self._neighbours = previous, following
+        self._viewing = viewing
+        self._costs = costs
+
+    @cached_property
+    def flow(self) -> Flow:
+        """Image flow, found when asked for."""
+        with self._costs.of("geometry"):
+            return image_flow(self.geometry, *self._neighbours)
+
+    @cached_property
+    def speed_deg_s(self) -> F32:
+        """Velocity of each pixel's pattern (§3.3), (H, W); 0 where a rest of the camera begins and ends."""
+        speed = self.flow.speed
+        if any(camera and camera.is_same_view(self.geometry.camera) for camera in self._neighbours):
+            speed = np.zeros_like(speed)  # it is looked at as long as the camera rests
+        return self._viewing.velocity_deg_s(speed)
+
+    @cached_property
+    def velocity_deg_s(self) -> F32:
+        """The same with its direction, (H, W, 2)."""
+        return np.ascontiguousarray(self._viewing.velocity_deg_s(self.flow.motion))
 
 
 class Views:
@@ -52,22 +82,9 @@ class Views:
             self._kept.move_to_end(frame)
             return self._kept[frame]
         with self._costs.of("geometry"):
-            view = self._find(frame)
+            geometry = find_geometry(self._renderer, self._path.cameras[frame])
+        view = View(geometry, *self._path.neighbours(frame), self.viewing, self._costs)
         self._kept[frame] = view
         if len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return view
-
-    def _find(self, frame: int) -> View:
-        geometry = find_geometry(self._renderer, self._path.cameras[frame])
-        neighbours = self._path.neighbours(frame)
-        flow = image_flow(geometry, *neighbours)
-        speed = flow.speed
-        if any(camera and camera.is_same_view(geometry.camera) for camera in neighbours):
-            speed = np.zeros_like(speed)  # it is looked at as long as the camera rests
-        return View(
-            geometry=geometry,
-            flow=flow,
-            speed_deg_s=self.viewing.velocity_deg_s(speed),
-            velocity_deg_s=np.ascontiguousarray(self.viewing.velocity_deg_s(flow.motion)),
-        )

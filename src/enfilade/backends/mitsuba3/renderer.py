@@ -176,14 +176,14 @@ class MitsubaRenderer:
 
     def _visible(self, ray: Any) -> tuple[Any, Any]:
         """First interaction of camera rays whose surface does not let the ray pass, and its distance."""
-        seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), coherent=True)
+        seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True))
         distance = Float(seen.t)
         if not self._items.any_passable:
             return seen, distance
 
         def look_behind(seen: Any, distance: Any, passing: Any, layer: Any) -> tuple[Any, ...]:
             behind = self._scene.ray_intersect(
-                seen.spawn_ray(ray.d), int(mi.RayFlags.All), False, active=passing
+                seen.spawn_ray(ray.d), int(mi.RayFlags.All), Bool(False), passing
             )
             distance = dr.select(passing, distance + behind.t, distance)
             seen = dr.select(passing, behind, seen)
