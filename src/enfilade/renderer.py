@@ -27,6 +27,7 @@ class Purpose(IntEnum):
     GATHER = 4
     SCATTER = 5
     SCOUT = 6
+    PILOT = 7
     GUIDE = 5
 
 

@@ -191,6 +191,12 @@ class AntialiasSettings(Section):
 class LightSettings(Section):
     """Keyframes as a cache of light (--method decoupled)."""
 
+    quality: float = option(
+        10.0, "Noise that may be left, JND as compare scores it: lower is dearer.", least=0.5, most=100.0
+    )
+    paths: int = option(
+        0, "Paths of a keyframe's pixel; 0 finds how many the quality asks for.", least=0, most=1_048_576
+    )
     spacing: int = option(8, "Uniform spacing of the keyframes of light, frames.", least=2)
     keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
     fills: int = option(2, "... and of the pages between them that fill their holes.", least=0, most=16)

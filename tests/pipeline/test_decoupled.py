@@ -21,7 +21,7 @@ def _job(folder, method: str, spp: int) -> Job:
     files = write_scene("room", folder / "room", preset="small")
     path = load_path(files.path, size=(64, 48), frames=FRAMES)
     settings = Settings.from_tables(
-        {"trace": {"spp": spp}, "keyframes": {"spacing": 4}, "light": {"samples": 8}}
+        {"trace": {"spp": spp}, "light": {"spacing": 4, "paths": spp, "samples": 8}}
     )
     return Job(files.scene, path, settings, method)
 

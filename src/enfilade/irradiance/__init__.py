@@ -3,6 +3,7 @@
 from enfilade.irradiance.cache import (
     LightCache,
     known,
+    light_of,
     open_cache,
     open_page,
     pooled,
@@ -17,6 +18,7 @@ __all__ = [
     "LightCache",
     "Shader",
     "known",
+    "light_of",
     "open_cache",
     "open_page",
     "pooled",

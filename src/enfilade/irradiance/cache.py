@@ -14,7 +14,7 @@ from enfilade.irradiance.cells import Cells
 from enfilade.pixels.lookup import Page, footprint, lookup
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.pixels.wavelet import Guide, smooth, without_speckles
-from enfilade.records import Geometry, LightPage, Mask, Shading
+from enfilade.records import F32, Geometry, LightPage, Mask, Shading
 
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
@@ -102,6 +102,11 @@ def pooled(page: LightPage, around: Sequence[Page]) -> Page:
     light = sum((light for light, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
     return _page(page.geometry, lanes(page.is_known), [(light, variance)])
+
+
+def light_of(page: Page) -> F32:
+    """The light that a page knows, all layers together, (H, W, 3); 0 where it knows none."""
+    return image(sum(page.values, Array3f(0)), page.height, page.width)
 
 
 def smoothed(geometry: Geometry, shading: Shading) -> Shading:

@@ -6,6 +6,7 @@ kernels are recorded once and replayed.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -267,7 +268,19 @@ class Shader:
 
     def _recorded(self, kernel: Any) -> Any:
         renderer = self._renderer
-        return dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: renderer.state)
+        recorded = dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: renderer.state)
+
+        def replayed(*arguments: Any) -> Any:
+            # Garbage that shares NumPy's memory can't be let go while a kernel is recorded.
+            had_collector = gc.isenabled()
+            gc.disable()
+            try:
+                return recorded(*arguments)
+            finally:
+                if had_collector:
+                    gc.enable()
+
+        return replayed
 
 
 def _diffuse(lit: Lit) -> tuple[Any, Any]:

@@ -38,14 +38,3 @@ class Costs:
             stage: {kind: round(seconds, 6) for kind, seconds in spent.items()}
             for stage, spent in taken.items()
         }
-
-
-def add_costs(lines: list[dict[str, dict[str, float]]]) -> dict[str, dict[str, float]]:
-    """Sum the costs of many units, by stage."""
-    total: dict[str, dict[str, float]] = {}
-    for line in lines:
-        for stage, spent in line.items():
-            into = total.setdefault(stage, {"wall_s": 0.0, "cpu_s": 0.0})
-            for kind, seconds in spent.items():
-                into[kind] += seconds
-    return total

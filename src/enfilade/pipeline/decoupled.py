@@ -7,7 +7,9 @@ lookup alone.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -21,6 +23,7 @@ from enfilade.irradiance import (
     LightCache,
     Shader,
     known,
+    light_of,
     open_cache,
     open_page,
     pooled,
@@ -40,10 +43,12 @@ LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows
 POOL = 4  # keyframes to each side with which a page is pooled
 LEAST_HOLES = 2e-3  # of a frame's pixels: fewer are left to the frames themselves
 LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
-EDGE_CONTRAST = 0.01  # deviation of a pixel's mean, relative to it, above which it takes more camera rays
+EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
 SCOUT_SPP = 8  # rays of a pixel that look for what no page sees
 SCOUTS = 8  # keyframes whose estimates of what no page sees a frame shares
-NOISE_CONTRAST = 0.1  # the same of what lobes scatter, once it is smoothed
+NOISE_CONTRAST = 0.01  # the same of what lobes scatter, once it is smoothed
+PILOT_PATHS = 8  # of each of the two estimates that tell how many paths are needed
+PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
 KEPT = 24  # pages kept in memory, of each kind
 
 T = TypeVar("T")
@@ -210,21 +215,60 @@ class LightTable:
 
     def _estimated(self, frame: int, where: Mask) -> tuple[Shading, Shading]:
         """Direct and indirect light."""
+        paths = self.paths
+        with self._workshop.costs.of("trace"):
+            light = self._light(frame, where, Purpose.LIGHT)
+            light.add(paths)
+        direct, indirect = (_spread(shading, where) for shading in light.shadings)
+        return direct, indirect
+
+    def _light(self, frame: int, where: Mask, purpose: Purpose) -> Estimate:
         workshop, renderer = self._workshop, self.renderer
-        settings = workshop.job.settings.trace
-        light = Estimate(
+        return Estimate(
             workshop.job.path.cameras[frame],
             np.flatnonzero(where).astype(np.uint32),
             lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
-            chunk=settings.chunk,
+            chunk=workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.CENTRE,
-            random=_random(workshop, frame, Purpose.LIGHT),
+            random=_random(workshop, frame, purpose),
             layers=2,
         )
-        with workshop.costs.of("trace"):
-            light.add(settings.spp)
-        direct, indirect = (_spread(shading, where) for shading in light.shadings)
-        return direct, indirect
+
+    @cached_property
+    def paths(self) -> int:
+        """Paths of a keyframe's pixel: as set, or as many as the quality asks for."""
+        workshop = self._workshop
+        settings = workshop.job.settings.light
+        if settings.paths:
+            return settings.paths
+        frame = self.keyframes[len(self.keyframes) // 2]
+        unit = f"pilot {workshop.number(frame)}"
+        if line := workshop.run.done(unit):
+            return int(line["paths"])
+        jnd = self._pilot_jnd(frame)
+        # Half of the squared difference is either's own; pages that are pooled share what is left.
+        share = max(min(len(self.keyframes), 2 * POOL + 1) / 2.0, 1.0)
+        wanted = PILOT_PATHS * (jnd / settings.quality) ** 2 / (2.0 * share)
+        paths = int(np.clip(4 * math.ceil(wanted / 4), *PATHS))
+        workshop.finish(unit, [], jnd=jnd, paths=paths)
+        return paths
+
+    def _pilot_jnd(self, frame: int) -> float:
+        """Visible difference between two estimates of a frame's light, as its surfaces show it."""
+        workshop = self._workshop
+        geometry = workshop.views[frame].geometry
+        where = _has_light(geometry)
+        if not where.any():
+            return 0.0
+        shown = []
+        with workshop.costs.of("pilot"):
+            for purpose in (Purpose.PILOT, Purpose.LIGHT):
+                light = self._light(frame, where, purpose)
+                light.add(PILOT_PATHS)
+                direct, indirect = (_spread(shading, where) for shading in light.shadings)
+                page = LightPage(frame, geometry, direct, indirect, where)
+                shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
+            return workshop.judge.compare(*shown, valid=where).score
 
 
 def make_frame(workshop: Workshop, table: LightTable, frame: int) -> None:
@@ -259,7 +303,8 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
     seen.add(settings.light.least_samples)
     if settings.light.samples > settings.light.least_samples:
         shading = seen.shading
-        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * _luminance(shading)
+        limit = EDGE_CONTRAST * settings.light.quality
+        is_edge = np.sqrt(shading.variance) > limit * _luminance(shading)
         seen.add(settings.light.samples - settings.light.least_samples, _grown(is_edge, path.width))
     return seen
 
@@ -291,7 +336,7 @@ def _scattered(
     if most > least:
         left = image()
         whole = _luminance(seen.shading) + _luminance(left).ravel()
-        is_noisy = np.sqrt(left.variance).ravel() > NOISE_CONTRAST * whole
+        is_noisy = np.sqrt(left.variance).ravel() > NOISE_CONTRAST * settings.light.quality * whole
         scattered.add(most - least, _grown(is_noisy, path.width)[where])
     return image()
 

@@ -12,7 +12,6 @@ from enfilade.masks import item_pixels, slow_pixels, visible_items
 from enfilade.metric import Pursuit
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Mask, Segment, Warped
 from enfilade.warp import agrees, warp_keyframe
 
@@ -160,7 +159,7 @@ def _differences(
     """
     support = workshop.spatial_support_px(view)
     shown = [
-        _shown(workshop, np.where(one.is_hole[..., None], other.color, one.color), support)
+        workshop.shown(reconstruct(np.where(one.is_hole[..., None], other.color, one.color), support))
         for one, other in ((before, after), (after, before))
     ]
     noise = _shown_variance(workshop, before.variance + after.variance)
@@ -176,17 +175,6 @@ def _differences(
         for pursuit in pursuits
     )
     return jnd, jnd_no_pursuit
-
-
-def _shown(workshop: Workshop, color: F32, support: F32) -> F32:
-    of = workshop.job.settings.viewing
-    shown: F32 = display_luminance(
-        reconstruct(color, support),
-        exposure_ev=of.exposure_ev,
-        peak_cd_m2=of.peak_cd_m2,
-        black_cd_m2=of.black_cd_m2,
-    )
-    return shown
 
 
 def _shown_variance(workshop: Workshop, variance: F32) -> F32:

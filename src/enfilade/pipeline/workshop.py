@@ -11,11 +11,12 @@ import numpy as np
 from enfilade.antialias import spatial_support_px
 from enfilade.codec import read_shading, write_shading
 from enfilade.masks import slow_pixels
-from enfilade.metric import Aqm
+from enfilade.metric import Aqm, MetricOptions
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
+from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Keyframe, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Renderer
 from enfilade.store import Run
@@ -47,6 +48,19 @@ class Workshop:
     def aqm(self) -> Aqm:
         """The metric, with its filters made once."""
         return Aqm(self.job.viewing, mask_slope=self.job.settings.metric.mask_slope, workers=FFT_WORKERS)
+
+    @cached_property
+    def judge(self) -> Aqm:
+        """The metric as it stands today, for what the paper does not ask."""
+        return Aqm(self.job.viewing, options=MetricOptions.modern(), workers=FFT_WORKERS)
+
+    def shown(self, color: F32) -> F32:
+        """What the screen emits for linear colours, (H, W) cd/m2."""
+        of = self.job.settings.viewing
+        luminance: F32 = display_luminance(
+            color, exposure_ev=of.exposure_ev, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
+        )
+        return luminance
 
     def number(self, frame: int) -> int:
         """Number by which the user knows a frame."""

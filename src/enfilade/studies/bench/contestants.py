@@ -57,10 +57,10 @@ class Preset:
 PRESETS = (
     Preset("paper-16", "paper", {"trace": {"spp": 16}}),
     Preset("paper-64", "paper", {"trace": {"spp": 64}}),
-    Preset("decoupled-a", "decoupled", {"trace": {"spp": 16}, "light": {"samples": 4}}),
-    Preset("decoupled-b", "decoupled", {"trace": {"spp": 32}, "light": {"samples": 8}}),
-    Preset("decoupled-c", "decoupled", {"trace": {"spp": 64}, "light": {"samples": 16}}),
-    Preset("decoupled-d", "decoupled", {"trace": {"spp": 128}, "light": {"samples": 32}}),
+    Preset("decoupled-30", "decoupled", {"light": {"quality": 30.0, "samples": 8, "lobe_samples": 8}}),
+    Preset("decoupled-15", "decoupled", {"light": {"quality": 15.0, "samples": 16}}),
+    Preset("decoupled-8", "decoupled", {"light": {"quality": 8.0}}),
+    Preset("decoupled-4", "decoupled", {"light": {"quality": 4.0, "samples": 32, "lobe_samples": 48}}),
 )
 
 
