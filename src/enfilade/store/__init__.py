@@ -12,5 +12,6 @@
 from __future__ import annotations
 
 from enfilade.store.run import KINDS, Run
+from enfilade.store.tally import add_costs, tally
 
-__all__ = ["KINDS", "Run"]
+__all__ = ["KINDS", "Run", "add_costs", "tally"]

@@ -24,11 +24,14 @@ class Ledger:
     writable
         Whether a torn last line is cut off in the file, and lines can be appended. Otherwise it is left
         out: someone may be writing it just now.
+    is_lenient
+        Leave damaged lines out, and say so in `notes`, instead of raising: for readers that show what
+        there is.
 
     Attributes
     ----------
     notes : list of str
-        What was recovered, for the user to know.
+        What was recovered or left out, for the user to know.
 
     Raises
     ------
@@ -36,8 +39,9 @@ class Ledger:
         The file can't be read, or a line before the last one is damaged.
     """
 
-    def __init__(self, file: Path, *, writable: bool) -> None:
+    def __init__(self, file: Path, *, writable: bool, is_lenient: bool = False) -> None:
         self.notes: list[str] = []
+        self._is_lenient = is_lenient
         self._file = file
         self._handle = -1
         self._units: dict[str, dict[str, Any]] = {}
@@ -104,14 +108,19 @@ class Ledger:
         for number, raw in enumerate(lines, 1):
             line = _parsed(raw) if raw.endswith(b"\n") else None
             if line is None and number < len(lines):
-                raise RunFolderError(
-                    f"{self._file}, line {number} is damaged: delete that line, then run the same command "
-                    "again to redo its unit"
-                )
+                self._refuse(number)
             if line is not None:
                 self._keep(line)
                 good += len(raw)
         return good
+
+    def _refuse(self, number: int) -> None:
+        text = f"{self._file}, line {number} is damaged"
+        if not self._is_lenient:
+            raise RunFolderError(
+                f"{text}: delete that line, then run the same command again to redo its unit"
+            )
+        self.notes.append(f"{text}; it was left out")
 
     def _cut(self, size: int, whole_size: int) -> None:
         if size == whole_size:

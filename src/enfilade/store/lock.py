@@ -8,10 +8,11 @@ import os
 import socket
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from enfilade.errors import RunFolderError
 
-__all__ = ["LOCK_NAME", "Lock"]
+__all__ = ["LOCK_NAME", "Lock", "writer_of"]
 
 LOCK_NAME = "run.lock"
 
@@ -64,6 +65,27 @@ class Lock:
             fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing alone leaves it with forked processes
             os.close(self._handle)
             self._handle = -1
+
+
+def writer_of(folder: Path) -> dict[str, Any] | None:
+    """Who is writing in a run folder, told without touching the lock; None if nobody is.
+
+    Parameters
+    ----------
+    folder
+
+    Returns
+    -------
+    dict or None
+        ``host``, ``pid`` and ``started`` (ISO 8601). A process of this host that has gone writes no more;
+        whether one of another host still lives can't be seen from here.
+    """
+    try:
+        name = json.loads((folder / LOCK_NAME).read_bytes())
+        is_gone = name["host"] == socket.gethostname() and not Path(f"/proc/{name['pid']:d}").exists()
+        return None if is_gone else {key: name[key] for key in ("host", "pid", "started")}
+    except (OSError, ValueError, KeyError, TypeError):  # it is just signing, or has gone
+        return None
 
 
 def _sign(handle: int) -> None:

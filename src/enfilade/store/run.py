@@ -13,7 +13,7 @@ from enfilade.codec import read_json, sweep, write_json
 from enfilade.codec.whole import MARK
 from enfilade.errors import RunFolderError
 from enfilade.store.ledger import Ledger
-from enfilade.store.lock import LOCK_NAME, Lock
+from enfilade.store.lock import LOCK_NAME, Lock, writer_of
 
 __all__ = ["KINDS", "Run"]
 
@@ -37,14 +37,16 @@ class Run:
         What was recovered or removed when the folder was opened, for the user to know.
     """
 
-    def __init__(self, folder: Path, identity: dict[str, Any], lock: Lock | None) -> None:
+    def __init__(
+        self, folder: Path, identity: dict[str, Any], lock: Lock | None, *, is_lenient: bool = False
+    ) -> None:
         self.folder = folder
         self.identity = identity
         self.notes: list[str] = []
         self._lock = lock
         if lock is not None and (left := sweep(folder)):
             self.notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
-        self._ledger = Ledger(folder / LEDGER_FILE, writable=lock is not None)
+        self._ledger = Ledger(folder / LEDGER_FILE, writable=lock is not None, is_lenient=is_lenient)
         self.notes.extend(self._ledger.notes)
 
     @classmethod
@@ -77,17 +79,25 @@ class Run:
             raise
 
     @classmethod
-    def existing(cls, folder: Path) -> Self:
+    def existing(cls, folder: Path, *, is_lenient: bool = False) -> Self:
         """Open the folder of a finished or running run, to read it and nothing else.
+
+        Parameters
+        ----------
+        folder
+        is_lenient
+            Leave damaged lines of the ledger out, and say so in `notes`.
 
         Raises
         ------
         RunFolderError
             It holds no run, or is damaged.
         """
+        if not folder.is_dir():
+            raise RunFolderError(f"there is no folder {folder}")
         if not (folder / RUN_FILE).is_file():
             raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
-        return cls(folder, _read_identity(folder), None)
+        return cls(folder, _read_identity(folder), None, is_lenient=is_lenient)
 
     def __enter__(self) -> Self:
         return self
@@ -103,6 +113,10 @@ class Run:
         if self._lock is not None:
             self._lock.release()
             self._lock = None
+
+    def writer(self) -> dict[str, Any] | None:
+        """Who is writing here now, see :func:`~enfilade.store.lock.writer_of`."""
+        return writer_of(self.folder)
 
     def file(self, kind: str, number: int) -> Path:
         """File of a frame, by the number by which the user knows it.
