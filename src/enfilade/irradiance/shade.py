@@ -21,8 +21,14 @@ from enfilade.pixels.estimate import Samples
 from enfilade.renderer import Bounce, LightRenderer, Lit, Rays
 
 BOUNCES = 16  # most bounces off lobes before a path is given up
-ROULETTE_FROM = 1  # bounce after which faint paths are ended at random
 LEAST_CHANCE = 0.05  # of a faint path to go on
+MOST_CHANCE = (
+    1.0,
+    1.0,
+    1.0,
+    0.5,
+    0.25,
+)  # of any path, by bounce; the last holds on: some are trapped in glass
 BLACK = 1e-4  # albedo below which no light is looked up
 LEAST_LANES = 1021  # of a kernel; fewer might be as many as some array of the scene: another recording
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
@@ -151,8 +157,10 @@ class Shader:
         for bounce in range(BOUNCES):
             if not dr.width(path.lane):
                 break
-            is_faint = opaque(int(bounce >= ROULETTE_FROM), UInt)
-            direct, step = self._go_on(cache, path, is_faint)
+            # The first bounce of every path counts; then faint ones are ended at random.
+            least = 1.0 if bounce == 0 else LEAST_CHANCE
+            most = MOST_CHANCE[min(bounce, len(MOST_CHANCE) - 1)]
+            direct, step = self._go_on(cache, path, opaque(least), opaque(most))
             _scatter_add(radiance, direct, path.lane)
             _scatter_add(radiance, step.sent, step.path.lane)
             self._add_missing(radiance, cache, step, heard)
@@ -230,13 +238,13 @@ class Shader:
         sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
         return _Step(Array3f(sent), Bool(is_diffuse & ~is_known & _carries(path)), Bool(False), path)
 
-    def _go_on_kernel(self, cache: LightCache, path: _Path, is_faint: Any) -> tuple[Any, _Step]:
+    def _go_on_kernel(self, cache: LightCache, path: _Path, least: Any, most: Any) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
         scattered = self._renderer.scatter(lit, rng)
         throughput = path.throughput * scattered.throughput
-        chance = dr.select(is_faint != 0, dr.clip(dr.max(dr.abs(throughput)), LEAST_CHANCE, 1.0), 1.0)
+        chance = dr.clip(dr.max(dr.abs(throughput)), least, most)
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
         blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
         ahead = _Path(

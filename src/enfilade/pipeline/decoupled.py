@@ -44,10 +44,10 @@ POOL = 4  # keyframes to each side with which a page is pooled
 LEAST_HOLES = 2e-3  # of a frame's pixels: fewer are left to the frames themselves
 LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
 EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
-SCOUT_SPP = 8  # rays of a pixel that look for what no page sees
+SCOUT_SPP = 4  # rays of a pixel that look for what no page sees
 SCOUTS = 8  # keyframes whose estimates of what no page sees a frame shares
 NOISE_CONTRAST = 0.01  # the same of what lobes scatter, once it is smoothed
-PILOT_PATHS = 8  # of each of the two estimates that tell how many paths are needed
+PILOT_PATHS = 4  # of each of the two estimates that tell how many paths are needed
 PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
 KEPT = 24  # pages kept in memory, of each kind
 
