@@ -1,5 +1,5 @@
-# make demo    set up, render a small walkthrough into runs/demo
-# make test    set up, run the tests
+# make demo    set up, render a small walkthrough into runs/demo, and a page that shows it
+# make test    set up, run the tests; Chromium, which tests the page, by apt where it is missing
 # make validate-metric   set up, judge the metric by what people saw
 # make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
 # make check   set up, run format, lint, type and import-floor checks
@@ -11,7 +11,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python libraries demo test validate-metric bench check format lock clean
+.PHONY: help setup python libraries browser demo test validate-metric bench check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -31,7 +31,10 @@ $(VENV)/.ready: requirements.lock pyproject.toml setup/venv.sh setup/python.sh
 demo: setup
 	@sh setup/demo.sh $(BIN) $(DEMO)
 
-test: setup
+browser:
+	@sh setup/browser.sh
+
+test: setup browser
 	$(BIN)/python -m pytest $(TESTS)
 
 validate-metric: setup

@@ -10,7 +10,10 @@ import enfilade
 from enfilade.cli import main
 from enfilade.cli.group import COMMANDS
 
-HEAVY = ("mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "numpy", "scipy", "trimesh", "PIL", "rich")
+HEAVY = (
+    "mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "numpy", "scipy", "trimesh", "PIL", "rich", "jinja2",
+    "plotly",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", COMMANDS)

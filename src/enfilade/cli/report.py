@@ -1,0 +1,74 @@
+"""``enfilade report``: a run as one HTML page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from enfilade.cli.group import debug_option
+from enfilade.cli.inputs import quiet_option
+
+PAGE = "report.html"
+
+
+@click.command("report", short_help="A run as one HTML page: frames, layers, charts, tables.")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    "file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help=f"The page.  [default: {PAGE} in the run folder]",
+)
+@click.option(
+    "--reference",
+    type=click.Path(path_type=Path),
+    help="A run of the same path, traced whole: its differences are shown, and judged by the metric.",
+)
+@click.option(
+    "--metric/--no-metric",
+    "has_metric",
+    default=True,
+    show_default=True,
+    help="Whether the metric judges each frame beside the reference, which takes about a second a frame.",
+)
+@click.option(
+    "--frames",
+    metavar="RANGES",
+    help="Frames to put on the page: 1-250, 1,5,9 or 1-250:2.  [default: all that are finished]",
+)
+@click.option(
+    "--max-mb",
+    type=float,
+    default=30.0,
+    show_default=True,
+    help="Size of the page that is not exceeded: pictures are scaled, then frames left out. At least 8.",
+)
+@quiet_option
+@debug_option
+def command(
+    *,
+    run: Path,
+    file: Path | None,
+    reference: Path | None,
+    has_metric: bool,
+    frames: str | None,
+    max_mb: float,
+    quiet: bool,
+) -> None:
+    """Write a page about the finished or running run in the folder RUN.
+
+    The page is one file that needs no network. A running run is shown as far as it has come; it is not
+    disturbed, and nothing is rendered.
+    """
+    from enfilade.cli.progress import watch
+    from enfilade.path import parse_frames
+    from enfilade.report.page import Wishes, write_page
+
+    numbers = None if frames is None else parse_frames(frames)
+    page = run / PAGE if file is None else file
+    with watch(quiet=quiet) as monitor:
+        notes = write_page(run, page, Wishes(reference, numbers, max_mb, has_metric), monitor)
+    for note in notes:
+        click.echo(f"note    {note}", err=True)
+    click.echo(f"report  {page}")

@@ -1,0 +1,146 @@
+"""How far a run has come, and how long the rest will take, from its ledger."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["Forecast", "Step", "forecast"]
+
+RECENT = 20  # units from which the pace is taken: scenes are not equally dear everywhere
+
+
+@dataclass(frozen=True)
+class Step:
+    """A kind of work.
+
+    Attributes
+    ----------
+    name : str
+    done : int
+    total : int or None
+        None where it is not known beforehand.
+    wall_s : float
+        Spent on it.
+    """
+
+    name: str
+    done: int
+    total: int | None
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """How far a run has come.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        In order.
+    left_s : float or None
+        Wall-clock seconds until the last frame at the present pace; None where it can't be known yet.
+    text : str
+        What it rests on, or why it isn't known.
+    """
+
+    steps: tuple[Step, ...]
+    left_s: float | None
+    text: str
+
+
+def forecast(identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Forecast:
+    """Tell how far a run has come.
+
+    Parameters
+    ----------
+    identity
+        As ``run.json`` has it.
+    lines
+        Of the ledger.
+    """
+    work = _Work(identity, lines)
+    steps = tuple(work.steps())
+    left, text = work.left()
+    return Forecast(steps, left, text)
+
+
+class _Work:
+    def __init__(self, identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> None:
+        self._method = identity["method"]
+        self._numbers = identity["path"]["frames"]
+        self._units: dict[str, list[Mapping[str, Any]]] = {}
+        for line in lines:
+            self._units.setdefault(line["unit"].partition(" ")[0], []).append(line)
+
+    def steps(self) -> list[Step]:
+        count = len(self._numbers)
+        totals: dict[str, tuple[str, int | None]] = {"survey": ("path surveyed", 1)}
+        if self._method == "paper":
+            totals |= {"keyframe": ("keyframes", None), "segment": ("segments judged", None)}
+            totals |= {"raw": ("frames before antialiasing", count)}
+        if self._method == "decoupled":
+            totals |= {"keyframe": ("keyframes", None), "light": ("segments lit", None)}
+        totals |= {"frame": ("frames", count), "video": ("video", 1)}
+        extra = {name: (name, None) for name in self._units if name not in totals}
+        ordered = [*list(totals.items())[:-2], *extra.items(), *list(totals.items())[-2:]]
+        return [
+            Step(title, len(self._units.get(kind, [])), total, self._spent(kind))
+            for kind, (title, total) in ordered
+        ]
+
+    def left(self) -> tuple[float | None, str]:
+        """Seconds left, and what they rest on."""
+        frames = self._left_of("frame")
+        if frames == 0.0:
+            return 0.0, "all frames are finished"
+        if self._method != "paper":
+            if frames is None:
+                return None, "the time left is known once the first frame is finished"
+            return frames, f"at the pace of the last {min(RECENT, self._done('frame'))} frames"
+        raw, share = self._left_of("raw"), self._judged_share()
+        if raw is None:
+            if share == 0.0:
+                return None, "the time left is known once the first in-between is finished"
+            spent = self._spent("keyframe") + self._spent("segment")
+            return None, (
+                f"{100.0 * share:.0f} % of the path is judged, which took {spent:.0f} s; "
+                "the time left is known once the first in-between is finished"
+            )
+        if frames is None and raw == 0.0:
+            return None, "only antialiasing is left; its time is known once the first frame is finished"
+        rest = "" if frames is not None else ", antialiasing left out: no frame tells yet what it costs"
+        kind, noun = ("raw", "in-betweens") if raw > 0.0 else ("frame", "frames")
+        basis = f"at the pace of the last {min(RECENT, self._done(kind))} {noun}"
+        return raw + (frames or 0.0), basis + rest
+
+    def _done(self, kind: str) -> int:
+        return len(self._units.get(kind, []))
+
+    def _spent(self, kind: str) -> float:
+        return sum(_wall(line) for line in self._units.get(kind, []))
+
+    def _left_of(self, kind: str) -> float | None:
+        left = len(self._numbers) - self._done(kind)
+        if left <= 0:
+            return 0.0
+        recent = [_wall(line) for line in self._units.get(kind, []) if not _is_keyframe(line)][-RECENT:]
+        return left * sum(recent) / len(recent) if recent else None
+
+    def _judged_share(self) -> float:
+        """Share of the path in segments that are not split any more."""
+        judged: set[int] = set()
+        for line in self._units.get("segment", []):
+            if not line["verdict"]["is_split"]:
+                judged |= {n for n in self._numbers if line["first"] <= n <= line["last"]}
+        return len(judged) / max(len(self._numbers), 1)
+
+
+def _wall(line: Mapping[str, Any]) -> float:
+    return sum(float(stage["wall_s"]) for stage in line.get("cost", {}).values())
+
+
+def _is_keyframe(line: Mapping[str, Any]) -> bool:
+    # A keyframe becomes a frame at no cost: it says nothing about the in-betweens that are left.
+    return line["unit"].startswith("raw ") and bool(line["sources"]["keyframe"])

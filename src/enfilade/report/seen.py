@@ -1,0 +1,178 @@
+"""A run folder opened to be looked at: who would see it on what screen, and its finished frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade import __version__
+from enfilade.codec import read_exr
+from enfilade.errors import ImageError, RunFolderError
+from enfilade.records import F32, U8, Flow
+from enfilade.settings import VideoSettings, ViewingSettings
+from enfilade.store import Run, tally
+from enfilade.viewing import Viewing
+
+__all__ = ["SeenFrame", "SeenRun"]
+
+
+@dataclass(frozen=True, eq=False)
+class SeenFrame:
+    """A finished frame.
+
+    Attributes
+    ----------
+    index : int
+        On the path, from 0.
+    number : int
+        By which the user knows it.
+    color : (H, W, 3) float32
+        Linear Rec.709.
+    source : (H, W) uint8 or None
+        :class:`~enfilade.records.Source`; None where the file has no such layer.
+    flow : Flow or None
+        Pixels per frame; None where the file has no such layers.
+    """
+
+    index: int
+    number: int
+    color: F32
+    source: U8 | None
+    flow: Flow | None
+
+
+class SeenRun:
+    """A finished or a running run, opened to be read.
+
+    Parameters
+    ----------
+    folder
+
+    Attributes
+    ----------
+    run : Run
+    identity : dict
+        As ``run.json`` has it.
+    lines : list of dict
+        Of the ledger, when the folder was opened.
+    figures : dict
+        See :func:`~enfilade.store.tally`.
+    numbers : tuple of int
+        Of all frames of the path.
+    speed_deg_s : list of float or None
+        Mean velocity of each, once the run has surveyed its path.
+    finished : tuple of int
+        Indices of the frames that are finished, rising.
+    viewing : Viewing
+    exposure_ev : float
+        Stops.
+    video : VideoSettings
+    notes : list of str
+        What is odd about the run, for the user to know.
+
+    Raises
+    ------
+    RunFolderError
+        It is no run folder, is damaged, or is of a version that kept other facts.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.run = Run.existing(folder, is_lenient=True)
+        self.identity = self.run.identity
+        self.notes = list(self.run.notes)
+        self.lines = list(self.run.lines())
+        try:
+            self._read()
+        except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError) as error:
+            raise RunFolderError(
+                f"{folder} is a run of another version ({_version(self.identity)}, this is {__version__}): "
+                f"its run.json or ledger.jsonl hasn't what is needed ({error!r}); render it again"
+            ) from error
+        if _version(self.identity) != __version__:
+            self.notes.append(f"made with version {_version(self.identity)}; this page by {__version__}")
+
+    def _read(self) -> None:
+        path, settings = self.identity["path"], self.identity["settings"]
+        self.numbers = tuple(int(number) for number in path["frames"])
+        survey = next((line["survey"] for line in self.lines if "survey" in line), None)
+        self.speed_deg_s = None if survey is None else [float(v) for v in survey["speed_deg_s"]]
+        self.figures = tally(self.identity, self.lines, self.speed_deg_s)
+        done = {line["frame"] for line in self.lines if line["unit"].startswith("frame ")}
+        self.finished = tuple(i for i, number in enumerate(self.numbers) if number in done)
+        of = ViewingSettings.from_table(_known(settings.get("viewing", {}), ViewingSettings))
+        self.exposure_ev = of.exposure_ev
+        self.video = VideoSettings.from_table(_known(settings.get("video", {}), VideoSettings))
+        width, height = path["size"]
+        self.viewing = Viewing(
+            int(width),
+            int(height),
+            diagonal_m=of.diagonal_m,
+            distance_m=of.distance_m,
+            fps=float(path["fps"]),
+            peak_cd_m2=of.peak_cd_m2,
+            black_cd_m2=of.black_cd_m2,
+            persistence=of.persistence,
+        )
+        self._cuts = frozenset(path.get("cuts", ()))
+
+    @property
+    def name(self) -> str:
+        """Name of the folder."""
+        return self.run.folder.resolve().name
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether all frames are there, and the video."""
+        return len(self.finished) == len(self.numbers) and any(line["unit"] == "video" for line in self.lines)
+
+    def begins_shot(self, index: int) -> bool:
+        """Whether nothing is carried to a frame from the one before."""
+        return index == 0 or self.numbers[index] in self._cuts
+
+    def frame(self, index: int) -> SeenFrame:
+        """Read a finished frame; its checksum is compared.
+
+        Raises
+        ------
+        ImageError, RunFolderError
+            It is missing or damaged, of another size, or holds a NaN. The message names the file.
+        """
+        file = self.run.file("frames", self.numbers[index])
+        self.run.check(file)
+        layers = read_exr(file)
+        size = (self.viewing.height_px, self.viewing.width_px)
+        color = layers.get("RGB")
+        if color is None or color.shape != (*size, 3):
+            raise ImageError(f"{file} holds no image of {size[1]}x{size[0]} pixels")
+        if not np.isfinite(color).all():
+            raise ImageError(f"{file} holds pixels that are NaN or infinite")
+        source = layers.get("source")
+        return SeenFrame(
+            index,
+            self.numbers[index],
+            color.astype(np.float32),
+            None if source is None else source.astype(np.uint8),
+            self._flow(index, layers),
+        )
+
+    def _flow(self, index: int, layers: Mapping[str, Any]) -> Flow | None:
+        if "forward" not in layers or "backward" not in layers:
+            return None
+        is_last = index + 1 == len(self.numbers) or self.begins_shot(index + 1)
+        backward, forward = (
+            np.ascontiguousarray(layers[name], np.float32) for name in ("backward", "forward")
+        )
+        return Flow(backward, forward, has_backward=not self.begins_shot(index), has_forward=not is_last)
+
+
+def _version(identity: Mapping[str, Any]) -> str:
+    versions = identity.get("versions")
+    return str(versions.get("enfilade", "unknown")) if isinstance(versions, dict) else "unknown"
+
+
+def _known(table: Mapping[str, Any], section: type[Any]) -> dict[str, Any]:
+    return {f.name: table[f.name] for f in fields(section) if f.name in table}

@@ -1,0 +1,62 @@
+"""The time left is what is left at the pace of the ledger, and unknown where nothing tells."""
+
+import pytest
+
+from enfilade.report.forecast import forecast
+
+
+def line(unit, wall_s, **more):
+    return {"unit": unit, "files": {}, "cost": {"trace": {"wall_s": wall_s, "cpu_s": wall_s}}, **more}
+
+
+def raw(number, wall_s, *, is_keyframe=False):
+    return line(f"raw {number}", wall_s, frame=number, sources={"keyframe": 100 * is_keyframe, "reused": 0})
+
+
+def of(method, lines, count=10):
+    return forecast({"method": method, "path": {"frames": list(range(1, count + 1))}}, lines)
+
+
+def test_a_reference_at_its_pace():
+    found = of("reference", [line("survey", 1.0), *(line(f"frame {i}", 2.0) for i in range(1, 5))])
+    assert found.left_s == pytest.approx(6 * 2.0)
+    assert "last 4 frames" in found.text
+    steps = {step.name: (step.done, step.total, step.wall_s) for step in found.steps}
+    assert steps["frames"] == (4, 10, 8.0)
+    assert steps["video"] == (0, 1, 0.0)
+
+
+def test_in_betweens_and_antialiasing_add_up_and_keyframes_do_not_count():
+    lines = [raw(1, 0.0, is_keyframe=True), raw(2, 3.0), raw(3, 3.0), line("frame 1", 0.5)]
+    assert of("paper", lines).left_s == pytest.approx(7 * 3.0 + 9 * 0.5)
+
+
+def test_only_antialiasing_is_left():
+    lines = [raw(i, 3.0) for i in range(1, 11)]
+    assert of("paper", lines).left_s is None
+    found = of("paper", [*lines, line("frame 1", 0.5)])
+    assert found.left_s == pytest.approx(9 * 0.5)
+    assert "last 1 frames" in found.text
+
+
+def test_before_the_first_frame_nothing_is_known():
+    verdict = {"is_split": False}
+    lines = [line("keyframe 1", 4.0), line("segment 1-5", 1.0, first=1, last=5, verdict=verdict)]
+    found = of("paper", lines)
+    assert found.left_s is None
+    assert found.text.startswith("50 % of the path is judged, which took 5 s")
+    assert of("decoupled", lines[:1]).left_s is None
+
+
+def test_a_finished_run():
+    assert (
+        of(
+            "paper",
+            [line(f"{k} {i}", 1.0, sources={"keyframe": 0}) for k in ("raw", "frame") for i in range(1, 11)],
+        ).left_s
+        == 0.0
+    )
+
+
+def test_units_of_a_later_version_are_listed():
+    assert "glow" in [step.name for step in of("decoupled", [line("glow 1", 1.0)]).steps]
