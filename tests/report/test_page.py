@@ -199,11 +199,24 @@ def test_a_run_of_another_version(copied, tmp_path):
     notes, _, _ = written(copied, tmp_path)
     assert any("made with version 0.0.1" in note for note in notes)
     change_identity(copied, lambda table: table["identity"].pop("path"))
-    with pytest.raises(RunFolderError, match=r"another version \(0\.0\.1"):
+    with pytest.raises(RunFolderError, match=r"can't be shown: .* another version \(0\.0\.1"):
         written(copied, tmp_path)
     change_identity(copied, lambda table: table.update(format=99))
     with pytest.raises(RunFolderError, match="format 99"):
         written(copied, tmp_path)
+
+
+def test_a_reference_of_the_bench_will_do(runs, tmp_path):
+    def trimmed(table):
+        table["identity"]["trace"] = {"spp": table["identity"].pop("settings")["trace"]["spp"]}
+
+    reference = shutil.copytree(runs / "reference", tmp_path / "reference")
+    change_identity(reference, trimmed)
+    keep_lines(reference, lambda unit: unit.startswith("frame "))
+    notes, text, data = written(runs / "paper", tmp_path, reference=reference, has_metric=False)
+    assert "difference" in data["frames"][0]["layers"]
+    assert "its paths a pixel" in text
+    assert not any("not finished" in note for note in notes)
 
 
 def test_a_reference_of_another_size_is_refused(runs, copied, tmp_path):

@@ -30,7 +30,7 @@ PAGE = "report.html"
     "has_metric",
     default=True,
     show_default=True,
-    help="Whether the metric judges each frame beside the reference, which takes about a second a frame.",
+    help="Whether the metric judges each frame beside the reference, which doubles the time.",
 )
 @click.option(
     "--frames",

@@ -50,7 +50,7 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         "ahead": ahead,
         "left": _left(ahead),
         "beside": _beside(seen, reference, film),
-        "settings": _settings(seen.identity["settings"]),
+        "settings": _settings(seen.identity.get("settings", {})),
         "identity": _identity(seen),
         "rows": _rows(seen, film),
         "data": json.dumps(_data(seen, film, made), ensure_ascii=True).replace("<", "\\u003c"),
@@ -62,7 +62,10 @@ def _state(seen: SeenRun) -> dict[str, str]:
     writer = seen.run.writer()
     count = f"{len(seen.finished)} of {len(seen.numbers)} frames"
     if seen.is_finished:
-        return {"word": "finished", "text": f"all {len(seen.numbers)} frames and the video"}
+        return {
+            "word": "finished",
+            "text": f"all {len(seen.numbers)} frames" + (" and the video" if _video(seen) else ""),
+        }
     if writer is not None:
         who = f"process {writer['pid']} on {writer['host']}, since {writer['started']}"
         return {"word": "running", "text": f"{count} finished; {who}"}

@@ -30,7 +30,7 @@ SOURCE_NAMES = {
     Source.HOLE: "hole",
     Source.KEYFRAME: "keyframe",
 }
-QUALITY = 88  # of WebP
+QUALITY = 92  # of WebP
 
 
 @dataclass(frozen=True)

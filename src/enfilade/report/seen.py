@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from enfilade import __version__
 from enfilade.codec import read_exr
 from enfilade.errors import ImageError, RunFolderError
 from enfilade.records import F32, U8, Flow
-from enfilade.settings import VideoSettings, ViewingSettings
+from enfilade.settings import MaskSettings, VideoSettings, ViewingSettings
 from enfilade.store import Run, tally
 from enfilade.viewing import Viewing
 
@@ -89,18 +89,19 @@ class SeenRun:
             self._read()
         except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError) as error:
             raise RunFolderError(
-                f"{folder} is a run of another version ({_version(self.identity)}, this is {__version__}): "
-                f"its run.json or ledger.jsonl hasn't what is needed ({error!r}); render it again"
+                f"{folder} can't be shown: its run.json or ledger.jsonl hasn't what is needed ({error!r}); "
+                f"it is of another version ({_version(self.identity)}, this is {__version__}) or of another "
+                "command; render it again"
             ) from error
         if _version(self.identity) != __version__:
             self.notes.append(f"made with version {_version(self.identity)}; this page by {__version__}")
 
     def _read(self) -> None:
-        path, settings = self.identity["path"], self.identity["settings"]
+        path, settings = self.identity["path"], self._settings()
         self.numbers = tuple(int(number) for number in path["frames"])
         survey = next((line["survey"] for line in self.lines if "survey" in line), None)
         self.speed_deg_s = None if survey is None else [float(v) for v in survey["speed_deg_s"]]
-        self.figures = tally(self.identity, self.lines, self.speed_deg_s)
+        self.figures = tally({**self.identity, "settings": settings}, self.lines, self.speed_deg_s)
         done = {line["frame"] for line in self.lines if line["unit"].startswith("frame ")}
         self.finished = tuple(i for i, number in enumerate(self.numbers) if number in done)
         of = ViewingSettings.from_table(_known(settings.get("viewing", {}), ViewingSettings))
@@ -119,6 +120,11 @@ class SeenRun:
         )
         self._cuts = frozenset(path.get("cuts", ()))
 
+    def _settings(self) -> dict[str, Any]:
+        """Tables of settings; those that tables are needed of are there."""
+        given = self.identity.get("settings", {"trace": self.identity.get("trace", {})})  # the bench has few
+        return {**given, "masks": asdict(MaskSettings()) | given.get("masks", {})}
+
     @property
     def name(self) -> str:
         """Name of the folder."""
@@ -126,8 +132,9 @@ class SeenRun:
 
     @property
     def is_finished(self) -> bool:
-        """Whether all frames are there, and the video."""
-        return len(self.finished) == len(self.numbers) and any(line["unit"] == "video" for line in self.lines)
+        """Whether all frames are there, and the video; runs of the bench may have none."""
+        has_video = any(line["unit"] == "video" for line in self.lines)
+        return len(self.finished) == len(self.numbers) and (has_video or "settings" not in self.identity)
 
     def begins_shot(self, index: int) -> bool:
         """Whether nothing is carried to a frame from the one before."""

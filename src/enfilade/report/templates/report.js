@@ -265,7 +265,10 @@
     });
   }
   plots.forEach(({ place }) => follow(place));
-  if (frames.length) [canvas.width, canvas.height] = data.size; // its height is that of the charts
+  if (frames.length) { // first: its height is that of the charts
+    [canvas.width, canvas.height] = data.size;
+    root.style.setProperty("--ratio", data.size[0] / data.size[1]);
+  }
   drawPlots();
   new ResizeObserver(moveCursors).observe(document.body);
   if (frames.length) {
