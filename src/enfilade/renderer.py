@@ -250,6 +250,14 @@ class LightRenderer(Renderer, Protocol):
         """
         ...
 
-    def scatter(self, lit: Lit, rng: Any) -> Scattered:
-        """Sample one bounce off everything but the diffuse lobe."""
+    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
+        """Sample one bounce off everything but the diffuse lobe.
+
+        Parameters
+        ----------
+        lit
+        rng : PCG32
+        choice : Float
+            In [0, 1): which of several lobes, those that let light through last. None leaves it to chance.
+        """
         ...

@@ -14,7 +14,7 @@ from enfilade.irradiance.cells import Cells
 from enfilade.pixels.lookup import Page, footprint, lookup
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.pixels.wavelet import Guide, smooth, without_speckles
-from enfilade.records import F32, Geometry, LightPage, Mask, Shading
+from enfilade.records import F32, U32, Geometry, LightPage, Mask, Shading
 
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
@@ -98,7 +98,8 @@ def pooled(page: LightPage, around: Sequence[Page]) -> Page:
         Opened, of one layer; known where ``page`` is.
     """
     layers, _ = _gathered(page.geometry, around, [1.0] * len(around))
-    smoothed = [_smooth(page.geometry, page.is_known, light, variance) for light, variance in layers]
+    groups = np.where(page.is_known, page.geometry.item, np.uint32(0))
+    smoothed = [_smooth(page.geometry, groups, light, variance) for light, variance in layers]
     light = sum((light for light, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
     return _page(page.geometry, lanes(page.is_known), [(light, variance)])
@@ -111,7 +112,7 @@ def light_of(page: Page) -> F32:
 
 def smoothed(geometry: Geometry, shading: Shading) -> Shading:
     """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left."""
-    light, variance = _smooth(geometry, geometry.is_hit, _even(shading), lanes(shading.variance))
+    light, variance = _smooth(geometry, geometry.item, _even(shading), lanes(shading.variance))
     size = shading.variance.shape
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
 
@@ -121,11 +122,11 @@ def _even(shading: Shading) -> Any:
     return without_speckles(lanes(shading.color), width=width, height=height, times=SPECKLE)
 
 
-def _smooth(geometry: Geometry, where: Mask, light: Any, variance: Any) -> tuple[Any, Any]:
+def _smooth(geometry: Geometry, groups: U32, light: Any, variance: Any) -> tuple[Any, Any]:
     guide = Guide(
         depths=lanes(geometry.depth),
         normals=lanes(geometry.normal),
-        items=lanes(np.where(where, geometry.item, np.uint32(0))),
+        items=lanes(groups),
         direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
         width=geometry.camera.width,
         height=geometry.camera.height,

@@ -8,21 +8,27 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import numpy as np
+import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, opaque
+from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.camera import Camera
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
 from enfilade.pixels.estimate import Samples
+from enfilade.pixels.rays import pinhole_directions
+from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import Bounce, LightRenderer, Lit, Rays
 
 BOUNCES = 16  # most bounces off lobes before a path is given up
+BRIGHT = 4.0  # one over the throughput below which a path is faint
 LEAST_CHANCE = 0.05  # of a faint path to go on
 MOST_CHANCE = (
+    1.0,
     1.0,
     1.0,
     1.0,
@@ -31,6 +37,10 @@ MOST_CHANCE = (
 )  # of any path, by bounce; the last holds on: some are trapped in glass
 BLACK = 1e-4  # albedo below which no light is looked up
 LEAST_LANES = 1021  # of a kernel; fewer might be as many as some array of the scene: another recording
+SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+BEHIND = np.uint32(1 << 30)  # added to the number of an item that is not seen where it is
+THROUGH = 0.999999  # chooses the lobe that lets light through
+LAYERS = 8  # of mirrors and glass, one behind the other
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
 CELL_BLUR = 0.25  # ... and at what is seen through a lobe, of the lobe's width
 UNRELATED = 0x9E3779B97F4A7C15  # makes other random numbers of those with which a path goes on
@@ -102,6 +112,7 @@ class Shader:
     def __init__(self, renderer: LightRenderer, pixel_angle: float) -> None:
         self._renderer = renderer
         self._pixel_angle = pixel_angle
+        self._look_on = self._recorded(self._look_on_kernel)
         self._meet = self._recorded(self._meet_kernel)
         self._look_up = self._recorded(self._look_up_kernel)
         self._go_on = self._recorded(self._go_on_kernel)
@@ -167,6 +178,35 @@ class Shader:
             path = _chosen(step.path, dr.compress(step.goes_on))
         return radiance
 
+    def shown(self, geometry: Geometry) -> Geometry:
+        """What mirrors show and glass lets through, in their place.
+
+        Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
+        :data:`BEHIND` added to the item's number and a depth of 0: it is not where it is seen. Everything
+        else stays.
+        """
+        pixels = np.flatnonzero(np.isin(geometry.surface, SHARP)).astype(np.uint32)
+        if not len(pixels):
+            return geometry
+        item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
+        depth = geometry.depth.ravel().copy()
+        depth[pixels], item[pixels], normal[pixels] = 0.0, BEHIND, 0.0
+        path = self._begun(*_centre_rays(geometry.camera, pixels))
+        for _ in range(LAYERS):
+            path, found, turned, is_sharp = self._look_on(path)
+            lane = pixels[np.array(path.lane)]
+            item[lane], normal[lane] = np.array(found) + BEHIND, np.array(turned).T
+            path = _chosen(path, dr.compress(is_sharp))
+            if not dr.width(path.lane):
+                break
+        size = geometry.item.shape
+        return replace(
+            geometry,
+            depth=depth.reshape(size),
+            item=item.reshape(size),
+            normal=np.ascontiguousarray(normal.reshape(*size, 3)),
+        )
+
     def _begun(self, rays: Rays, rng: Any) -> _Path:
         count = dr.width(rng.state)
         path = _Path(
@@ -210,6 +250,22 @@ class Shader:
             for key in keys:
                 heard(Estimates.of(np.array(key)[:count], values))
 
+    def _look_on_kernel(self, path: _Path) -> tuple[_Path, Any, Any, Any]:
+        """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
+        rng = PCG32(path.rng)
+        lit = self._renderer.lit(path.rays, path.bounce)
+        scattered = self._renderer.scatter(lit, rng, Float(THROUGH))
+        ahead = _Path(
+            path.lane, scattered.rays, scattered.bounce, path.throughput, path.width, path.spread, rng
+        )
+        surfaces = self._renderer.lit(ahead.rays, ahead.bounce).surfaces
+        is_sharp = Bool(False)
+        for sharp in SHARP:
+            is_sharp |= surfaces.surface == int(sharp)
+        item = dr.select(surfaces.is_hit, surfaces.item, 0)
+        normal = dr.select(surfaces.is_hit, surfaces.normal, 0.0)
+        return ahead, item, Array3f(normal), Bool(is_sharp & surfaces.is_hit & scattered.is_alive)
+
     def _meet_kernel(self, cache: LightCache, path: _Path) -> _Step:
         return self._met(cache, path)
 
@@ -244,7 +300,7 @@ class Shader:
         lit = self._renderer.lit(path.rays, path.bounce)
         scattered = self._renderer.scatter(lit, rng)
         throughput = path.throughput * scattered.throughput
-        chance = dr.clip(dr.max(dr.abs(throughput)), least, most)
+        chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, most)
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
         blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
         ahead = _Path(
@@ -291,6 +347,18 @@ class Shader:
         return replayed
 
 
+def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, Any]:
+    """Rays through the centres of pixels, with a generator each."""
+    pixel = lanes(pixels)
+    row = pixel // opaque(camera.width)
+    direction = pinhole_directions(
+        Float(pixel - row * opaque(camera.width)) + 0.5,
+        Float(row) + 0.5,
+        direction_from_pixel=matrix3(camera.direction_from_pixel),
+    )
+    return Rays(vector3(camera.eye), direction), PCG32(dr.width(pixel))
+
+
 def _diffuse(lit: Lit) -> tuple[Any, Any]:
     """Albedo, and where it is worth looking up light."""
     albedo = lit.surfaces.albedo
@@ -307,26 +375,26 @@ def _width(path: _Path, lit: Lit) -> Any:
     return path.width + path.spread * lit.surfaces.distance * dr.norm(path.rays.direction)
 
 
-def _padded(lanes: Any) -> tuple[Any, Any]:
+def _padded(chosen: Any) -> tuple[Any, Any]:
     """Lanes of a list, repeated until they are enough for a kernel, and which are no repetitions."""
-    count = dr.width(lanes)
+    count = dr.width(chosen)
     index = dr.arange(UInt, max(count, LEAST_LANES))
-    return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)
+    return dr.gather(UInt, chosen, dr.minimum(index, opaque(count - 1))), index < opaque(count)
 
 
-def _chosen(path: _Path, lanes: Any) -> _Path:
-    """Paths of some lanes; what is added to have enough of them carries nothing."""
-    if not dr.width(lanes):
+def _chosen(path: _Path, chosen_lanes: Any) -> _Path:
+    """Paths of some chosen_lanes; what is added to have enough of them carries nothing."""
+    if not dr.width(chosen_lanes):
         return _Path(UInt(), path.rays, path.bounce, path.throughput, path.width, path.spread, path.rng)
-    lanes, is_real = _padded(lanes)
+    chosen_lanes, is_real = _padded(chosen_lanes)
     chosen = _Path(
-        lane=dr.gather(UInt, path.lane, lanes),
-        rays=dr.gather(Rays, path.rays, lanes),
-        bounce=dr.gather(Bounce, path.bounce, lanes) if path.bounce else None,
-        throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, lanes), 0.0),
-        width=dr.gather(Float, path.width, lanes),
-        spread=dr.gather(Float, path.spread, lanes),
-        rng=dr.gather(PCG32, path.rng, lanes),
+        lane=dr.gather(UInt, path.lane, chosen_lanes),
+        rays=dr.gather(Rays, path.rays, chosen_lanes),
+        bounce=dr.gather(Bounce, path.bounce, chosen_lanes) if path.bounce else None,
+        throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, chosen_lanes), 0.0),
+        width=dr.gather(Float, path.width, chosen_lanes),
+        spread=dr.gather(Float, path.spread, chosen_lanes),
+        rng=dr.gather(PCG32, path.rng, chosen_lanes),
     )
     dr.eval(chosen)
     return chosen

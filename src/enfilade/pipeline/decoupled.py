@@ -329,9 +329,10 @@ def _scattered(
     least, most = settings.light.least_lobe_samples, settings.light.lobe_samples
     scattered.add(least)
 
+    shown = table.shader.shown(workshop.views[frame].geometry)
+
     def image() -> Shading:
-        whole = _spread(scattered.shading, where.reshape(path.height, path.width))
-        return smoothed(workshop.views[frame].geometry, whole)
+        return smoothed(shown, _spread(scattered.shading, where.reshape(path.height, path.width)))
 
     if most > least:
         left = image()

@@ -73,12 +73,12 @@ class Light:
         indirect = dr.select(active, weight * (found - whole), 0.0)
         return _divided(direct, lit.surfaces.albedo), _divided(indirect, lit.surfaces.albedo)
 
-    def scatter(self, lit: Lit, rng: Any) -> Scattered:
+    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
         seen = lit.native
         material = seen.bsdf()
         direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, lit.has_lobe)
-        wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng)
+        wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng, choice)
         ray = seen.spawn_ray(seen.to_world(wo))
         return Scattered(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),

@@ -76,7 +76,9 @@ class Lobes:
         beyond, mixed_pdf = self._beyond(seen, material, wo, active & undivided)
         return dr.select(undivided, beyond, own), dr.select(undivided, mixed_pdf, own_pdf)
 
-    def sample_rest(self, seen: Any, material: Any, rng: Any) -> tuple[Any, Any, Any, Any]:
+    def sample_rest(
+        self, seen: Any, material: Any, rng: Any, choice: Any = None
+    ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight, and whether the direction is the only one (a delta lobe).
 
         What a whole BSDF has beyond Lambert's lobe is sampled by both in turn: where only the one or the
@@ -84,6 +86,8 @@ class Lobes:
         """
         undivided = self.is_undivided(seen, material)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        if choice is not None:
+            first = choice
         is_turn = rng.next_float32() < 0.5
         own, weight = material.sample(self._rest, seen, first, second, ~undivided)
         whole, whole_weight = material.sample(self._all, seen, first, second, undivided)

@@ -114,9 +114,9 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
         return self._light.light(lit, rng)
 
-    def scatter(self, lit: Lit, rng: Any) -> Scattered:
+    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
-        return self._light.scatter(lit, rng)
+        return self._light.scatter(lit, rng, choice)
 
     def _find(self, rays: Rays, *, from_camera: bool = True) -> tuple[Surfaces, Any]:
         direction = mi.Vector3f(rays.direction)
