@@ -129,7 +129,10 @@ def test_a_running_run_is_shown_as_far_as_it_has_come(copied, tmp_path):
     assert "state-running" in text
     assert "8 of 10 frames finished; process" in text
     assert re.search(r"About \d+ s left, at the pace of the last 8 frames", text)
-    assert [frame["number"] for frame in data["frames"]] == list(range(1, 9))
+    assert [frame["number"] for frame in data["frames"]] == list(range(1, FRAMES + 1))
+    assert [frame["number"] for frame in data["frames"] if frame["isRaw"]] == [9, 10]
+    assert "2 frames are shown before antialiasing, which the run has still to do" in notes
+    assert "velocity" not in data["frames"][-1]["layers"]
     assert not any("damaged" in note for note in notes)
     unchanged = {file: data for file, data in before.items() if file.name != "run.lock"}
     assert all(file.read_bytes() == data for file, data in unchanged.items())
@@ -140,7 +143,7 @@ def test_a_run_that_was_stopped_early(copied, tmp_path):
     notes, text, data = written(copied, tmp_path)
     assert "state-unfinished" in text
     assert "No frame to show yet" in text
-    assert notes == ["no frame is finished yet"]
+    assert notes == ["there is no frame to show yet"]
     assert [panel["name"] for panel in data["panels"]] == ["velocity"]
 
 
@@ -160,7 +163,7 @@ def test_a_damaged_line_of_the_ledger_is_named_and_left_out(copied, tmp_path):
     (copied / "ledger.jsonl").write_text("".join(lines))
     notes, _, data = written(copied, tmp_path)
     assert any(f"ledger.jsonl, line {number + 1} is damaged" in note for note in notes)
-    assert 5 not in [frame["number"] for frame in data["frames"]]
+    assert data["frames"][4]["isRaw"]  # its line of before antialiasing is whole
 
 
 def test_a_damaged_reference_leaves_the_frame(runs, copied, tmp_path):
@@ -247,7 +250,7 @@ def test_where_there_is_little_room_frames_are_left_out_evenly(runs):
     numbers = [frame["number"] for frame in film.frames]
     assert numbers[0] == 1
     assert len(numbers) < FRAMES / 2 + 1
-    assert any(f"{len(numbers)} of 10 finished frames" in note for note in film.notes)
+    assert any(f"{len(numbers)} of 10 frames are on the page" in note for note in film.notes)
     assert sum(len(t) for f in film.frames for t in f["layers"].values()) <= taken / 2.2
 
 

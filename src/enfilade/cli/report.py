@@ -35,7 +35,7 @@ PAGE = "report.html"
 @click.option(
     "--frames",
     metavar="RANGES",
-    help="Frames to put on the page: 1-250, 1,5,9 or 1-250:2.  [default: all that are finished]",
+    help="Frames to put on the page: 1-250, 1,5,9 or 1-250:2.  [default: all that are there]",
 )
 @click.option(
     "--max-mb",

@@ -60,7 +60,7 @@ class Against:
     Raises
     ------
     RunFolderError
-        The two differ in size or have no finished frame in common.
+        The two differ in size or have no frame in common.
     """
 
     def __init__(self, test: SeenRun, reference: SeenRun, *, has_metric: bool) -> None:
@@ -72,16 +72,16 @@ class Against:
             )
         self._test, self._reference = test, reference
         self._index = {reference.numbers[i]: i for i in reference.finished}
-        if not any(test.numbers[i] in self._index for i in test.finished):
+        if not self._index.keys() & set(test.numbers):
             raise RunFolderError(
-                f"{test.run.folder} and the reference {reference.run.folder} have no finished frame in common"
+                f"{test.run.folder} and the reference {reference.run.folder} have no frame in common"
             )
         self.notes = _oddities(test, reference)
         self._last: int | None = None  # index of the frame judged last
         self._aqm = _metric(test) if has_metric else None
 
     def beside(self, frame: SeenFrame) -> Beside | None:
-        """Judge the next frame; None where the reference doesn't have it.
+        """Judge the next frame; None where the reference doesn't have it, or it is not antialiased yet.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class Against:
             The reference's file is missing or damaged.
         """
         index = self._index.get(frame.number)
-        if index is None:
+        if index is None or frame.is_raw:
             return None
         other = self._reference.frame(index)
         pair = shown(

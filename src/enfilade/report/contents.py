@@ -218,6 +218,7 @@ def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, An
                 "index": frame["index"],
                 "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[frame["index"]],
                 "traced": row.get("traced"),
+                "isRaw": frame["is_raw"],
                 "isKeyframe": row.get("keyframe", 0.0) > 0.0,
                 "score": found.get("score_jnd"),
                 "psnr": found.get("psnr_db"),

@@ -34,7 +34,7 @@ class Film:
     size : tuple of int
         Width and height of the pictures, pixels.
     frames : list of dict
-        ``number``, ``index``, and ``layers``: base64 of a WebP by the layer's name.
+        ``number``, ``index``, ``is_raw``, and ``layers``: base64 of a WebP by the layer's name.
     beside : dict of int to dict
         By the frame's number: ``psnr_db``, ``score_jnd``, ``percent_visible``.
     notes : list of str
@@ -74,7 +74,7 @@ def encode_film(
     ----------
     seen
     wanted
-        Indices of finished frames, rising.
+        Indices of frames that are there, rising.
     against
         None: without a reference. Of frames that are left out, the metric judges all the same: what
         flickers is seen in frames that follow each other.
@@ -86,7 +86,7 @@ def encode_film(
     shown_size = (seen.viewing.width_px, seen.viewing.height_px)
     size = _scaled(shown_size, min(1.0, WIDEST_PX / shown_size[0]))
     if not wanted:
-        return Film(size, notes=["no frame is finished yet"])
+        return Film(size, notes=["there is no frame to show yet"])
     each = _probe(seen, wanted, view, size, has_maps=against is not None)
     size, step = _fitted(size, each * len(wanted), room_bytes * CAUTION)
     film = Film(size)
@@ -102,8 +102,15 @@ def encode_film(
         if frame.index in kept:
             pictures = painted(frame, beside, view=view, viewing=seen.viewing)
             film.frames.append(
-                {"number": frame.number, "index": frame.index, "layers": _encoded(pictures, size)}
+                {
+                    "number": frame.number,
+                    "index": frame.index,
+                    "is_raw": frame.is_raw,
+                    "layers": _encoded(pictures, size),
+                }
             )
+    if raw := sum(frame["is_raw"] for frame in film.frames):
+        film.notes.append(f"{raw} frames are shown before antialiasing, which the run has still to do")
     is_thinned = step > 1
     while len(film.frames) > 1 and _bytes(film.frames) > room_bytes:
         film.frames, is_thinned = film.frames[::2], True
@@ -112,7 +119,7 @@ def encode_film(
         film.notes.append(f"pictures are scaled from {before} to {after} pixels")
     if is_thinned:
         film.notes.append(
-            f"{len(film.frames)} of {len(wanted)} finished frames are on the page, to keep it small; charts "
+            f"{len(film.frames)} of {len(wanted)} frames are on the page, to keep it small; charts "
             "and tables show all (--max-mb and --frames choose others)"
         )
     return film

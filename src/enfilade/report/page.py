@@ -41,7 +41,7 @@ class Wishes:
     reference : Path or None
         Run folder of a reference.
     numbers : tuple of int or None
-        Of the frames that may be on the page; None: all that are finished.
+        Of the frames that may be on the page; None: all that are there.
     max_mb : float
         Megabytes that the page should not exceed; 8 or more.
     has_metric : bool
@@ -110,12 +110,12 @@ def write_page(folder: Path, file: Path, wishes: Wishes, monitor: Monitor) -> li
 
 def _wanted(seen: SeenRun, numbers: tuple[int, ...] | None) -> list[int]:
     if numbers is None:
-        return list(seen.finished)
+        return list(seen.there)
     if unknown := sorted(set(numbers) - set(seen.numbers)):
         raise SettingsError(
             f"{seen.run.folder} has no frame {unknown[0]}; it has {seen.numbers[0]} to {seen.numbers[-1]}"
         )
-    return [i for i in seen.finished if seen.numbers[i] in numbers]
+    return [i for i in seen.there if seen.numbers[i] in numbers]
 
 
 def _view(seen: SeenRun) -> tuple[View, list[str]]:

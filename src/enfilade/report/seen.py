@@ -22,7 +22,7 @@ __all__ = ["SeenFrame", "SeenRun"]
 
 @dataclass(frozen=True, eq=False)
 class SeenFrame:
-    """A finished frame.
+    """A frame of the run.
 
     Attributes
     ----------
@@ -36,6 +36,8 @@ class SeenFrame:
         :class:`~enfilade.records.Source`; None where the file has no such layer.
     flow : Flow or None
         Pixels per frame; None where the file has no such layers.
+    is_raw : bool
+        Whether it is not antialiased yet.
     """
 
     index: int
@@ -43,6 +45,7 @@ class SeenFrame:
     color: F32
     source: U8 | None
     flow: Flow | None
+    is_raw: bool = False
 
 
 class SeenRun:
@@ -67,6 +70,8 @@ class SeenRun:
         Mean velocity of each, once the run has surveyed its path.
     finished : tuple of int
         Indices of the frames that are finished, rising.
+    there : tuple of int
+        The same, and of those that wait for antialiasing.
     viewing : Viewing
     exposure_ev : float
         Stops.
@@ -102,8 +107,12 @@ class SeenRun:
         survey = next((line["survey"] for line in self.lines if "survey" in line), None)
         self.speed_deg_s = None if survey is None else [float(v) for v in survey["speed_deg_s"]]
         self.figures = tally({**self.identity, "settings": settings}, self.lines, self.speed_deg_s)
-        done = {line["frame"] for line in self.lines if line["unit"].startswith("frame ")}
+        done, raw = (
+            {line["frame"] for line in self.lines if line["unit"].startswith(kind)}
+            for kind in ("frame ", "raw ")
+        )
         self.finished = tuple(i for i, number in enumerate(self.numbers) if number in done)
+        self.there = tuple(i for i, number in enumerate(self.numbers) if number in done | raw)
         of = ViewingSettings.from_table(_known(settings.get("viewing", {}), ViewingSettings))
         self.exposure_ev = of.exposure_ev
         self.video = VideoSettings.from_table(_known(settings.get("video", {}), VideoSettings))
@@ -141,14 +150,15 @@ class SeenRun:
         return index == 0 or self.numbers[index] in self._cuts
 
     def frame(self, index: int) -> SeenFrame:
-        """Read a finished frame; its checksum is compared.
+        """Read a frame that is finished or waits for antialiasing; its checksum is compared.
 
         Raises
         ------
         ImageError, RunFolderError
             It is missing or damaged, of another size, or holds a NaN. The message names the file.
         """
-        file = self.run.file("frames", self.numbers[index])
+        is_raw = index not in self.finished
+        file = self.run.file("raw" if is_raw else "frames", self.numbers[index])
         self.run.check(file)
         layers = read_exr(file)
         size = (self.viewing.height_px, self.viewing.width_px)
@@ -164,6 +174,7 @@ class SeenRun:
             color.astype(np.float32),
             None if source is None else source.astype(np.uint8),
             self._flow(index, layers),
+            is_raw,
         )
 
     def _flow(self, index: int, layers: Mapping[str, Any]) -> Flow | None:

@@ -109,7 +109,7 @@
     at.frame = Math.min(Math.max(frame, 0), frames.length - 1);
     at.layer = layer;
     const here = frames[at.frame];
-    const kind = here.isKeyframe ? "keyframe" : "in-between";
+    const kind = (here.isKeyframe ? "keyframe" : "in-between") + (here.isRaw ? ", not antialiased" : "");
     const title = data.layers.find((one) => one.name === layer).title;
     scrubber.value = at.frame;
     scrubber.setAttribute("aria-valuetext", `frame ${here.number}, ${kind}`);
