@@ -178,6 +178,17 @@ def test_what_no_page_saw_is_traced(diffuse):
     assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
 
 
+def test_a_scene_opened_earlier_is_no_hindrance(tmp_path):
+    shared = '</shape><bsdf type="diffuse" id="used"/><bsdf type="conductor" id="unused"/><shape type="cube">'
+    balls = {"glass": '<bsdf type="dielectric"/>', "plastic": f'{shared}<ref id="used"/>'}
+    camera = _camera()
+    earlier = _opened(tmp_path, balls)
+    alone = _shaded(earlier, LightCache(), camera, spp=4)
+    renderer = _opened(tmp_path, balls)
+    for opened in (renderer, earlier, renderer):
+        assert (_shaded(opened, LightCache(), camera, spp=4).color == alone.color).all()
+
+
 def test_same_seed_same_bytes_whatever_the_chunks(diffuse):
     renderer, pages = diffuse
     camera, cache = _camera(24, 18), _opened_cache(pages)

@@ -7,6 +7,7 @@ since changing its size or crop compiles anew and its Gaussian filter adds in no
 from __future__ import annotations
 
 import re
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,9 @@ from enfilade.settings import TraceSettings
 UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
+
+# Arrays that kernels read. Dr.Jit counts all materials there are, so that a scene must know of others.
+_states: weakref.WeakKeyDictionary[MitsubaRenderer, Any] = weakref.WeakKeyDictionary()
 
 
 class MitsubaRenderer:
@@ -72,6 +76,8 @@ class MitsubaRenderer:
         self._light = Light(scene, lambda rays, rng: self._radiance(rays, rng, self._onward))
         self._items = _items(scene)
         self._file = file
+        items, light = self._items, self._light.state
+        _states[self] = scene, self._integrator, self._onward, items.number, items.is_passable, light
 
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""
@@ -92,8 +98,7 @@ class MitsubaRenderer:
     @property
     def state(self) -> Any:
         """See :meth:`enfilade.renderer.LightRenderer.state`."""
-        items = self._items
-        return self._scene, self._integrator, self._onward, items.number, items.is_passable, self._light.state
+        return _states[self], [state for renderer, state in _states.items() if renderer is not self]
 
     def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
         """Find the first surface along rays, and the light it emits.

@@ -1,0 +1,104 @@
+"""Smoothing along surfaces, against loops."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import image, lanes, matrix3
+from enfilade.camera import Camera, look_at
+from enfilade.pixels.wavelet import Guide, smooth, without_speckles
+from twins import wavelet as twin
+
+HEIGHT, WIDTH = 18, 24
+CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
+OPTIONS = {"levels": 3, "deviations": 3.0, "plane_tolerance": 0.01, "normal_exponent": 64.0}
+
+
+@dataclasses.dataclass
+class Scene:
+    """A wall with a step in depth and a tilted part, two items, and light with noise."""
+
+    color: np.ndarray
+    variance: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    item: np.ndarray
+
+    def smoothed(self, **options):
+        guide = Guide(
+            lanes(self.depth),
+            lanes(self.normal),
+            lanes(self.item),
+            matrix3(CAMERA.direction_from_pixel),
+            WIDTH,
+            HEIGHT,
+        )
+        color, variance = smooth(lanes(self.color), lanes(self.variance), guide, **{**OPTIONS, **options})
+        return image(color, HEIGHT, WIDTH), image(variance, HEIGHT, WIDTH)
+
+
+@pytest.fixture
+def scene():
+    rng = np.random.default_rng(3)
+    depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
+    depth[:, 16:] = 4.5
+    normal = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    normal[..., 2] = 1.0
+    normal[12:] = (0.0, 0.6, 0.8)
+    item = np.ones((HEIGHT, WIDTH), np.uint32)
+    item[:, :6] = 2
+    light = np.where(np.arange(WIDTH) < 11, 1.0, 3.0)[None, :, None]
+    noise = rng.normal(0.0, 0.1, (HEIGHT, WIDTH, 1))
+    color = (light + noise * (1.0, 0.9, 0.8)).astype(np.float32)
+    return Scene(color, np.full((HEIGHT, WIDTH), 0.01, np.float32), depth, normal, item)
+
+
+def test_it_does_what_loops_do(scene):
+    color, variance = scene.smoothed()
+    wanted, wanted_variance = twin.smooth(
+        *(a.astype(float) for a in (scene.color, scene.variance, scene.depth, scene.normal)),
+        scene.item,
+        CAMERA.direction_from_pixel,
+        levels=3,
+        deviations=3.0,
+        plane=0.01,
+        exponent=64.0,
+    )
+    np.testing.assert_allclose(color, wanted, rtol=2e-4)
+    np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
+
+
+def test_noise_goes_and_edges_stay(scene):
+    color, variance = scene.smoothed(levels=4)
+    inside = color[2:10, 1:4]
+    assert inside.std() < 0.5 * scene.color[2:10, 1:4].std()
+    assert variance.mean() < 0.2 * scene.variance.mean()
+    assert np.abs(color[:, 10].mean() - 1.0) < 0.05
+    assert np.abs(color[:, 11].mean() - 3.0 * 0.9) < 0.4
+
+
+def test_without_noise_nothing_changes(scene):
+    scene.color[:] = np.where(np.arange(WIDTH) % 2, 1.0, 1.1)[None, :, None]
+    scene.variance[:] = 0.0
+    color, _ = scene.smoothed()
+    np.testing.assert_allclose(color, scene.color, rtol=1e-5)
+
+
+def test_no_light_is_lost_where_noise_meets_none(scene):
+    """A noisy pixel among black ones without noise: what it gives away arrives."""
+    scene.normal[:], scene.depth[:], scene.item[:] = (0.0, 0.0, 1.0), 4.0, 1
+    scene.color[:], scene.variance[:] = 0.0, 0.0
+    scene.color[9, 12], scene.variance[9, 12] = 1.0, 1.0
+    color, _ = scene.smoothed(levels=1)
+    assert 0.7 < color.sum() / scene.color.sum() < 1.3
+
+
+def test_a_speckle_is_cut_to_its_brightest_neighbour():
+    color = np.ones((5, 6, 3), np.float32)
+    color[2, 3] = 50.0
+    color[1, 3] = 1.5
+    cut = image(without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)
+    np.testing.assert_allclose(cut[2, 3], 3.0, rtol=1e-5)
+    color[2, 3] = cut[2, 3]
+    np.testing.assert_array_equal(cut, color)

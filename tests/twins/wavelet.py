@@ -1,0 +1,49 @@
+"""The edge-avoiding wavelet in loops."""
+
+import numpy as np
+
+SPLINE = np.array([1, 4, 6, 4, 1]) / 16.0
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def smooth(color, variance, depth, normal, item, direction_from_pixel, *, levels, **limits):
+    seen = depth, normal, item, direction_from_pixel
+    for level in range(levels):
+        color, variance = _pass(color, variance, seen, step=1 << level, **limits)
+    return color, variance
+
+
+def _pass(color, variance, seen, *, step, deviations, plane, exponent):
+    depth, normal, item, p = seen
+    height, width = variance.shape
+    spread = np.zeros_like(variance)
+    padded = np.pad(variance, 1, mode="edge")
+    for j, wy in enumerate((0.25, 0.5, 0.25)):
+        for i, wx in enumerate((0.25, 0.5, 0.25)):
+            spread += wy * wx * padded[j : j + height, i : i + width]
+    luminance = color @ LUMINANCE
+    out, out_variance = np.zeros_like(color), np.zeros_like(variance)
+    for y in range(height):
+        for x in range(width):
+            here = depth[y, x] * (p @ (x + 0.5, y + 0.5, 1.0))
+            total, total_variance, weight = np.zeros(3), 0.0, 0.0
+            for j, wy in zip(range(-2, 3), SPLINE, strict=True):
+                for i, wx in zip(range(-2, 3), SPLINE, strict=True):
+                    v, u = y + j * step, x + i * step
+                    if not (0 <= v < height and 0 <= u < width):
+                        continue
+                    share = wy * wx
+                    if i or j:
+                        if item[v, u] != item[y, x]:
+                            continue
+                        there = depth[v, u] * (p @ (u + 0.5, v + 0.5, 1.0))
+                        away = abs(normal[y, x] @ (there - here)) / (plane * depth[y, x] + 1e-8)
+                        apart = abs(luminance[v, u] - luminance[y, x])
+                        apart /= deviations * np.sqrt(spread[v, u] + spread[y, x]) + 1e-8
+                        cosine = np.clip(normal[y, x] @ normal[v, u], 0.0, 1.0)
+                        share *= np.exp(-away - apart) * cosine**exponent
+                    total += share * color[v, u]
+                    total_variance += share**2 * variance[v, u]
+                    weight += share
+            out[y, x], out_variance[y, x] = total / weight, total_variance / weight**2
+    return out, out_variance
