@@ -9,7 +9,10 @@
     │   ├── SettingsError         a setting: unknown, or out of range
     │   ├── ImageError            an image, a sequence or a video that can't be read or compared
     │   └── RunFolderError        a run folder: holds another run, damaged, can't be written
-    └── DeviceError               no usable LLVM or CUDA on this machine
+    │       └── DamagedFileError  a file of it that is missing, or isn't what was written
+    ├── DeviceError               no usable LLVM or CUDA on this machine
+    ├── NoSpaceError              the disk is full; what is finished stays
+    └── UnfinishedError           parts of a run that failed again and again, and were left out
 
 A message says what is wrong, where, and what to do next.
 """
@@ -43,5 +46,36 @@ class RunFolderError(InputError):
     """A run folder that holds another run, is damaged, or can't be written."""
 
 
+class DamagedFileError(RunFolderError):
+    """A file of a run folder that is missing, or isn't what was written.
+
+    Attributes
+    ----------
+    file : str
+    """
+
+    def __init__(self, message: str, file: str) -> None:
+        super().__init__(message)
+        self.file = file
+
+
 class DeviceError(EnfiladeError):
     """No usable LLVM or CUDA on this machine."""
+
+
+class NoSpaceError(EnfiladeError):
+    """The disk is full; what is finished stays."""
+
+
+class UnfinishedError(EnfiladeError):
+    """Parts of a run that failed again and again, and were left out.
+
+    Attributes
+    ----------
+    units : tuple of str
+        Their names.
+    """
+
+    def __init__(self, message: str, units: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.units = units

@@ -52,8 +52,9 @@ def unit_lines(folder):
 
 
 def keep_lines(folder, is_kept):
-    lines = [line for line in unit_lines(folder) if is_kept(json.loads(line)["unit"])]
-    (folder / "ledger.jsonl").write_text("".join(lines))
+    read = [(line, json.loads(line)) for line in unit_lines(folder)]
+    kept = [line for line, value in read if "unit" not in value or is_kept(value["unit"])]
+    (folder / "ledger.jsonl").write_text("".join(kept))
 
 
 def test_it_says_what_the_summary_says(runs, page_file):
@@ -190,6 +191,8 @@ def change_identity(folder, change):
     table = json.loads((folder / "run.json").read_text())
     change(table)
     (folder / "run.json").write_text(json.dumps(table))
+    rest = [line for line in unit_lines(folder) if "unit" in json.loads(line)]
+    (folder / "ledger.jsonl").write_text("".join(rest))  # without the checksum of run.json
 
 
 def test_a_run_of_another_version(copied, tmp_path):

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from enfilade.errors import RunFolderError
+from enfilade.errors import DamagedFileError, NoSpaceError, RunFolderError
 from enfilade.store import KINDS, Run
 
 IDENTITY = {
@@ -37,6 +37,14 @@ def folder(tmp_path):
     return tmp_path / "deep" / "run"
 
 
+def recorded(folder):
+    """Lines of units, as they stand in the file."""
+    lines = [json.loads(text) for text in (folder / "ledger.jsonl").read_text().splitlines()]
+    assert all(len(line.pop("sum")) == 16 for line in lines)
+    assert list(lines[0]) == ["identity"]
+    return lines[1:]
+
+
 def test_a_run_is_continued(folder):
     with Run.open(folder, IDENTITY) as run:
         assert run.done("keyframe 1") is None
@@ -49,7 +57,7 @@ def test_a_run_is_continued(folder):
     assert line is not None
     assert line["spp"] == 64
     assert line["files"]["keyframes/0001.exr"]["bytes"] == 6
-    assert json.loads((folder / "ledger.jsonl").read_text()) == line
+    assert recorded(folder) == [line]
     assert json.loads((folder / "run.json").read_text())["identity"] == IDENTITY
 
 
@@ -74,7 +82,7 @@ def test_files_are_named_by_the_frame(folder, number, name):
     with Run.open(folder, IDENTITY) as run:
         for kind in KINDS:
             assert run.file(kind, number) == folder / kind / f"{name}.exr"
-        with pytest.raises(ValueError, match="known are: keyframes, cells, raw, frames"):
+        with pytest.raises(ValueError, match="known are: drafts, keyframes, cells, raw, frames"):
             run.file("plots", number)
 
 
@@ -117,9 +125,40 @@ def test_a_place_that_can_not_be_written_is_said(tmp_path):
         Run.open(tmp_path.__class__("/proc/enfilade"), IDENTITY)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "identity": {}}'])
-def test_a_damaged_identity_is_said(folder, text):
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "identity": {}}', None])
+def test_a_damaged_identity_is_written_again_by_who_knows_it(folder, text):
     Run.open(folder, IDENTITY).close()
+    whole = (folder / "run.json").read_bytes()
+    if text is None:
+        (folder / "run.json").unlink()
+    else:
+        (folder / "run.json").write_text(text)
+    with pytest.raises(RunFolderError, match=r"run\.json"):
+        Run.existing(folder)
+    with pytest.raises(RunFolderError, match=r"run\.json is (damaged|missing), and its checksum"):
+        Run.open(folder, other(spp=1))
+    with Run.open(folder, IDENTITY) as run:
+        assert run.notes == ["run.json was damaged or missing and was written again"]
+    assert (folder / "run.json").read_bytes() == whole
+
+
+def test_a_flipped_bit_of_the_identity_is_no_other_run(folder):
+    Run.open(folder, IDENTITY).close()
+    text = (folder / "run.json").read_text()
+    (folder / "run.json").write_text(text.replace("64", "65"))
+    with pytest.raises(RunFolderError, match="is damaged"):
+        Run.existing(folder)
+    Run.open(folder, IDENTITY).close()
+    assert (folder / "run.json").read_text() == text
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "identity": {}}'])
+def test_a_folder_from_before_ledgers_had_a_head(folder, text):
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("a", files=[], facts={"x": 1})
+    lines = recorded(folder)
+    (folder / "ledger.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert [line["x"] for line in Run.existing(folder).lines()] == [1]
     (folder / "run.json").write_text(text)
     for opening in (lambda: Run.open(folder, IDENTITY), lambda: Run.existing(folder)):
         with pytest.raises(RunFolderError, match=r"run\.json"):
@@ -174,7 +213,7 @@ def test_a_line_torn_anywhere_is_recovered(folder):
         run.finish("b", files=[], facts={})
     ledger = folder / "ledger.jsonl"
     data = ledger.read_bytes()
-    first = data.index(b"\n") + 1
+    first = data.index(b"\n", data.index(b"\n") + 1) + 1
     for size in range(first, len(data)):
         ledger.write_bytes(data[:size])
         with Run.open(folder, IDENTITY) as run:
@@ -205,14 +244,39 @@ def test_a_damaged_last_line_is_recovered_and_said(folder, tail):
         b'{"unit": "x", "files": {"a": 1}}',
     ],
 )
-def test_a_damaged_line_in_the_middle_is_named(folder, bad):
+def test_a_damaged_line_in_the_middle_is_left_out_and_its_unit_done_again(folder, bad):
     with Run.open(folder, IDENTITY) as run:
         for unit in "abc":
             run.finish(unit, files=[], facts={})
     lines = (folder / "ledger.jsonl").read_bytes().splitlines()
-    (folder / "ledger.jsonl").write_bytes(b"\n".join([lines[0], bad, lines[2], b""]))
-    with pytest.raises(RunFolderError, match=r"ledger\.jsonl, line 2 is damaged"):
-        Run.open(folder, IDENTITY)
+    (folder / "ledger.jsonl").write_bytes(b"\n".join([*lines[:2], bad, lines[3], b""]))
+    with pytest.raises(RunFolderError, match=r"ledger\.jsonl, line 3 is damaged: run the command"):
+        Run.existing(folder)
+    assert "line 3 is damaged; it was left out" in Run.existing(folder, is_lenient=True).notes[0]
+    with Run.open(folder, IDENTITY) as run:
+        assert "line 3 is damaged; its unit is done again" in run.notes[0]
+        assert [line["unit"] for line in run.lines()] == ["a", "c"]
+        run.finish("b", files=[], facts={})
+    assert sorted((folder / "ledger.jsonl").read_bytes().splitlines()) == sorted(lines)
+
+
+def test_every_flipped_bit_of_the_ledger_is_found(folder):
+    with Run.open(folder, IDENTITY) as run:
+        for unit in "abc":
+            run.finish(unit, files=[write(run, "raw", ord(unit))], facts={"x": 1.5})
+        digest = run.digest()
+    whole = (folder / "ledger.jsonl").read_bytes()
+    for place in range(0, len(whole), 7):
+        flipped = bytearray(whole)
+        flipped[place] ^= 1 << place % 8
+        (folder / "ledger.jsonl").write_bytes(flipped)
+        with Run.open(folder, IDENTITY) as run:
+            left = {line["unit"] for line in run.lines()}
+            assert left < set("abc") or run.digest() == digest
+            for unit in set("abc") - left:
+                assert run.notes
+                run.finish(unit, files=[run.file("raw", ord(unit))], facts={"x": 1.5})
+            assert run.digest() == digest
 
 
 def test_a_full_disk_leaves_the_ledger_as_it_was(folder, monkeypatch):
@@ -228,7 +292,7 @@ def test_a_full_disk_leaves_the_ledger_as_it_was(folder, monkeypatch):
 
         with monkeypatch.context() as patch:
             patch.setattr(os, "write", half)
-            with pytest.raises(RunFolderError, match="No space left"):
+            with pytest.raises(NoSpaceError, match="No space left"):
                 run.finish("b", files=[], facts={})
         assert (folder / "ledger.jsonl").read_bytes() == before
         assert run.done("b") is None
@@ -271,6 +335,73 @@ def test_a_run_killed_before_it_had_an_identity_begins_anew(folder):
     with Run.open(folder, IDENTITY) as run:
         assert "1 unfinished" in run.notes[0]
     assert sorted(f.name for f in folder.iterdir()) == ["ledger.jsonl", "run.json", "run.lock"]
+
+
+def test_damaged_files_are_found_and_forgotten(folder):
+    with Run.open(folder, IDENTITY) as run:
+        for number in (1, 2, 3):
+            run.finish(f"frame {number}", files=[write(run, "frames", number)], facts={})
+        assert run.damaged() == []
+        run.file("frames", 1).write_bytes(b"pixelz")
+        run.file("frames", 3).unlink()
+        assert run.damaged() == ["frames/0001.exr", "frames/0003.exr"]
+        with pytest.raises(DamagedFileError) as error:
+            run.check(run.file("frames", 1))
+        assert run.done("frame 1")
+        run.forget(error.value.file)
+        assert not run.done("frame 1")
+        assert run.done("frame 2")
+
+
+def test_the_digest_leaves_out_times_and_order(tmp_path):
+    digests = []
+    for name, units in (("a", "xyz"), ("b", "zxy")):
+        with Run.open(tmp_path / name, IDENTITY) as run:
+            for unit in units:
+                run.finish(unit, files=[write(run, "raw", ord(unit))], facts={"n": unit, "cost": {"t": name}})
+            digests.append(run.digest())
+            run.finish("x", files=[write(run, "raw", 120, b"other!")], facts={"n": "x"})
+            digests.append(run.digest())
+    assert digests[0] == digests[2] != digests[1] == digests[3]
+
+
+def test_who_joins_a_run_reports_and_sees_what_is_finished(folder):
+    reported = []
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("a", files=[], facts={})
+        worker = Run.joining(folder, reported.append)
+        assert worker.done("a")
+        run.finish("b", files=[], facts={})
+        assert not worker.done("b")
+        worker.refresh()
+        assert worker.done("b")
+        worker.finish("c", files=[write(worker, "raw", 3)], facts={"n": np.int64(3)})
+        assert worker.done("c")["n"] == 3
+        assert not run.done("c")
+        run.record(reported[0])
+        assert run.done("c") == worker.done("c")
+        worker.check(worker.file("raw", 3))
+    assert [line["unit"] for line in recorded(folder)] == ["a", "b", "c"]
+
+
+def test_several_commands_share_a_run(folder):
+    Run.open(folder, IDENTITY).close()
+    with Run.sharing(folder, "one") as one, Run.sharing(folder, "two") as two:
+        one.finish("a", files=[], facts={})
+        two.refresh()
+        assert two.done("a")
+        two.finish("b", files=[write(two, "raw", 1)], facts={})
+        with pytest.raises(RunFolderError, match=f"another command is writing.*process {os.getpid()}"):
+            Run.open(folder, IDENTITY)
+        with pytest.raises(RunFolderError, match="another command is writing"):
+            Run.sharing(folder, "two")
+    assert {line["unit"] for line in Run.existing(folder).lines()} == {"a", "b"}
+    with Run.open(folder, IDENTITY) as run:
+        assert {line["unit"] for line in run.lines()} == {"a", "b"}
+        with pytest.raises(RunFolderError, match="another command is writing"):
+            Run.sharing(folder, "three")
+    assert [line["unit"] for line in recorded(folder)] == ["a", "b"]
+    assert not list((folder / "parts").glob("*.jsonl"))
 
 
 def test_ten_thousand_units_open_quickly(folder):

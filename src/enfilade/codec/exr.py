@@ -55,7 +55,7 @@ def write_exr(
     ------
     ValueError
         An array of another shape or dtype, or an attribute that OpenEXR itself needs.
-    RunFolderError
+    RunFolderError, NoSpaceError
         The file can't be written. No partial file is left.
     """
     channels = _channels(layers)
@@ -70,7 +70,8 @@ def write_exr(
                 image.write(str(beside))
             _part_headers(beside)
         except (RuntimeError, ImageError) as error:
-            raise unwritable(file, str(error)) from error
+            size = sum(array.nbytes for array in layers.values())
+            raise unwritable(file, str(error), written=beside, size=size) from error
 
 
 def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:

@@ -23,14 +23,14 @@ def write_arrays(file: Path, arrays: Mapping[str, Array]) -> None:
 
     Raises
     ------
-    RunFolderError
+    RunFolderError, NoSpaceError
         The file can't be written.
     """
     try:
         with whole_file(file) as beside, beside.open("wb") as raw:
             np.savez(raw, allow_pickle=False, **arrays)
     except OSError as error:
-        raise unwritable(file, str(error)) from error
+        raise unwritable(file, error) from error
 
 
 def read_arrays(file: Path, *names: str) -> tuple[Array, ...]:

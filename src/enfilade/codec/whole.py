@@ -6,6 +6,7 @@ is a hidden file with :data:`MARK` in its name, which :func:`sweep` removes.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import secrets
@@ -14,11 +15,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from enfilade.errors import EnfiladeError, RunFolderError
+from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 
-__all__ = ["MARK", "flush", "read_json", "sweep", "unwritable", "whole_file", "write_json"]
+__all__ = ["MARK", "flush", "json_bytes", "read_json", "sweep", "unwritable", "whole_file", "write_json"]
 
 MARK = ".writing-"  # in the name of every file that isn't finished
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+BLOCK = bytes(1 << 20)  # written to learn whether there is room
 
 
 @contextmanager
@@ -38,7 +41,7 @@ def whole_file(file: Path) -> Iterator[Path]:
 
     Raises
     ------
-    RunFolderError
+    RunFolderError, NoSpaceError
         The folder or the file can't be written, or the disk is full. Nothing is left beside it.
     """
     beside = file.with_name(f".{file.stem}{MARK}{os.getpid()}-{secrets.token_hex(4)}{file.suffix}")
@@ -49,7 +52,7 @@ def whole_file(file: Path) -> Iterator[Path]:
         beside.replace(file)
         flush(file.parent)
     except OSError as error:
-        raise unwritable(file, error.strerror or str(error)) from error
+        raise unwritable(file, error) from error
     finally:
         _remove(beside)
 
@@ -90,9 +93,14 @@ def write_json(file: Path, value: Any) -> None:
     ValueError, TypeError
         The value holds a NaN, an infinity, or something that JSON has no word for.
     """
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    data = json_bytes(value)
     with whole_file(file) as beside:
-        beside.write_text(text, encoding="utf-8")
+        beside.write_bytes(data)
+
+
+def json_bytes(value: Any) -> bytes:
+    """What :func:`write_json` writes."""
+    return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def read_json(file: Path) -> Any:
@@ -111,7 +119,9 @@ def read_json(file: Path) -> Any:
         raise RunFolderError(f"{file} is damaged ({error}); delete it or its folder") from error
 
 
-def unwritable(file: Path, reason: str) -> EnfiladeError:
+def unwritable(
+    file: Path, reason: OSError | str, *, written: Path | None = None, size: int = 0
+) -> EnfiladeError:
     """Describe a file that can't be written, and what to do.
 
     Parameters
@@ -119,11 +129,37 @@ def unwritable(file: Path, reason: str) -> EnfiladeError:
     file
     reason
         What the operating system or a library said.
+    written
+        What a library that gives no reason has written so far: it is tried whether more can be.
+    size
+        Bytes that it would have written at most.
+
+    Returns
+    -------
+    NoSpaceError or RunFolderError
     """
+    is_full = isinstance(reason, OSError) and reason.errno in FULL
+    text = reason.strerror or str(reason) if isinstance(reason, OSError) else reason
+    if is_full or (written is not None and _is_full(written, size)):
+        return NoSpaceError(
+            f"can't write {file}: no room on the disk ({text}); what is finished stays: make room, then run "
+            "the same command again"
+        )
     return RunFolderError(
-        f"can't write {file}: {reason}; make room or choose another folder, then run the same command "
+        f"can't write {file}: {text}; make room or choose another folder, then run the same command "
         "again: what is finished stays"
     )
+
+
+def _is_full(file: Path, size: int) -> bool:
+    try:
+        with file.open("ab", buffering=0) as raw:
+            while size > 0:
+                size -= raw.write(BLOCK[:size])
+            os.fsync(raw.fileno())
+    except OSError as error:
+        return error.errno in FULL
+    return False
 
 
 def flush(path: Path) -> None:

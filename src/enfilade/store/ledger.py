@@ -1,7 +1,11 @@
-"""The ledger of a run: one line of JSON for each finished unit of work, only ever appended to."""
+"""The ledger of a run: one line of JSON for each finished unit of work, only ever appended to.
+
+Each line ends with a checksum of itself. The first one holds the checksum of ``run.json``.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -11,7 +15,12 @@ from typing import Any
 from enfilade.codec import whole
 from enfilade.errors import RunFolderError
 
-__all__ = ["Ledger"]
+__all__ = ["Ledger", "covered", "head_of"]
+
+HEAD = "identity"  # key of the first line
+SUM = "sum"  # last key of each line
+SUM_LETTERS = 16  # of SHA-256
+VOLATILE = ("cost", "tries")  # wall times, and how often a unit was begun: outside the checksum of a run
 
 
 class Ledger:
@@ -22,8 +31,8 @@ class Ledger:
     file
         ``ledger.jsonl``; need not exist.
     writable
-        Whether a torn last line is cut off in the file, and lines can be appended. Otherwise it is left
-        out: someone may be writing it just now.
+        Whether damaged lines are taken out of the file, and lines can be appended. Otherwise a torn last
+        line is left out: someone may be writing it just now.
     is_lenient
         Leave damaged lines out, and say so in `notes`, instead of raising: for readers that show what
         there is.
@@ -32,27 +41,27 @@ class Ledger:
     ----------
     notes : list of str
         What was recovered or left out, for the user to know.
+    head : dict or None
+        Checksum of ``run.json``; None where the ledger has none.
 
     Raises
     ------
     RunFolderError
-        The file can't be read, or a line before the last one is damaged.
+        The file can't be read, or a line before the last one is damaged and may not be taken out.
     """
 
     def __init__(self, file: Path, *, writable: bool, is_lenient: bool = False) -> None:
         self.notes: list[str] = []
-        self._is_lenient = is_lenient
-        self._file = file
+        self.head: dict[str, Any] | None = None
+        self._is_lenient = is_lenient or writable
+        self._writable = writable
         self._handle = -1
         self._units: dict[str, dict[str, Any]] = {}
         self._writers: dict[str, str] = {}  # file -> unit that wrote it last
+        self._read: dict[Path, int] = {}  # bytes of each file that are known
+        self._file = file
         try:
-            data = file.read_bytes() if file.exists() else b""
-            whole_size = self._take(data)
-            if writable:
-                self._handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
-                self._cut(len(data), whole_size)
-                whole.flush(file.parent)
+            self._open()
         except OSError as error:
             raise RunFolderError(f"can't open {file}: {error.strerror}") from error
 
@@ -69,7 +78,23 @@ class Ledger:
         line = self._units.get(self._writers.get(name, ""))
         return line if line is not None and name in line["files"] else None
 
-    def append(self, line: Mapping[str, Any]) -> None:
+    def begin(self, head: Mapping[str, Any]) -> None:
+        """Write the first line, where there is none.
+
+        Parameters
+        ----------
+        head
+            Size and checksum of ``run.json``.
+
+        Raises
+        ------
+        RunFolderError, NoSpaceError
+        """
+        if self.head is None:
+            self._write([{HEAD: dict(head)}, *self._units.values()])
+            self.head = dict(head)
+
+    def append(self, line: Mapping[str, Any]) -> dict[str, Any]:
         """Add a line and flush it to the disk: when this returns, it stays.
 
         Parameters
@@ -77,23 +102,56 @@ class Ledger:
         line
             With ``unit`` and ``files``. NumPy's numbers are written as plain ones.
 
+        Returns
+        -------
+        dict
+            The line as it was written.
+
         Raises
         ------
-        RunFolderError
+        RunFolderError, NoSpaceError
             It can't be written. The ledger is as before.
         ValueError
             A fact is NaN or infinite, for which JSON has no word.
         """
-        text = json.dumps(line, ensure_ascii=False, allow_nan=False, default=_plain)
-        data = text.encode() + b"\n"
+        data = sealed(line)
         size = os.fstat(self._handle).st_size
         try:
             _write_all(self._handle, data)
             os.fsync(self._handle)
         except OSError as error:
             os.ftruncate(self._handle, size)
-            raise whole.unwritable(self._file, error.strerror or str(error)) from error
-        self._keep(json.loads(text))
+            raise whole.unwritable(self._file, error) from error
+        self._read[self._file] = size + len(data)
+        return self.keep(json.loads(data))
+
+    def keep(self, line: dict[str, Any]) -> dict[str, Any]:
+        """Know a line without writing it."""
+        line.pop(SUM, None)
+        self._units.pop(line["unit"], None)  # a unit done again counts where it was done last
+        self._units[line["unit"]] = line
+        self._writers.update(dict.fromkeys(line["files"], line["unit"]))
+        return line
+
+    def read_on(self, *files: Path) -> None:
+        """Read what others have appended since, to this ledger or to some more files.
+
+        Raises
+        ------
+        RunFolderError
+            A file can't be read, or a line of it is damaged.
+        """
+        for file in files or (self._file,):
+            known = self._read.get(file, 0)
+            try:
+                with file.open("rb") as stream:
+                    stream.seek(known)
+                    data = stream.read()
+            except FileNotFoundError:
+                continue
+            except OSError as error:
+                raise RunFolderError(f"can't read {file}: {error.strerror}") from error
+            self._read[file] = known + self._take(data, file)[0]
 
     def close(self) -> None:
         """Close the file. A second call does nothing."""
@@ -101,41 +159,88 @@ class Ledger:
             os.close(self._handle)
             self._handle = -1
 
-    def _take(self, data: bytes) -> int:
-        # returns the bytes that hold whole lines: a process killed while appending leaves part of one
-        good = 0
-        lines = data.splitlines(keepends=True)
-        for number, raw in enumerate(lines, 1):
-            line = _parsed(raw) if raw.endswith(b"\n") else None
-            if line is None and number < len(lines):
-                self._refuse(number)
-            if line is not None:
-                self._keep(line)
-                good += len(raw)
-        return good
-
-    def _refuse(self, number: int) -> None:
-        text = f"{self._file}, line {number} is damaged"
-        if not self._is_lenient:
-            raise RunFolderError(
-                f"{text}: delete that line, then run the same command again to redo its unit"
-            )
-        self.notes.append(f"{text}; it was left out")
-
-    def _cut(self, size: int, whole_size: int) -> None:
-        if size == whole_size:
+    def _open(self) -> None:
+        data = self._file.read_bytes() if self._file.exists() else b""
+        size, has_damage = self._take(data, self._file)
+        self._read[self._file] = size
+        if not self._writable:
             return
-        os.ftruncate(self._handle, whole_size)
-        os.fsync(self._handle)
-        self.notes.append(
-            f"the last line of {self._file.name} was torn ({size - whole_size} bytes) and was cut off; "
-            "its unit is done again"
-        )
+        if has_damage:
+            head = [] if self.head is None else [{HEAD: self.head}]
+            self._write([*head, *self._units.values()])
+            return
+        self._handle = _appending(self._file)
+        if size < len(data):
+            os.ftruncate(self._handle, size)
+            os.fsync(self._handle)
+            self.notes.append(
+                f"the last line of {self._file.name} was torn ({len(data) - size} bytes) and was cut off; "
+                "its unit is done again"
+            )
+        whole.flush(self._file.parent)
 
-    def _keep(self, line: dict[str, Any]) -> None:
-        self._units.pop(line["unit"], None)  # a unit done again counts where it was done last
-        self._units[line["unit"]] = line
-        self._writers.update(dict.fromkeys(line["files"], line["unit"]))
+    def _take(self, data: bytes, file: Path) -> tuple[int, bool]:
+        # Returns the bytes that hold whole lines, and whether one of them is damaged. The last line may be
+        # torn: a process killed while appending leaves part of one.
+        lines = data.splitlines(keepends=True)
+        parsed = [_parsed(raw) if raw.endswith(b"\n") else None for raw in lines]
+        is_sealed = any(line is not None and SUM in line for line in parsed)
+        has_damage, good = False, len(data)
+        for number, (raw, line) in enumerate(zip(lines, parsed, strict=True), 1):
+            if line is None or (is_sealed and SUM not in line):
+                if number == len(lines):
+                    good -= len(raw)
+                else:
+                    has_damage = True
+                    self._refuse(file, number)
+            elif HEAD in line:
+                self.head = line[HEAD]
+            else:
+                self.keep(line)
+        return good, has_damage
+
+    def _refuse(self, file: Path, number: int) -> None:
+        text = f"{file}, line {number} is damaged"
+        if not self._is_lenient:
+            raise RunFolderError(f"{text}: run the command that made it again, which does its unit again")
+        what = "its unit is done again" if self._writable else "it was left out"
+        self.notes.append(f"{text}; {what}")
+
+    def _write(self, lines: list[dict[str, Any]]) -> None:
+        # All of it anew, whole or not at all; then go on after it.
+        self.close()
+        data = b"".join(sealed(line) for line in lines)
+        with whole.whole_file(self._file) as beside:
+            beside.write_bytes(data)
+        self._handle = _appending(self._file)
+        self._read[self._file] = len(data)
+
+
+def covered(line: Mapping[str, Any]) -> str:
+    """What the checksum of a run covers of a line: all but times and tries."""
+    kept = {key: value for key, value in line.items() if key not in VOLATILE}
+    return json.dumps(kept, sort_keys=True, ensure_ascii=False)
+
+
+def head_of(file: Path) -> dict[str, Any] | None:
+    """Checksum of ``run.json`` as the first line of a ledger has it; None where it has none."""
+    try:
+        with file.open("rb") as stream:
+            line = _parsed(stream.readline(1 << 16))
+    except OSError:  # opening the ledger says why
+        return None
+    head: dict[str, Any] | None = (line or {}).get(HEAD)
+    return head
+
+
+def sealed(line: Mapping[str, Any]) -> bytes:
+    """A line as it stands in the file, with its checksum."""
+    text = json.dumps(line, ensure_ascii=False, allow_nan=False, default=_plain)
+    return f'{text[:-1]}, "{SUM}": "{_sum(text.encode())}"}}\n'.encode()
+
+
+def _sum(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:SUM_LETTERS]
 
 
 def _parsed(raw: bytes) -> dict[str, Any] | None:
@@ -143,12 +248,22 @@ def _parsed(raw: bytes) -> dict[str, Any] | None:
         line = json.loads(raw.decode())
     except (ValueError, RecursionError):
         return None
-    if not isinstance(line, dict) or not isinstance(line.get("unit"), str):
+    if not isinstance(line, dict) or (SUM in line and not _is_sound(raw)):
+        return None
+    if HEAD in line:
+        return line if _is_record("run.json", line[HEAD]) else None
+    if not isinstance(line.get("unit"), str):
         return None
     files = line.get("files")
     if not isinstance(files, dict) or not all(_is_record(name, record) for name, record in files.items()):
         return None
     return line
+
+
+def _is_sound(raw: bytes) -> bool:
+    tail = len(f', "{SUM}": "{"0" * SUM_LETTERS}"}}\n')
+    body = raw[:-tail] + b"}"
+    return raw[-tail:] == f', "{SUM}": "{_sum(body)}"}}\n'.encode()
 
 
 def _is_record(name: str, record: Any) -> bool:
@@ -160,6 +275,10 @@ def _is_record(name: str, record: Any) -> bool:
         and isinstance(record.get("bytes"), int)
         and isinstance(record.get("sha256"), str)
     )
+
+
+def _appending(file: Path) -> int:
+    return os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
 
 
 def _write_all(handle: int, data: bytes) -> None:

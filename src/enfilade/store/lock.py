@@ -28,6 +28,9 @@ class Lock:
     ----------
     folder
         The run folder, which must exist.
+    part
+        Name of a share of the run: those who share it keep away who wants the folder to itself, and others
+        of the same name. None: the folder to itself.
 
     Raises
     ------
@@ -35,36 +38,49 @@ class Lock:
         Another process is writing there, or the folder can't be written.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._handle = -1
-        file = folder / LOCK_NAME
+    def __init__(self, folder: Path, *, part: str | None = None) -> None:
+        self._own = self._shared = -1
         try:
-            handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise RunFolderError(
-                f"can't write in {folder}: {error.strerror}; choose another --out"
-            ) from error
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            holder = _holder(handle)
-            os.close(handle)
-            if not isinstance(error, BlockingIOError):
-                raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
-            raise RunFolderError(
-                f"another command is writing {folder}: {holder}; wait for it, stop it, "
-                "or choose another --out"
-            ) from error
-        self._handle = handle
-        _sign(handle)
+            if part is not None:
+                self._shared = _locked(folder / LOCK_NAME, fcntl.LOCK_SH)
+            self._own = _locked(folder / (LOCK_NAME if part is None else f"parts/{part}.lock"), fcntl.LOCK_EX)
+        except BaseException:
+            self.release()
+            raise
+        for handle in (self._shared, self._own):
+            if handle >= 0:
+                _sign(handle)
 
     def release(self) -> None:
         """Let others write. A second call does nothing."""
-        if self._handle >= 0:
-            os.ftruncate(self._handle, 0)
-            fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing alone leaves it with forked processes
-            os.close(self._handle)
-            self._handle = -1
+        for handle in (self._own, self._shared):
+            if handle >= 0:
+                if handle == self._own:
+                    os.ftruncate(handle, 0)
+                fcntl.flock(handle, fcntl.LOCK_UN)  # closing alone leaves it with forked processes
+                os.close(handle)
+        self._own = self._shared = -1
+
+
+def _locked(file: Path, kind: int) -> int:
+    try:
+        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise RunFolderError(
+            f"can't write in {file.parent}: {error.strerror}; choose another --out"
+        ) from error
+    try:
+        fcntl.flock(handle, kind | fcntl.LOCK_NB)
+    except OSError as error:
+        holder = _holder(handle)
+        os.close(handle)
+        if not isinstance(error, BlockingIOError):
+            raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
+        raise RunFolderError(
+            f"another command is writing {file.parent}: {holder}; wait for it, stop it, "
+            "or choose another --out"
+        ) from error
+    return handle
 
 
 def writer_of(folder: Path) -> dict[str, Any] | None:

@@ -4,29 +4,34 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self
 
 from enfilade.codec import read_json, sweep, write_json
-from enfilade.codec.whole import MARK
-from enfilade.errors import RunFolderError
-from enfilade.store.ledger import Ledger
+from enfilade.codec.whole import MARK, json_bytes
+from enfilade.errors import DamagedFileError, RunFolderError
+from enfilade.store.ledger import Ledger, covered, head_of, sealed
 from enfilade.store.lock import LOCK_NAME, Lock, writer_of
 
 __all__ = ["KINDS", "Run"]
 
-KINDS = ("keyframes", "cells", "raw", "frames")
+KINDS = ("drafts", "keyframes", "cells", "raw", "frames")
 FORMAT = 1  # of the folder; another number is refused
-RUN_FILE, LEDGER_FILE = "run.json", "ledger.jsonl"
+RUN_FILE, LEDGER_FILE, PARTS = "run.json", "ledger.jsonl", "parts"
 RESERVED = frozenset({"unit", "files"})  # keys of a ledger line that are ours
 SHOWN_DIFFERENCES = 12
 SHOWN_LETTERS = 80  # of one value: a list of frames has many
 
+Report = Callable[[dict[str, Any]], None]
+
 
 class Run:
     """A run folder. Made by :meth:`open` to write in it, by :meth:`existing` to read it.
+
+    :meth:`joining` is for the workers of who writes in it, :meth:`sharing` for several commands that work on
+    it at once, each with a ledger of its own.
 
     Attributes
     ----------
@@ -38,16 +43,20 @@ class Run:
     """
 
     def __init__(
-        self, folder: Path, identity: dict[str, Any], lock: Lock | None, *, is_lenient: bool = False
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        ledger: Ledger,
+        *,
+        lock: Lock | None = None,
+        report: Report | None = None,
     ) -> None:
         self.folder = folder
         self.identity = identity
-        self.notes: list[str] = []
+        self.notes: list[str] = list(ledger.notes)
         self._lock = lock
-        if lock is not None and (left := sweep(folder)):
-            self.notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
-        self._ledger = Ledger(folder / LEDGER_FILE, writable=lock is not None, is_lenient=is_lenient)
-        self.notes.extend(self._ledger.notes)
+        self._ledger = ledger
+        self._report = report
 
     @classmethod
     def open(cls, folder: Path, identity: Mapping[str, Any]) -> Self:
@@ -64,19 +73,24 @@ class Run:
         RunFolderError
             The folder holds another run, or something else; is damaged; another command is writing it;
             it can't be written.
+        NoSpaceError
         """
         wanted = json.loads(json.dumps(identity, allow_nan=False))
         _prepare(folder)
         lock = Lock(folder)
         try:
-            if (folder / RUN_FILE).exists():
-                _check_same(folder, _read_identity(folder), wanted)
-            else:
-                write_json(folder / RUN_FILE, {"format": FORMAT, "identity": wanted})
-            return cls(folder, wanted, lock)
+            notes = _claim(folder, wanted)
+            if left := sweep(folder):
+                notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
+            ledger = Ledger(folder / LEDGER_FILE, writable=True)
+            ledger.begin(_record(folder / RUN_FILE))
+            _join_parts(folder, ledger)
+            run = cls(folder, wanted, ledger, lock=lock)
         except BaseException:
             lock.release()
             raise
+        run.notes[:0] = notes
+        return run
 
     @classmethod
     def existing(cls, folder: Path, *, is_lenient: bool = False) -> Self:
@@ -93,11 +107,61 @@ class Run:
         RunFolderError
             It holds no run, or is damaged.
         """
-        if not folder.is_dir():
-            raise RunFolderError(f"there is no folder {folder}")
-        if not (folder / RUN_FILE).is_file():
-            raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
-        return cls(folder, _read_identity(folder), None, is_lenient=is_lenient)
+        identity = _found(folder)
+        ledger = Ledger(folder / LEDGER_FILE, writable=False, is_lenient=is_lenient)
+        ledger.read_on(*_parts(folder))
+        return cls(folder, identity, ledger)
+
+    @classmethod
+    def joining(cls, folder: Path, report: Report) -> Self:
+        """Work on a run that another process writes: what is finished is reported to that one.
+
+        Parameters
+        ----------
+        folder
+        report
+            Takes the ledger line of a finished unit.
+
+        Raises
+        ------
+        RunFolderError
+            It holds no run, or is damaged.
+        """
+        return cls(folder, _found(folder), Ledger(folder / LEDGER_FILE, writable=False), report=report)
+
+    @classmethod
+    def sharing(cls, folder: Path, part: str) -> Self:
+        """Work on a run together with other commands, on a folder that all of them see.
+
+        What is finished goes into a ledger of its own, ``parts/NAME.jsonl``, which the next command that has
+        the folder to itself takes over.
+
+        Parameters
+        ----------
+        folder
+        part
+            Name of this command's share, which no other has at the same time.
+
+        Raises
+        ------
+        RunFolderError
+            It holds no run, or is damaged; one command has it to itself, or another the same share.
+        """
+        identity = _found(folder)
+        file = folder / PARTS / f"{part}.jsonl"
+        file.parent.mkdir(exist_ok=True)
+        lock = Lock(folder, part=part)
+        try:
+            ledger = Ledger(file, writable=True)
+            ledger.read_on(folder / LEDGER_FILE, *_parts(folder))
+            return cls(folder, identity, ledger, lock=lock)
+        except BaseException:
+            lock.release()
+            raise
+
+    def refresh(self) -> None:
+        """Read what other processes have finished since."""
+        self._ledger.read_on(self.folder / LEDGER_FILE, *_parts(self.folder))
 
     def __enter__(self) -> Self:
         return self
@@ -148,6 +212,8 @@ class Run:
     def finish(self, unit: str, *, files: Sequence[Path], facts: Mapping[str, Any]) -> None:
         """Record a unit as finished: a line in the ledger that stays when this returns.
 
+        A run that was joined reports the line instead.
+
         Parameters
         ----------
         unit
@@ -161,15 +227,29 @@ class Run:
         ------
         RunFolderError
             The ledger can't be written, or a file isn't there.
+        NoSpaceError
         ValueError
             A file outside the folder, a fact that JSON has no word for, or a run opened for reading.
         """
-        if self._lock is None:
-            raise ValueError(f"{self.folder} is open for reading only")
         if taken := RESERVED.intersection(facts):
             raise ValueError(f"the ledger keeps these keys for itself: {', '.join(sorted(taken))}")
+        if self._lock is None and self._report is None:
+            raise ValueError(f"{self.folder} is open for reading only")
         records = {self._relative(f): _record(f) for f in files}
-        self._ledger.append({"unit": unit, "files": records, **facts})
+        line = {"unit": unit, "files": records, **facts}
+        if self._report is None:
+            self._ledger.append(line)
+        else:
+            self._report(self._ledger.keep(json.loads(sealed(line))))
+
+    def record(self, line: Mapping[str, Any]) -> None:
+        """Put a line into the ledger that a run which joined this one has reported.
+
+        Raises
+        ------
+        RunFolderError, NoSpaceError
+        """
+        self._ledger.append(line)
 
     def lines(self) -> Iterator[dict[str, Any]]:
         """Ledger lines of all finished units, in order; of a unit done twice, the newest."""
@@ -180,18 +260,49 @@ class Run:
 
         Raises
         ------
-        RunFolderError
+        DamagedFileError
             It is missing, damaged, or not on record.
         """
         name = self._relative(file)
         line = self._ledger.writer(name)
         if line is None:
-            raise RunFolderError(f"{file} is in no ledger line: it was not finished; delete it")
-        if _size(file) is None or _record(file) != line["files"][name]:
-            raise RunFolderError(
+            raise DamagedFileError(f"{file} is in no ledger line: it was not finished; delete it", name)
+        if not self._is_sound(name, line):
+            raise DamagedFileError(
                 f"{file} isn't what unit {line['unit']!r} wrote: it is missing or damaged; delete it and run "
-                "the same command again"
+                "the same command again",
+                name,
             )
+
+    def damaged(self) -> list[str]:
+        """Compare every file with its checksum; names of those that are missing or damaged, in order."""
+        return [name for line in self.lines() for name in line["files"] if not self._is_sound(name, line)]
+
+    def forget(self, name: str) -> None:
+        """Remove a damaged file, so that its unit counts as not done.
+
+        Parameters
+        ----------
+        name
+            In the folder, as :attr:`~enfilade.errors.DamagedFileError.file` has it.
+
+        Raises
+        ------
+        RunFolderError
+            It can't be removed.
+        """
+        try:
+            (self.folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise RunFolderError(f"can't remove {self.folder / name}: {error.strerror}") from error
+
+    def digest(self) -> str:
+        """Checksum of the run: of all that the ledger says but times and tries, whatever the order.
+
+        Two runs of the same work have the same one, however often they were stopped and whoever did what.
+        """
+        text = "\n".join(sorted(covered(line) for line in self.lines()))
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def write_json(self, name: str, value: Any) -> None:
         """Write a JSON file into the folder, whole or not at all.
@@ -208,6 +319,10 @@ class Run:
             raise ValueError(f"{name!r} is no name for a file of the caller's")
         write_json(self.folder / name, value)
 
+    def _is_sound(self, name: str, line: Mapping[str, Any]) -> bool:
+        file, record = self.folder / name, line["files"][name]
+        return _size(file) == record["bytes"] and _record(file) == record
+
     def _relative(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix()
 
@@ -221,10 +336,55 @@ def _prepare(folder: Path) -> None:
             f"can't make a run in {folder}: {error.strerror}; choose another --out"
         ) from error
     foreign = [name for name in names if name != LOCK_NAME and MARK not in name]
-    if foreign and RUN_FILE not in names:
+    if foreign and RUN_FILE not in names and head_of(folder / LEDGER_FILE) is None:
         raise RunFolderError(
             f"{folder} is not empty and holds no run (it has {', '.join(foreign[:3])}); choose another --out"
         )
+
+
+def _found(folder: Path) -> dict[str, Any]:
+    if not folder.is_dir():
+        raise RunFolderError(f"there is no folder {folder}")
+    if not (folder / RUN_FILE).is_file():
+        raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
+    identity = _read_identity(folder)
+    if head_of(folder / LEDGER_FILE) not in (None, _record(folder / RUN_FILE)):
+        raise RunFolderError(
+            f"{folder / RUN_FILE} is damaged: it isn't what was written; run the command that made it again"
+        )
+    return identity
+
+
+def _claim(folder: Path, wanted: dict[str, Any]) -> list[str]:
+    """Say in ``run.json`` what the folder holds, or check that it is that; returns what was mended."""
+    file, text = folder / RUN_FILE, {"format": FORMAT, "identity": wanted}
+    head, data = head_of(folder / LEDGER_FILE), json_bytes(text)
+    is_there = file.exists()
+    if is_there and (head is None or _record(file) == head):
+        _check_same(folder, _read_identity(folder), wanted)
+        return []
+    if head is not None and head != {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}:
+        raise RunFolderError(
+            f"{file} is {'damaged' if is_there else 'missing'}, and its checksum in the ledger isn't that of "
+            "this command: continue with the command that began it, or choose another --out"
+        )
+    write_json(file, text)
+    return [] if head is None else [f"{RUN_FILE} was damaged or missing and was written again"]
+
+
+def _parts(folder: Path) -> list[Path]:
+    return sorted((folder / PARTS).glob("*.jsonl"))
+
+
+def _join_parts(folder: Path, ledger: Ledger) -> None:
+    """Take over the lines of those who shared the run."""
+    for file in _parts(folder):
+        part = Ledger(file, writable=True)
+        ledger.notes.extend(part.notes)
+        for line in part:
+            ledger.append(line)
+        part.close()
+        file.unlink()
 
 
 def _read_identity(folder: Path) -> dict[str, Any]:

@@ -83,6 +83,8 @@ def encode_video(
                     container.mux(stream.encode(picture))
                 container.mux(stream.encode(None))
         except av.FFmpegError as error:
+            if error.errno in whole.FULL:
+                raise whole.unwritable(file, OSError(error.errno, error.strerror)) from error
             raise whole.unwritable(file, f"{codec.encoder}: {error}") from error
 
 
