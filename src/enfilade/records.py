@@ -33,6 +33,7 @@ class SurfaceClass(IntEnum):
 
 
 SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
 
 
 class Source(IntEnum):
@@ -181,6 +182,12 @@ class Geometry:
         return self.item > 0
 
     @property
+    def has_light(self) -> Mask:
+        """Pixels that see a diffuse surface, (H, W): those that show the light that falls on it."""
+        has_light: Mask = self.is_hit & (self.albedo.max(axis=2) > LEAST_ALBEDO)
+        return has_light
+
+    @property
     def disparity(self) -> F32:
         """One over the depth, (H, W); 0 where nothing is hit: at infinity."""
         return np.divide(1.0, self.depth, out=np.zeros_like(self.depth), where=self.is_hit)
@@ -250,6 +257,12 @@ class Shading:
     def __post_init__(self) -> None:
         _check(self.color, (*self.variance.shape, 3), np.float32, "color")
         _check(self.variance, self.color.shape[:-1], np.float32, "variance")
+
+    def spread(self, where: Mask) -> Shading:
+        """An image of what was traced for a list of its pixels: those of a mask, (H, W)."""
+        color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
+        color[where], variance[where] = self.color, self.variance
+        return Shading(color, variance, self.dropped)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,9 @@ class Purpose(IntEnum):
     SCATTER = 5
     SCOUT = 6
     PILOT = 7
-    GUIDE = 5
+    GUIDE = 8
+    DRAFT = 9
+    DRAFT_SCOUT = 10
 
 
 class PixelFilter(IntEnum):
@@ -126,7 +128,7 @@ class Bounce:
 
 @dataclass(frozen=True)
 class Scattered:
-    """One bounce off everything but the diffuse lobe, as lanes.
+    """One bounce off the diffuse lobe, or off everything else, as lanes.
 
     Attributes
     ----------
@@ -237,16 +239,31 @@ class LightRenderer(Renderer, Protocol):
         """
         ...
 
-    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
+    def light(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
         """Estimate the radiance that the diffuse lobe would send if the albedo were one.
 
         One path, with lights sampled at its first vertex: irradiance over pi, as the material's own
         diffuse lobe weights it.
 
+        Parameters
+        ----------
+        lit
+        rng : PCG32
+        edges
+            How many lead from the camera to the surface, 1 or 2: they count where the scene limits the
+            length of paths.
+
         Returns
         -------
         direct, indirect : Array3f
             By light straight from emitters, and by all other.
+        """
+        ...
+
+    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
+        """Sample one bounce off the diffuse lobe, as if the albedo were one.
+
+        What :meth:`light` estimates is its direct light, and its throughput times what its rays find.
         """
         ...
 

@@ -20,6 +20,7 @@ from enfilade.camera import Camera
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
 from enfilade.pixels.estimate import Samples
+from enfilade.pixels.random import Leading
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import Bounce, LightRenderer, Lit, Rays
@@ -43,6 +44,7 @@ THROUGH = 0.999999  # chooses the lobe that lets light through
 LAYERS = 8  # of mirrors and glass, one behind the other
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
 CELL_BLUR = 0.25  # ... and at what is seen through a lobe, of the lobe's width
+GATHER_BLUR = 0.2  # ... and at what lights a diffuse surface, of its distance
 UNRELATED = 0x9E3779B97F4A7C15  # makes other random numbers of those with which a path goes on
 
 
@@ -116,6 +118,7 @@ class Shader:
         self._meet = self._recorded(self._meet_kernel)
         self._look_up = self._recorded(self._look_up_kernel)
         self._go_on = self._recorded(self._go_on_kernel)
+        self._gather = self._recorded(self._gather_kernel)
         self._estimate = self._recorded(self._estimate_kernel)
 
     def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> Samples:
@@ -139,7 +142,7 @@ class Shader:
         """
         step = self._meet(view, self._begun(rays, rng))
         radiance = Array3f(step.sent)
-        self._add_missing(radiance, cache, step)
+        self._add_missing(radiance, cache, step, 1.0)
         return Samples((radiance,), step.goes_on)
 
     def scattered(
@@ -165,18 +168,60 @@ class Shader:
         radiance = dr.zeros(Array3f, dr.width(rng.state))
         path = self._begun(rays, rng)
         path = _chosen(path, dr.compress(self._meet(LightCache(), path).goes_on))
-        for bounce in range(BOUNCES):
-            if not dr.width(path.lane):
-                break
-            # The first bounce of every path counts; then faint ones are ended at random.
+        self._follow(radiance, cache, path, 0, heard)
+        return radiance
+
+    def gathered(
+        self,
+        cache: LightCache,
+        rays: Rays,
+        rng: Any,
+        square: Any,
+        heard: Callable[[Estimates], None] | None = None,
+    ) -> Samples:
+        """Light on the diffuse surfaces seen, by lights sampled and one bounce into the cache.
+
+        Parameters are those of :meth:`scattered`.
+
+        Parameters
+        ----------
+        square : Array4f
+            In [0, 1): where on the lights, and where to bounce.
+
+        Returns
+        -------
+        Samples
+            Radiance that the diffuse lobe would send if the albedo were one, in two layers: by light
+            straight from emitters, and by all other.
+        """
+        dr.eval(square)  # for the same reason as in _begun
+        direct, step = self._gather(cache, self._begun(rays, rng), square)
+        indirect = Array3f(step.sent)
+        self._add_missing(indirect, _cells_of(cache), step, 0.0, heard)
+        self._follow(indirect, cache, _chosen(step.path, dr.compress(step.goes_on)), 1, heard)
+        return Samples((direct, indirect))
+
+    def _follow(
+        self,
+        radiance: Any,
+        cache: LightCache,
+        path: _Path,
+        bounce: int,
+        heard: Callable[[Estimates], None] | None,
+    ) -> None:
+        """Add what paths find on their way from lobe to lobe, of which some bounces lie behind them."""
+        # What is seen in a mirror is smoothed over cells; where light comes from needs no smoothing.
+        jitter = 1.0 if bounce == 0 else 0.0
+        while bounce < BOUNCES and dr.width(path.lane):
+            # The first bounce off what is seen counts; then faint paths are ended at random.
             least = 1.0 if bounce == 0 else LEAST_CHANCE
             most = MOST_CHANCE[min(bounce, len(MOST_CHANCE) - 1)]
             direct, step = self._go_on(cache, path, opaque(least), opaque(most))
             _scatter_add(radiance, direct, path.lane)
             _scatter_add(radiance, step.sent, step.path.lane)
-            self._add_missing(radiance, cache, step, heard)
+            self._add_missing(radiance, _cells_of(cache), step, jitter, heard)
             path = _chosen(step.path, dr.compress(step.goes_on))
-        return radiance
+            bounce += 1
 
     def shown(self, geometry: Geometry) -> Geometry:
         """What mirrors show and glass lets through, in their place.
@@ -227,13 +272,14 @@ class Shader:
         radiance: Any,
         cache: LightCache,
         step: _Step,
+        jitter: float,
         heard: Callable[[Estimates], None] | None = None,
     ) -> None:
         """Add what diffuse lobes send whose light was not found: look further, or estimate it."""
         path = step.path
         missing: Any = dr.compress(step.is_missing)
-        if cache.pages and dr.width(missing):
-            further = self._look_up(cache, _chosen(path, missing))
+        if (cache.pages or cache.cells) and dr.width(missing):
+            further = self._look_up(cache, _chosen(path, missing), opaque(jitter))
             _scatter_add(radiance, further.sent, further.path.lane)
             still: Any = dr.compress(further.is_missing)
             missing = dr.gather(UInt, _padded(missing)[0], still)
@@ -267,19 +313,21 @@ class Shader:
         return ahead, item, Array3f(normal), Bool(is_sharp & surfaces.is_hit & scattered.is_alive)
 
     def _meet_kernel(self, cache: LightCache, path: _Path) -> _Step:
-        return self._met(cache, path)
+        emitted, step = self._met(cache, path)
+        return replace(step, sent=emitted + step.sent)
 
-    def _met(self, cache: LightCache, path: _Path) -> _Step:
+    def _met(self, cache: LightCache, path: _Path) -> tuple[Any, _Step]:
+        """What is emitted where rays meet a surface; and what it scatters, as far as that is known."""
         lit = self._renderer.lit(path.rays, path.bounce)
         albedo, is_diffuse = _diffuse(lit)
         found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
-        sent = path.throughput * (lit.emission + dr.select(is_diffuse & is_known, albedo * found, 0.0))
+        sent = path.throughput * dr.select(is_diffuse & is_known, albedo * found, 0.0)
         carries = _carries(path)
-        return _Step(
-            Array3f(sent), Bool(is_diffuse & ~is_known & carries), Bool(lit.has_lobe & carries), path
-        )
+        is_missing = is_diffuse & ~is_known & carries
+        step = _Step(Array3f(sent), Bool(is_missing), Bool(lit.has_lobe & carries), path)
+        return Array3f(path.throughput * lit.emission), step
 
-    def _look_up_kernel(self, cache: LightCache, path: _Path) -> _Step:
+    def _look_up_kernel(self, cache: LightCache, path: _Path, jitter: Any) -> _Step:
         """What the diffuse lobes send, by pages and cells."""
         lit = self._renderer.lit(path.rays, path.bounce)
         albedo, is_diffuse = _diffuse(lit)
@@ -287,8 +335,9 @@ class Shader:
         if cache.cells:
             rng = PCG32(path.rng)
             rng.state ^= UNRELATED
-            jitter = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
-            light, is_in_cell = cache.cells.find(lit.position, lit.surfaces.normal, _width(path, lit), jitter)
+            moved = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+            moved = 0.5 + jitter * (moved - 0.5)
+            light, is_in_cell = cache.cells.find(lit.position, lit.surfaces.normal, _width(path, lit), moved)
             found = dr.select(is_known, found, light)
             is_known |= is_in_cell
         sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
@@ -312,20 +361,37 @@ class Shader:
             spread=dr.maximum(path.spread, blur),
             rng=rng,
         )
-        step = self._met(cache, ahead)
+        emitted, step = self._met(cache, ahead)
         return Array3f(path.throughput * scattered.direct), _Step(
-            sent=dr.select(is_alive, step.sent, 0.0),
+            sent=dr.select(is_alive, emitted + step.sent, 0.0),
             is_missing=Bool(step.is_missing & is_alive),
             goes_on=Bool(step.goes_on & is_alive),
             path=ahead,
         )
+
+    def _gather_kernel(self, cache: LightCache, path: _Path, square: Any) -> tuple[Any, _Step]:
+        """Scatter off the diffuse lobe that the rays meet, and meet the next surface."""
+        rng = PCG32(path.rng)
+        lit = self._renderer.lit(path.rays, path.bounce)
+        lobe = self._renderer.scatter_diffuse(lit, Leading(square, rng))
+        ahead = _Path(
+            lane=path.lane,
+            rays=lobe.rays,
+            bounce=lobe.bounce,
+            throughput=Array3f(dr.select(lobe.is_alive, lobe.throughput, 0.0)),
+            width=_width(path, lit),
+            spread=dr.maximum(path.spread, GATHER_BLUR),
+            rng=rng,
+        )
+        emitted, step = self._met(cache, ahead)
+        return Array3f(lobe.direct + emitted), step
 
     def _estimate_kernel(self, path: _Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
         """Light where rays meet a surface, by path tracing, with its weight in the image and its cells."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
         width = _width(path, lit)
-        direct, indirect = self._renderer.light(lit, rng)
+        direct, indirect = self._renderer.light(lit, rng, edges=2 if path.bounce else 1)
         light = Array3f(direct + indirect)
         keys = tuple(cell_key(lit.position, lit.surfaces.normal, width, level) for level in range(LEVELS))
         return Array3f(path.throughput * lit.surfaces.albedo), light, keys, rng
@@ -357,6 +423,11 @@ def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, 
         direction_from_pixel=matrix3(camera.direction_from_pixel),
     )
     return Rays(vector3(camera.eye), direction), PCG32(dr.width(pixel))
+
+
+def _cells_of(cache: LightCache) -> LightCache:
+    """What is left to ask when the pages do not know."""
+    return LightCache(cells=cache.cells)
 
 
 def _diffuse(lit: Lit) -> tuple[Any, Any]:

@@ -96,6 +96,11 @@ class Workshop:
             self._keyframes.popitem(last=False)
         return keyframe
 
+    def random(self, frame: int, purpose: Purpose) -> dict[str, int]:
+        """What the random numbers of a frame depend on, beside the pixel and the number of the path."""
+        seed = self.job.settings.trace.seed
+        return {"seed": seed, "frame": self.number(frame), "purpose": int(purpose)}
+
     def finish(self, unit: str, files: list[Any], **facts: Any) -> None:
         """Record a unit of work as done, with its costs."""
         self.run.finish(unit, files=files, facts={**facts, "cost": self.costs.take()})

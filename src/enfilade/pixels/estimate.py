@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera import Camera
-from enfilade.pixels.random import stratified, streams
+from enfilade.pixels.random import stratified, stratified4, streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, Rays
@@ -21,7 +21,7 @@ PASS = 64  # paths of a pixel summed in one go; fixed, so that no chunking chang
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 
-Radiance = Callable[[Rays, Any], Any]
+Radiance = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,9 @@ class Estimate:
         Seed, frame and purpose of :func:`enfilade.pixels.random.streams`.
     layers
         How many ``radiance`` answers with.
+    is_stratified
+        Whether ``radiance`` is given an Array4f as a third argument: points of the unit cube that the paths
+        of a pixel share out evenly among them.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: dict[str, int],
         layers: int = 1,
+        is_stratified: bool = False,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
@@ -80,6 +84,7 @@ class Estimate:
         self._paths = 0  # numbers given to paths so far
         self._asked = 0
         self._layers = layers
+        self._is_stratified = is_stratified
         self._sums = np.zeros((2 + 4 * layers, len(pixels)))  # paths that are finite, and marked; see _summed
 
     def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
@@ -99,8 +104,9 @@ class Estimate:
                 part = chosen[start : start + step]
                 pixel, path = _numbered(self._pixels[part], first, width)
                 rng = streams(pixel, path, **self._random)
-                rays = self._rays(pixel, path)
-                self._sums[:, part] += _summed(self._radiance(rays, rng), width)
+                more = (stratified4(pixel, path, **self._random),) if self._is_stratified else ()
+                found = self._radiance(self._rays(pixel, path), rng, *more)
+                self._sums[:, part] += _summed(found, width)
         self._paths += spp
         self._asked += spp * len(chosen)
 

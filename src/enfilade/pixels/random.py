@@ -6,13 +6,15 @@ the start of a cheap sequential one (PCG32, O'Neill 2014) for each path.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from drjit.auto.ad import Philox4x32
 
-from enfilade.arrays import PCG32, Array2f, Float, UInt, UInt64, opaque
+from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, opaque
 
 WHOLE_PIXEL = 0xFFFFFFFF  # the path's number in draws that all paths of a pixel share
+R4 = (3679390609, 3152041523, 2700274806, 2313257605)  # 2**32 over powers of the root of x^5 = x + 1
 R2 = (3242174889, 2447445414)  # 2**32 over the plastic number, and over its square: Roberts 2018
 
 
@@ -50,6 +52,36 @@ def stratified(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) ->
     """
     a, b, _, _ = _drawn(pixel, UInt(WHOLE_PIXEL), seed=seed, frame=frame, purpose=purpose)
     return Array2f(_unit(a + path * UInt(R2[0])), _unit(b + path * UInt(R2[1])))
+
+
+def stratified4(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
+    """The same in the unit cube of four dimensions (Roberts 2018); Array4f.
+
+    Its points are not related to those of :func:`stratified` for another purpose only.
+    """
+    starts = _drawn(pixel, UInt(WHOLE_PIXEL), seed=seed, frame=frame, purpose=purpose)
+    return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
+
+
+class Leading:
+    """A random number generator whose first numbers are given.
+
+    Parameters
+    ----------
+    numbers : sequence of Float
+        In [0, 1).
+    rng : PCG32
+        Draws what comes after them.
+    """
+
+    def __init__(self, numbers: Iterable[Any], rng: Any) -> None:
+        self._numbers = iter(numbers)
+        self._rng = rng
+
+    def next_float32(self, active: Any = True) -> Any:
+        """Draw a number in [0, 1); Float."""
+        number = next(self._numbers, None)
+        return self._rng.next_float32(active) if number is None else number
 
 
 def _unit(number: Any) -> Any:

@@ -12,7 +12,7 @@ from enfilade.arrays import Array3f, Bool
 from enfilade.backends.mitsuba3.lobes import LEAST_ALBEDO, Lobes
 from enfilade.renderer import Bounce, Lit, Rays, Scattered
 
-Radiance = Callable[[Rays, Any], Any]
+Radiance = Callable[[Rays, Any, int], Any]
 
 
 class Light:
@@ -22,7 +22,8 @@ class Light:
     ----------
     scene : mitsuba.Scene
     radiance
-        The path tracer: radiance along rays, given a random number generator for each.
+        The path tracer: radiance along rays, given a random number generator for each, and how many edges
+        their paths have behind them.
     """
 
     def __init__(self, scene: Any, radiance: Radiance) -> None:
@@ -53,25 +54,34 @@ class Light:
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
         return seen.is_valid() & (((flags & beyond) != 0) | self._lobes.is_undivided(seen, material))
 
-    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
+    def light(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
-        seen = lit.native
-        active = seen.is_valid() & (dr.max(lit.surfaces.albedo) > LEAST_ALBEDO)
+        lobe = self.scatter_diffuse(lit, rng)
+        # What the path tracer finds in the direction of the lobe, its first emitter weighted.
+        found = self._radiance(lobe.rays, rng, edges)
+        ray = mi.Ray3f(mi.Point3f(lobe.rays.origin), mi.Vector3f(lobe.rays.direction))
+        following = self._scene.ray_intersect(ray, lobe.is_alive)
+        whole = following.emitter(self._scene).eval(following, lobe.is_alive)
+        emitted = lobe.throughput * self.emission(following, lobe.bounce)
+        direct = lobe.direct + dr.select(lobe.is_alive, emitted, 0.0)
+        indirect = dr.select(lobe.is_alive, lobe.throughput * (found - whole), 0.0)
+        return Array3f(direct), Array3f(indirect)
+
+    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
+        """See :meth:`enfilade.renderer.LightRenderer.scatter_diffuse`."""
+        seen, albedo = lit.native, lit.surfaces.albedo
+        active = seen.is_valid() & (dr.max(albedo) > LEAST_ALBEDO)
         material = seen.bsdf()
-
-        # Lights, sampled.
         direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active)
-
-        # One direction of the lobe: what the path tracer finds there, its first emitter weighted.
         wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
-        active &= pdf > 0.0
         ray = seen.spawn_ray(seen.to_world(wo))
-        found = self._radiance(Rays(Array3f(ray.o), Array3f(ray.d)), rng)
-        following = self._scene.ray_intersect(ray, active)
-        whole = following.emitter(self._scene).eval(following, active)
-        direct += dr.select(active, weight * self.emission(following, Bounce(seen.p, pdf, Bool(False))), 0.0)
-        indirect = dr.select(active, weight * (found - whole), 0.0)
-        return _divided(direct, lit.surfaces.albedo), _divided(indirect, lit.surfaces.albedo)
+        return Scattered(
+            rays=Rays(Array3f(ray.o), Array3f(ray.d)),
+            bounce=Bounce(Array3f(seen.p), pdf, Bool(False)),
+            throughput=_divided(weight, albedo),
+            direct=_divided(direct, albedo),
+            is_alive=Bool(active & (pdf > 0.0)),
+        )
 
     def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""

@@ -61,7 +61,7 @@ class Lobes:
     def sample_diffuse(self, seen: Any, material: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
         """Direction, density and weight of a sample of the diffuse lobe."""
         undivided = self.is_undivided(seen, material)
-        first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        second, first = mi.Point2f(rng.next_float32(), rng.next_float32()), rng.next_float32()
         own, weight = material.sample(self._diffuse, seen, first, second, active & ~undivided)
         up = _cosine(seen, second)
         albedo = diffuse_reflectance(seen, material, active & undivided)

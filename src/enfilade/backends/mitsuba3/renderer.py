@@ -71,9 +71,9 @@ class MitsubaRenderer:
         self._scene = scene
         self._chunk = settings.chunk
         self._integrator = _integrator(scene, settings.max_depth)
-        self._onward = _one_edge_less(self._integrator)
+        self._onward = [_shortened(self._integrator, edges) for edges in (1, 2)]
         self._sampler = _lane_sampler()
-        self._light = Light(scene, lambda rays, rng: self._radiance(rays, rng, self._onward))
+        self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
         self._file = file
         items, light = self._items, self._light.state
@@ -115,9 +115,13 @@ class MitsubaRenderer:
             native=seen,
         )
 
-    def light(self, lit: Lit, rng: Any) -> tuple[Any, Any]:
+    def light(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
-        return self._light.light(lit, rng)
+        return self._light.light(lit, rng, edges)
+
+    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
+        """See :meth:`enfilade.renderer.LightRenderer.scatter_diffuse`."""
+        return self._light.scatter_diffuse(lit, rng)
 
     def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
@@ -169,6 +173,10 @@ class MitsubaRenderer:
             pixel_filter=pixel_filter,
             random={"seed": seed, "frame": frame, "purpose": int(purpose)},
         )
+
+    def _radiance_onward(self, rays: Rays, rng: Any, edges: int) -> Any:
+        """Along rays that have edges of their path behind them."""
+        return self._radiance(rays, rng, self._onward[edges - 1])
 
     def _radiance(self, rays: Rays, rng: Any, integrator: Any = None) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
@@ -274,15 +282,16 @@ def _integrator(scene: Any, max_depth: int) -> Any:
     return own if isinstance(own, mi.SamplingIntegrator) else mi.load_dict({"type": "path"})
 
 
-def _one_edge_less(integrator: Any) -> Any:
-    """The path tracer for paths that have one edge behind them; itself where its paths have no limit."""
+def _shortened(integrator: Any, edges: int) -> Any:
+    """The path tracer for paths that have edges behind them; itself where its paths have no limit."""
     described = re.search(r"max_depth = (\d+),\s*rr_depth = (\d+)", str(integrator))
     if integrator.class_name() != "PathIntegrator" or not described:
         return integrator
     longest, roulette = (int(number) for number in described.groups())
-    if not 1 < longest < UNLIMITED:
+    if longest >= UNLIMITED:
         return integrator
-    return mi.load_dict({"type": "path", "max_depth": longest - 1, "rr_depth": max(roulette - 1, 1)})
+    longest, roulette = max(longest - edges, 0), max(roulette - edges, 1)
+    return mi.load_dict({"type": "path", "max_depth": longest, "rr_depth": roulette})
 
 
 def _lane_sampler() -> Any:

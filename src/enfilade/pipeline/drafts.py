@@ -1,0 +1,163 @@
+"""A first, rough idea of the light of a shot, which the keyframes of light are made with.
+
+A keyframe's paths need not be followed through all their bounces: they look up the light where their first
+bounce lands. That may be rough, since each looks at many places (final gathering: Jensen 1996; Ward and
+Heckbert 1992).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from enfilade.codec import read_arrays, read_light, write_arrays, write_light
+from enfilade.geometry import find_geometry
+from enfilade.irradiance import Estimates, LightCache, Shader, open_cache, open_page, pooled
+from enfilade.irradiance.cells import Cells
+from enfilade.pipeline.kept import Kept, nearest
+from enfilade.pipeline.workshop import Workshop
+from enfilade.pixels.estimate import Estimate, Samples, estimate
+from enfilade.pixels.lookup import Page
+from enfilade.records import LightPage
+from enfilade.renderer import LightRenderer, PixelFilter, Purpose
+
+COARSER = 2  # times fewer pixels across than a frame has
+PATHS = 8  # of a draft's pixel
+POOL = 4  # keyframes to each side with which a draft is pooled
+PAGES = 4  # drafts in which a point is looked up
+GATHER_SPP = 4  # bounces of a draft's pixel that look for what no draft sees
+LOBE_SPP = 4  # rays of a frame's pixel that look for the same off mirrors, glass and glossy surfaces
+SCOUTS = 8  # keyframes whose estimates of what no draft sees a frame shares
+
+
+class Drafts:
+    """Rough light at a shot's keyframes: pages of fewer pixels, and cells for what none of them sees.
+
+    Parameters
+    ----------
+    workshop
+    renderer, shader
+    keyframes
+        Frames.
+    """
+
+    def __init__(
+        self, workshop: Workshop, renderer: LightRenderer, shader: Shader, keyframes: list[int]
+    ) -> None:
+        self._workshop = workshop
+        self._renderer = renderer
+        self._shader = shader
+        self._keyframes = keyframes
+        self._traced: Kept[LightPage] = Kept(2 * POOL + 1)
+        self._opened: Kept[Page] = Kept(2 * POOL + 1)
+        self._pooled: Kept[Page] = Kept(PAGES)
+        self._estimates: Kept[Estimates] = Kept(SCOUTS)
+        self._cells: tuple[list[int], Cells | None] = ([], None)
+
+    def cache(self, frame: int) -> LightCache:
+        """What drafts and cells near a frame know."""
+        return replace(self._pages(frame), cells=self.cells(frame))
+
+    def cells(self, frame: int) -> Cells | None:
+        """What is known of surfaces that no draft near a frame sees."""
+        near = nearest(self._keyframes, frame, SCOUTS)
+        if self._cells[0] != near:
+            self._cells = near, Estimates.joined([self.scout(k) for k in near]).opened()
+        return self._cells[1]
+
+    def scout(self, frame: int) -> Estimates:
+        """Estimate the light where paths lead from a keyframe and no draft sees."""
+        return self._estimates.made(frame, lambda: self._read_or_scout(frame))
+
+    def trace(self, frame: int) -> LightPage:
+        """The draft of a keyframe."""
+        return self._traced.made(frame, lambda: self._read_or_trace(frame))
+
+    def _pages(self, frame: int) -> LightCache:
+        near = nearest(self._keyframes, frame, PAGES)
+        pages = [self._page(keyframe) for keyframe in near]
+        # Always as many, so that the kernels which look them up are recorded once.
+        missing = PAGES - len(pages)
+        return open_cache([*pages, *[pages[0]] * missing], [*[1.0] * len(pages), *[0.0] * missing])
+
+    def _page(self, frame: int) -> Page:
+        return self._pooled.made(frame, lambda: self._pool(frame))
+
+    def _pool(self, frame: int) -> Page:
+        around = sorted(nearest(self._keyframes, frame, 2 * POOL + 1))
+        return pooled(self.trace(frame), [self._open(keyframe) for keyframe in around])
+
+    def _open(self, frame: int) -> Page:
+        return self._opened.made(frame, lambda: open_page(self.trace(frame)))
+
+    def _read_or_trace(self, frame: int) -> LightPage:
+        workshop, renderer = self._workshop, self._renderer
+        number = workshop.number(frame)
+        unit, file = f"draft {number}", workshop.run.file("drafts", number)
+        with workshop.costs.of("draft"):
+            camera = workshop.job.path.cameras[frame]
+            camera = replace(
+                camera, width=max(camera.width // COARSER, 1), height=max(camera.height // COARSER, 1)
+            )
+            geometry = find_geometry(renderer, camera)
+            if workshop.run.done(unit):
+                workshop.run.check(file)
+                return LightPage(frame, geometry, *read_light(file))
+            where = geometry.has_light
+            light = Estimate(
+                camera,
+                np.flatnonzero(where).astype(np.uint32),
+                lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng, edges=2)),
+                chunk=workshop.job.settings.trace.chunk,
+                pixel_filter=PixelFilter.CENTRE,
+                random=workshop.random(frame, Purpose.DRAFT),
+                layers=2,
+            )
+            light.add(PATHS)
+            direct, indirect = (shading.spread(where) for shading in light.shadings)
+        write_light(file, direct, indirect, where)
+        workshop.finish(unit, [file], frame=number, dropped=direct.dropped)
+        return LightPage(frame, geometry, direct, indirect, where)
+
+    def _read_or_scout(self, frame: int) -> Estimates:
+        workshop = self._workshop
+        number = workshop.number(frame)
+        unit, file = f"cells {number}", workshop.run.file("cells", number).with_suffix(".npz")
+        if workshop.run.done(unit):
+            workshop.run.check(file)
+            return Estimates(*read_arrays(file, "keys", "sums", "counts"))
+        parts: list[Estimates] = []
+        with workshop.costs.of("scout"):
+            self._heard_by_lobes(frame, parts)
+            self._heard_by_gathering(frame, parts)
+            estimates = Estimates.joined(parts)
+        write_arrays(file, {"keys": estimates.keys, "sums": estimates.sums, "counts": estimates.counts})
+        workshop.finish(unit, [file], frame=number, cells=len(estimates.keys))
+        return estimates
+
+    def _heard_by_lobes(self, frame: int, parts: list[Estimates]) -> None:
+        path, cache = self._workshop.job.path, self._pages(frame)
+        estimate(
+            path.cameras[frame],
+            np.arange(path.width * path.height, dtype=np.uint32),
+            lambda rays, rng: self._shader.scattered(cache, rays, rng, parts.append),
+            spp=LOBE_SPP,
+            chunk=self._workshop.job.settings.trace.chunk,
+            pixel_filter=PixelFilter.BOX,
+            random=self._workshop.random(frame, Purpose.SCOUT),
+        )
+
+    def _heard_by_gathering(self, frame: int, parts: list[Estimates]) -> None:
+        page, cache = self.trace(frame), self._pages(frame)
+        bounces = Estimate(
+            page.geometry.camera,
+            np.flatnonzero(page.is_known).astype(np.uint32),
+            lambda rays, rng, square: self._shader.gathered(cache, rays, rng, square, parts.append),
+            chunk=self._workshop.job.settings.trace.chunk,
+            pixel_filter=PixelFilter.CENTRE,
+            random=self._workshop.random(frame, Purpose.DRAFT_SCOUT),
+            layers=2,
+            is_stratified=True,
+        )
+        bounces.add(GATHER_SPP)

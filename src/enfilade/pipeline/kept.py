@@ -1,0 +1,40 @@
+"""What is near a frame, and what of it is kept in memory."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import TypeVar
+
+__all__ = ["Kept", "nearest"]
+
+T = TypeVar("T")
+
+
+class Kept(OrderedDict[int, T]):
+    """What was last made or asked for, by frame.
+
+    Parameters
+    ----------
+    count
+        How much of it.
+    """
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self._count = count
+
+    def made(self, frame: int, make: Callable[[], T]) -> T:
+        """What is kept of a frame; else it is made."""
+        if frame in self:
+            self.move_to_end(frame)
+        else:
+            self[frame] = make()
+            if len(self) > self._count:
+                self.popitem(last=False)
+        return self[frame]
+
+
+def nearest(frames: list[int], frame: int, count: int) -> list[int]:
+    """The so many of some frames that are nearest to one, nearest first."""
+    return sorted(frames, key=lambda k: (abs(k - frame), k))[:count]

@@ -1,0 +1,212 @@
+"""The light of a shot, kept in pages at its keyframes and between them."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from enfilade.codec import read_light, write_light
+from enfilade.errors import SettingsError
+from enfilade.irradiance import (
+    LightCache,
+    Shader,
+    known,
+    light_of,
+    open_cache,
+    open_page,
+    pooled,
+    seen_from,
+)
+from enfilade.pipeline.drafts import Drafts
+from enfilade.pipeline.kept import Kept, nearest
+from enfilade.pipeline.workshop import Workshop
+from enfilade.pixels.estimate import Estimate
+from enfilade.pixels.lookup import Page
+from enfilade.records import LightPage, Mask, Segment, Shading
+from enfilade.renderer import LightRenderer, PixelFilter, Purpose
+
+REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
+LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
+POOL = 4  # keyframes to each side with which a page is pooled
+LEAST_HOLES = 2e-3  # of a frame's pixels: fewer are left to the frames themselves
+PILOT_PATHS = 4  # of each of the two estimates that tell how many paths are needed
+PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
+TRACED = 4  # pages kept as they were traced
+
+
+class LightTable:
+    """The light of a shot: pages at its keyframes, and smaller ones that fill the holes between them.
+
+    Parameters
+    ----------
+    workshop
+    segments
+        The shot's initial segments.
+
+    Raises
+    ------
+    SettingsError
+        The renderer can't be asked for light.
+    """
+
+    def __init__(self, workshop: Workshop, segments: list[Segment]) -> None:
+        if not isinstance(workshop.renderer, LightRenderer):
+            name = workshop.renderer.describe().renderer
+            raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
+        self.renderer: LightRenderer = workshop.renderer
+        first = workshop.job.path.cameras[segments[0].first]
+        self.shader = Shader(self.renderer, pixel_angle=1.0 / first.focal_px)
+        self._workshop = workshop
+        self.segments = segments
+        self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
+        self._fills: list[int] = []
+        self.drafts = Drafts(workshop, self.renderer, self.shader, self.keyframes)
+        settings = workshop.job.settings.light
+        self._traced: Kept[LightPage] = Kept(TRACED)
+        self._opened: Kept[Page] = Kept(2 * (2 * POOL + 1))
+        self._pooled: Kept[Page] = Kept(settings.keyframes + settings.fills + 1)
+
+    def prepare(self, segment: Segment) -> None:
+        """Trace the light of a segment's keyframes, and of what they leave open between them."""
+        workshop = self._workshop
+        first, last = workshop.number(segment.first), workshop.number(segment.last)
+        unit = f"light {first}-{last}"
+        if line := workshop.run.done(unit):
+            fills = [self._frame(number) for number in line["fills"]]
+        else:
+            fills = self._filled(segment.first, segment.last, [])
+            numbers = [workshop.number(frame) for frame in fills]
+            workshop.finish(unit, [], fills=numbers)
+        self._fills = sorted({*self._fills, *fills})
+
+    def around(self, frame: int) -> tuple[LightCache, LightCache]:
+        """What is known of the very view of a frame, and what is known near it.
+
+        Pages are weighted so that none comes or goes abruptly.
+        """
+        settings = self._workshop.job.settings.light
+        frames = [*nearest(self.keyframes, frame, settings.keyframes)]
+        frames += nearest(self._fills, frame, settings.fills)
+        pages = [self._page(f) for f in frames]
+        shares = [max(1.0 - abs(f - frame) / (REACH * self._spacing), LEAST_SHARE) for f in frames]
+        view = seen_from(self._workshop.views[frame].geometry, pages, shares)
+        # Always as many pages, so that the kernels which look them up are recorded once.
+        missing = settings.keyframes + settings.fills - len(pages)
+        pages, shares = [*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing]
+        return open_cache([view], [1.0]), open_cache(pages, shares, self.drafts.cells(frame))
+
+    @property
+    def _spacing(self) -> float:
+        return max((self.keyframes[-1] - self.keyframes[0]) / max(len(self.keyframes) - 1, 1), 1.0)
+
+    def _frame(self, number: int) -> int:
+        return self._workshop.job.path.numbers.index(number)
+
+    def _filled(self, first: int, last: int, fills: list[int]) -> list[int]:
+        """Halve a stretch of frames until nothing new comes into view; returns the frames that fill holes."""
+        middle = (first + last) // 2
+        if middle == first:
+            return fills
+        holes = self._holes(middle, fills)
+        if holes.mean() < LEAST_HOLES:
+            return fills
+        self._trace(middle, holes)
+        fills = [*fills, middle]
+        return self._filled(middle, last, self._filled(first, middle, fills))
+
+    def _holes(self, frame: int, fills: list[int]) -> Mask:
+        geometry = self._workshop.views[frame].geometry
+        frames = nearest(self.keyframes, frame, self._workshop.job.settings.light.keyframes)
+        pages = [self._open(f) for f in (*frames, *fills)]
+        return geometry.has_light & ~known(geometry, pages)
+
+    def _page(self, frame: int) -> Page:
+        """A page with what all around it know of its surfaces."""
+        return self._pooled.made(frame, lambda: self._pool(frame))
+
+    def _pool(self, frame: int) -> Page:
+        around = nearest(self.keyframes, frame, 2 * POOL + 1)
+        around += nearest(self._fills, frame, 2 * POOL + 1)
+        with self._workshop.costs.of("pool"):
+            pages = [self._open(f) for f in sorted({*around, frame})]
+            return pooled(self._trace(frame), pages)
+
+    def _open(self, frame: int) -> Page:
+        return self._opened.made(frame, lambda: open_page(self._trace(frame)))
+
+    def _trace(self, frame: int, holes: Mask | None = None) -> LightPage:
+        """Light at what pixels' centres of a frame see: of all of them, or of those in holes."""
+        return self._traced.made(frame, lambda: self._read_or_trace(frame, holes))
+
+    def _read_or_trace(self, frame: int, holes: Mask | None) -> LightPage:
+        workshop = self._workshop
+        number, geometry = workshop.number(frame), workshop.views[frame].geometry
+        unit, file = f"keyframe {number}", workshop.run.file("keyframes", number)
+        if workshop.run.done(unit):
+            workshop.run.check(file)
+            return LightPage(frame, geometry, *read_light(file))
+        where = geometry.has_light if holes is None else holes
+        direct, indirect = self._estimated(frame, where)
+        write_light(file, direct, indirect, where)
+        workshop.finish(unit, [file], frame=number, pixels=int(where.sum()), dropped=direct.dropped)
+        return LightPage(frame, geometry, direct, indirect, where)
+
+    def _estimated(self, frame: int, where: Mask) -> tuple[Shading, Shading]:
+        """Direct and indirect light."""
+        paths = self.paths
+        with self._workshop.costs.of("trace"):
+            light = self._light(frame, where, Purpose.LIGHT)
+            light.add(paths)
+        direct, indirect = (shading.spread(where) for shading in light.shadings)
+        return direct, indirect
+
+    def _light(self, frame: int, where: Mask, purpose: Purpose) -> Estimate:
+        workshop, cache = self._workshop, self.drafts.cache(frame)
+        return Estimate(
+            workshop.job.path.cameras[frame],
+            np.flatnonzero(where).astype(np.uint32),
+            lambda rays, rng, square: self.shader.gathered(cache, rays, rng, square),
+            chunk=workshop.job.settings.trace.chunk,
+            pixel_filter=PixelFilter.CENTRE,
+            random=workshop.random(frame, purpose),
+            layers=2,
+            is_stratified=True,
+        )
+
+    @cached_property
+    def paths(self) -> int:
+        """Paths of a keyframe's pixel: as set, or as many as the quality asks for."""
+        workshop = self._workshop
+        settings = workshop.job.settings.light
+        if settings.paths:
+            return settings.paths
+        frame = self.keyframes[len(self.keyframes) // 2]
+        unit = f"pilot {workshop.number(frame)}"
+        if line := workshop.run.done(unit):
+            return int(line["paths"])
+        jnd = self._pilot_jnd(frame)
+        # Half of the squared difference is either's own; pages that are pooled share what is left.
+        share = max(min(len(self.keyframes), 2 * POOL + 1) / 2.0, 1.0)
+        wanted = PILOT_PATHS * (jnd / settings.quality) ** 2 / (2.0 * share)
+        paths = int(np.clip(4 * math.ceil(wanted / 4), *PATHS))
+        workshop.finish(unit, [], jnd=jnd, paths=paths)
+        return paths
+
+    def _pilot_jnd(self, frame: int) -> float:
+        """Visible difference between two estimates of a frame's light, as its surfaces show it."""
+        workshop = self._workshop
+        geometry = workshop.views[frame].geometry
+        where = geometry.has_light
+        if not where.any():
+            return 0.0
+        shown = []
+        with workshop.costs.of("pilot"):
+            for purpose in (Purpose.PILOT, Purpose.LIGHT):
+                light = self._light(frame, where, purpose)
+                light.add(PILOT_PATHS)
+                direct, indirect = (shading.spread(where) for shading in light.shadings)
+                page = LightPage(frame, geometry, direct, indirect, where)
+                shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
+            return workshop.judge.compare(*shown, valid=where).score
