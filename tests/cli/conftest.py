@@ -39,7 +39,8 @@ def jobs(monkeypatch):
             raise told.error
         return told.answer
 
-    def render(job, folder, monitor):
+    def render(job, folder, monitor, crew, *, is_verified):
+        told.crew, told.is_verified = crew, is_verified
         answer = take(job)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "summary.json").write_text(json.dumps(answer))

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Float, UInt
 from enfilade.backends.analytic_scene import (
+    NAME,
     AnalyticScene,
     Checker,
     Material,
@@ -57,7 +58,7 @@ class AnalyticRenderer:
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""
         return SceneFacts(
-            renderer="analytic 1",
+            renderer=NAME,
             variant=dr.backend_v(Float).name.lower(),
             items=tuple(shape.name for shape in self._scene.shapes),
             fingerprint=hashlib.sha256(scene_text(self._scene).encode()).hexdigest(),

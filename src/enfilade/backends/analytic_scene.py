@@ -16,6 +16,7 @@ from typing import Any
 from enfilade.errors import SceneError
 from enfilade.records import SurfaceClass
 
+NAME = "analytic 1"  # of the renderer
 SUFFIX = ".analytic.json"
 
 Vector = tuple[float, float, float]

@@ -13,6 +13,7 @@ from enfilade.cli.flags import settings_of
 from enfilade.device import Choice, activate
 
 if TYPE_CHECKING:
+    from enfilade.pipeline.crew import Crew
     from enfilade.pipeline.job import Job
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -82,6 +83,50 @@ device_option = click.option(
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, for programs.")
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+
+
+def crew_options(command: Command) -> Command:
+    """Decorate a command with who does the work; it changes no result."""
+    for decorate in (
+        click.option(
+            "--threads",
+            type=click.IntRange(0),
+            default=0,
+            show_default=True,
+            help="Threads of each worker process; 0: its share of the cores.",
+        ),
+        click.option(
+            "--workers",
+            type=click.IntRange(1),
+            help="Worker processes, or units on the cluster at once.  [default: one for each core]",
+        ),
+        click.option(
+            "--executor",
+            metavar="WHO",
+            default="in-process",
+            show_default=True,
+            help="Who does the work: in-process, processes (on this machine), ray (a local cluster) or "
+            "ray:ADDRESS.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def crew_of(executor: str, workers: int | None, threads: int) -> Crew:
+    """Who does the work. The device must be active.
+
+    Raises
+    ------
+    SettingsError
+        There is no such executor.
+    """
+    from enfilade.executors.opener import check_executor
+
+    check_executor(executor)
+    from enfilade.pipeline.crew import Crew
+
+    return Crew(executor, workers, threads)
 
 
 def output_options(command: Command) -> Command:

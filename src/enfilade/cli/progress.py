@@ -99,12 +99,13 @@ class LineMonitor:
         self._now = ""
 
     def stage(self, name: str, total: int) -> None:
-        """Write how the last stage ended, and that one begins."""
-        self.close()
-        self._now = name
+        """Write how the last stage ended, and that one begins; one that goes on says so later."""
         if name in self._stages:
+            self._now = name
             self.extend(total)
             return
+        self.close()
+        self._now = name
         now = self._clock()
         self._stages[name] = _Count(total, now, now)
         self._write(f"{name}: {total} to do")
@@ -116,17 +117,17 @@ class LineMonitor:
             return
         stage.done += count
         if self._clock() - stage.shown_s >= self._every_s:
-            self._show(stage)
+            self._show(self._now, stage)
 
     def close(self) -> None:
-        """Write how far the present stage came, where no line has said so yet."""
-        stage = self._stages.get(self._now)
-        if stage is not None and stage.shown < stage.done:
-            self._show(stage)
+        """Write how far the stages came, where no line has said so yet."""
+        for name, stage in self._stages.items():
+            if stage.shown < stage.done:
+                self._show(name, stage)
 
-    def _show(self, stage: _Count) -> None:
+    def _show(self, name: str, stage: _Count) -> None:
         stage.shown_s, stage.shown = self._clock(), stage.done
-        self._write(f"{self._now}: {stage.done}/{stage.total}, {_times(stage, stage.shown_s)}")
+        self._write(f"{name}: {stage.done}/{stage.total}, {_times(stage, stage.shown_s)}")
 
     def extend(self, count: int) -> None:
         """Count the added units."""

@@ -10,7 +10,7 @@ import click
 
 from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
+from enfilade.cli.inputs import JOB_SECTIONS, crew_of, crew_options, job_of, job_options, output_options
 
 
 @click.command(
@@ -24,19 +24,30 @@ from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_option
     required=True,
     help="The run folder; the same command goes on with what is there.",
 )
+@crew_options
+@click.option(
+    "--verify",
+    "is_verified",
+    is_flag=True,
+    help="Compare every file that is there with its checksum first; what is damaged is made again.",
+)
 @output_options
 @debug_option
 @settings_options(*JOB_SECTIONS)
 @click.pass_context
-def command(ctx: click.Context, /, *, folder: Path, as_json: bool, quiet: bool, **inputs: Any) -> None:
+def command(
+    ctx: click.Context, /, *, folder: Path, is_verified: bool, as_json: bool, quiet: bool, **inputs: Any
+) -> None:
     """Render a walkthrough of SCENE (Mitsuba 3 XML) into frames, a video and a report of the cost."""
     mark_resumable(ctx)
+    who = [inputs.pop(name) for name in ("executor", "workers", "threads")]
     job = job_of(ctx, **inputs)
+    crew = crew_of(*who)
     from enfilade.cli.progress import watch
     from enfilade.pipeline.walkthrough import render
 
     with watch(quiet=quiet) as monitor:
-        summary = render(job, folder, monitor)
+        summary = render(job, folder, monitor, crew, is_verified=is_verified)
     from enfilade.report.plots import plot_run
 
     plots = plot_run(folder)

@@ -27,23 +27,34 @@ def result_unit(workshop: Workshop, frame: int) -> str:
     return f"frame {workshop.number(frame)}"
 
 
-def antialias_shot(workshop: Workshop, shot: range) -> None:
-    """Filter the frames of a shot and write them.
+class Antialiasing:
+    """Filters frames along the flow and writes them.
 
     Memory is bounded by the frames that the filter spans, whatever the length of the shot.
+
+    Parameters
+    ----------
+    workshop
     """
-    settings = workshop.job.settings.antialias
-    reach = max(settings.frames, settings.slow_frames) // 2
-    window: dict[int, _Raw] = {}
-    for frame in shot:
-        if not workshop.run.done(result_unit(workshop, frame)):
-            span = range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
-            window = {f: window[f] if f in window else _raw(workshop, f) for f in span}
-            color = _filtered(workshop, frame, window)
-            here = window[frame]
-            made = Frame(color, here.source)
-            write_frame_result(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
-        workshop.monitor.advance()
+
+    def __init__(self, workshop: Workshop) -> None:
+        self._workshop = workshop
+        self._window: dict[int, _Raw] = {}
+
+    def make(self, frame: int) -> None:
+        """Filter a frame, whose neighbours are in the run folder."""
+        workshop, settings = self._workshop, self._workshop.job.settings.antialias
+        if workshop.run.done(result_unit(workshop, frame)):
+            return
+        reach = max(settings.frames, settings.slow_frames) // 2
+        shot = next(shot for shot in workshop.job.path.shots() if frame in shot)
+        span = range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
+        kept = {f: raw for f, raw in self._window.items() if f in span}
+        self._window = kept | {f: _raw(workshop, f) for f in span if f not in kept}
+        color = _filtered(workshop, frame, self._window)
+        here = self._window[frame]
+        made = Frame(color, here.source)
+        write_frame_result(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
 
 
 def trace_reference(workshop: Workshop, frame: int) -> None:

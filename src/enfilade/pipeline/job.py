@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from enfilade import __version__
+from enfilade.camera import Camera
+from enfilade.codec import read_json
+from enfilade.device import active
+from enfilade.errors import CameraPathError, RunFolderError, SettingsError
 from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings, TraceSettings
 from enfilade.viewing import Viewing
 
 ANALYTIC_SUFFIX = ".analytic.json"
+JOB_FILE = "job.json"  # in a run folder: what its workers read
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +57,28 @@ class Job:
             persistence=of.persistence,
         )
 
-    def identity(self, renderer: Renderer) -> dict[str, Any]:
+    def identity(self, renderer: Renderer | None = None) -> dict[str, Any]:
         """What makes the results what they are: a run folder holds one such identity.
 
         The number of paths in flight is left out: it changes no result.
+
+        Parameters
+        ----------
+        renderer
+            Adds the number of items. Without it the scene is not loaded: its files are only hashed.
+
+        Raises
+        ------
+        SceneError
+            The scene is missing or malformed.
         """
-        facts = renderer.describe()
+        name, fingerprint = _renderer_and_fingerprint(self.scene)
+        items = {} if renderer is None else {"items": len(renderer.describe().items)}
         settings = self.settings.to_tables()
         del settings["trace"]["chunk"]
         return {
             "method": self.method,
-            "scene": {"fingerprint": facts.fingerprint, "items": len(facts.items)},
+            "scene": {"fingerprint": fingerprint, **items},
             "path": {
                 "size": [self.path.width, self.path.height],
                 "fps": self.path.fps,
@@ -70,10 +89,67 @@ class Job:
             "settings": settings,
             "versions": {
                 "enfilade": __version__,
-                "renderer": facts.renderer,
-                "variant": facts.variant,
+                "renderer": name,
+                "variant": _variant(self.scene),
             },
         }
+
+    def to_json(self) -> dict[str, Any]:
+        """All of it, fit for JSON, for workers elsewhere; :meth:`from_json` reads back the very same."""
+        path = self.path
+        return {
+            "scene": str(self.scene.resolve()),
+            "method": self.method,
+            "settings": self.settings.to_tables(),
+            "path": {
+                "size": [path.width, path.height],
+                "fps": path.fps,
+                "numbers": list(path.numbers),
+                "cuts": sorted(path.cuts),
+                "poses": [camera.world_from_camera.ravel().tolist() for camera in path.cameras],
+                "fov_deg": [camera.fov_deg for camera in path.cameras],
+            },
+        }
+
+    @staticmethod
+    def from_json(table: dict[str, Any]) -> Job:
+        """Read back from :meth:`to_json`.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            It is something else.
+        """
+        path = table["path"]
+        poses = np.array(path["poses"], np.float64).reshape(-1, 4, 4)
+        cameras = tuple(
+            Camera(pose, float(fov), *path["size"]) for pose, fov in zip(poses, path["fov_deg"], strict=True)
+        )
+        numbers = tuple(int(number) for number in path["numbers"])
+        return Job(
+            scene=Path(table["scene"]),
+            path=CameraPath(cameras, numbers, float(path["fps"]), frozenset(path["cuts"])),
+            settings=Settings.from_tables(table["settings"]),
+            method=str(table["method"]),
+        )
+
+
+def read_job(folder: Path) -> Job:
+    """The job of a run folder, for its workers.
+
+    Raises
+    ------
+    RunFolderError
+        It has none, or it is damaged.
+    """
+    try:
+        return Job.from_json(read_json(folder / JOB_FILE))
+    except (KeyError, TypeError, ValueError, SettingsError, CameraPathError) as error:
+        if isinstance(error, RunFolderError):
+            raise
+        raise RunFolderError(
+            f"{folder / JOB_FILE} is damaged ({error}); run the command that made the run again"
+        ) from error
 
 
 def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:
@@ -93,6 +169,22 @@ def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:
     from enfilade.backends.mitsuba3 import MitsubaRenderer
 
     return MitsubaRenderer(scene, settings)
+
+
+def _renderer_and_fingerprint(scene: Path) -> tuple[str, str]:
+    """Name of the renderer, and what the scene's files hold, without loading either."""
+    if scene.name.endswith(ANALYTIC_SUFFIX):
+        from enfilade.backends.analytic_scene import NAME, read_scene, scene_text
+
+        return NAME, hashlib.sha256(scene_text(read_scene(scene)).encode()).hexdigest()
+    from enfilade.backends.scenefile import fingerprint
+
+    return f"Mitsuba {importlib.metadata.version('mitsuba')}", fingerprint(scene)
+
+
+def _variant(scene: Path) -> str:
+    device = active()
+    return device.backend if scene.name.endswith(ANALYTIC_SUFFIX) else device.variant
 
 
 def _digest(path: CameraPath) -> str:

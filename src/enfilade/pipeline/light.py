@@ -73,13 +73,18 @@ class LightTable:
         workshop = self._workshop
         first, last = workshop.number(segment.first), workshop.number(segment.last)
         unit = f"light {first}-{last}"
-        if line := workshop.run.done(unit):
+        line = workshop.run.done(unit)
+        if line and all(workshop.run.done(f"keyframe {number}") for number in line["fills"]):
             fills = [self._frame(number) for number in line["fills"]]
         else:
             fills = self._filled(segment.first, segment.last, [])
             numbers = [workshop.number(frame) for frame in fills]
             workshop.finish(unit, [], fills=numbers)
         self._fills = sorted({*self._fills, *fills})
+
+    def trace(self, keyframe: int) -> LightPage:
+        """The light of a keyframe: from memory, from the run folder, or traced now."""
+        return self._trace(keyframe)
 
     def around(self, frame: int) -> tuple[LightCache, LightCache]:
         """What is known of the very view of a frame, and what is known near it.

@@ -51,10 +51,8 @@ class Verdict:
         return Verdict(**{**table, "items": tuple(table["items"])})
 
 
-def refine(
-    workshop: Workshop, segment: Segment, whole: Verdict | None = None
-) -> list[tuple[Segment, Verdict]]:
-    """Split a segment until what is reused in it can't be told from what is traced.
+def refine(workshop: Workshop, segment: Segment, whole: Verdict | None = None) -> None:
+    """Judge a segment: it is split until what is reused in it can't be told from what is traced.
 
     Or until splitting helps no more: differences that do not shrink with the segment, such as the
     aliasing of keyframes sampled at pixel centres, are not those of reuse.
@@ -65,19 +63,9 @@ def refine(
     segment
     whole
         Verdict on the segment of which this is a half.
-
-    Returns
-    -------
-    list of (Segment, Verdict)
-        The segments that remain, in order.
     """
-    verdict = _recorded(workshop, segment) or _judge_and_record(workshop, segment, whole)
-    workshop.monitor.advance()
-    if not verdict.is_split or verdict.middle is None:
-        return [(segment, verdict)]
-    halves = segment.split(verdict.middle)
-    workshop.monitor.extend(len(halves))
-    return [kept for half in halves for kept in refine(workshop, half, verdict)]
+    if not workshop.run.done(segment_unit(workshop, segment)):
+        _judge_and_record(workshop, segment, whole)
 
 
 def segment_unit(workshop: Workshop, segment: Segment) -> str:
@@ -85,12 +73,7 @@ def segment_unit(workshop: Workshop, segment: Segment) -> str:
     return f"segment {workshop.number(segment.first)}-{workshop.number(segment.last)}"
 
 
-def _recorded(workshop: Workshop, segment: Segment) -> Verdict | None:
-    line = workshop.run.done(segment_unit(workshop, segment))
-    return Verdict.from_dict(line["verdict"]) if line else None
-
-
-def _judge_and_record(workshop: Workshop, segment: Segment, whole: Verdict | None) -> Verdict:
+def _judge_and_record(workshop: Workshop, segment: Segment, whole: Verdict | None) -> None:
     workshop.keyframe(segment.first)
     workshop.keyframe(segment.last)
     verdict = judge(workshop, segment)
@@ -105,7 +88,6 @@ def _judge_and_record(workshop: Workshop, segment: Segment, whole: Verdict | Non
         depth=segment.depth,
         verdict=verdict.to_dict(),
     )
-    return verdict
 
 
 def judge(workshop: Workshop, segment: Segment) -> Verdict:

@@ -6,21 +6,22 @@ import resource
 from typing import Any
 
 from enfilade.pipeline.survey import Survey
-from enfilade.pipeline.workshop import Workshop
-from enfilade.store import tally
+from enfilade.store import Run, tally
 
 
-def summarize(workshop: Workshop, survey: Survey, video: str) -> dict[str, Any]:
+def summarize(run: Run, survey: Survey, video: str, *, has_workers: bool) -> dict[str, Any]:
     """Gather the figures of a finished run.
 
     Returns
     -------
     dict
-        Those of :func:`~enfilade.store.tally`; ``peak_memory_bytes``: of this process; ``video``.
+        Those of :func:`~enfilade.store.tally`; ``peak_memory_bytes``: of this process or of the largest of
+        its workers; ``video``.
     """
-    run = workshop.run
+    children = [resource.RUSAGE_CHILDREN] if has_workers else []
+    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, *children))
     return {
         **tally(run.identity, run.lines(), survey.speed_deg_s),
-        "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "peak_memory_bytes": peak * 1024,
         "video": video,
     }

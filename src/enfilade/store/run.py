@@ -321,7 +321,7 @@ class Run:
 
     def _is_sound(self, name: str, line: Mapping[str, Any]) -> bool:
         file, record = self.folder / name, line["files"][name]
-        return _size(file) == record["bytes"] and _record(file) == record
+        return bool(_size(file) == record["bytes"] and _record(file) == record)
 
     def _relative(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix()

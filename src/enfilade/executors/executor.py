@@ -1,0 +1,171 @@
+"""The seam between who hands out units and who does them. Only JSON crosses it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol
+
+from enfilade import errors
+from enfilade.executors.unit import Unit
+
+Tell = Callable[[str, Any], None]
+Worker = Callable[[str, Mapping[str, Any]], None]
+
+
+class Maker(Protocol):
+    """What makes a worker."""
+
+    def make(self, tell: Tell, *, share: int = 1) -> Worker:
+        """Make it; see :meth:`Recipe.make`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a worker is made, anywhere.
+
+    Attributes
+    ----------
+    target : str
+        ``package.module:function``. Called with `spec` and with what takes its reports, it returns a function
+        that does a unit, given its kind and facts.
+    spec : mapping
+        Fit for JSON.
+    """
+
+    target: str
+    spec: Mapping[str, Any] = field(default_factory=dict)
+
+    def make(self, tell: Tell, *, share: int = 1) -> Worker:
+        """Make the worker.
+
+        Parameters
+        ----------
+        tell
+            Takes reports: what it is, and a value fit for JSON.
+        share
+            The worker shall use one part in so many of the memory that it would use.
+        """
+        module, _, function = self.target.partition(":")
+        made: Worker = getattr(importlib.import_module(module), function)({**self.spec, "share": share}, tell)
+        return made
+
+
+class FailureKind(Enum):
+    """What became of a unit that was not finished."""
+
+    DIED = "died"  # its worker did
+    MEMORY = "memory"  # there was too little
+    ERROR = "error"  # it raised something that nobody foresaw
+    REFUSED = "refused"  # an error of ours: it would be the same again
+    DAMAGED = "damaged"  # a file that it needs isn't what was written
+    SPACE = "space"  # the disk is full
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """Why a unit was not finished.
+
+    Attributes
+    ----------
+    kind : FailureKind
+    text : str
+        One line.
+    log : str
+        What else its worker said.
+    error : Exception or None
+        To be raised where the command ends with it.
+    file : str
+        The damaged one.
+    is_final : bool
+        Whether it was tried often enough.
+    """
+
+    kind: FailureKind
+    text: str
+    log: str = ""
+    error: Exception | None = None
+    file: str = ""
+    is_final: bool = False
+
+    @staticmethod
+    def of(error: Exception, log: str = "") -> Failure:
+        """What an exception means."""
+        text = f"{type(error).__name__}: {error}"
+        match error:
+            case errors.DamagedFileError():
+                return Failure(FailureKind.DAMAGED, text, log, error, file=error.file)
+            case errors.NoSpaceError():
+                return Failure(FailureKind.SPACE, text, log, error)
+            case errors.EnfiladeError():
+                return Failure(FailureKind.REFUSED, text, log, error)
+            case MemoryError():
+                return Failure(FailureKind.MEMORY, text, log, error)
+            case RuntimeError() if "out of memory" in str(error).lower():  # Dr.Jit's own
+                return Failure(FailureKind.MEMORY, text, log, error)
+            case _:
+                return Failure(FailureKind.ERROR, text, log, error)
+
+    def to_json(self) -> dict[str, str]:
+        """Fit to be sent; read back by :meth:`from_json`."""
+        error = self.error
+        return {
+            "kind": self.kind.value,
+            "text": self.text,
+            "log": self.log,
+            "file": self.file,
+            "type": type(error).__name__ if isinstance(error, errors.EnfiladeError) else "",
+            "message": str(error),
+        }
+
+    @staticmethod
+    def from_json(table: Mapping[str, str]) -> Failure:
+        """Read back from :meth:`to_json`; an error of ours is that error again."""
+        kind = FailureKind(table["kind"])
+        cls = getattr(errors, table["type"], None) if table["type"] else None
+        error: Exception | None = None
+        if cls is errors.DamagedFileError:
+            error = errors.DamagedFileError(table["message"], table["file"])
+        elif cls is not None:
+            error = cls(table["message"])
+        return Failure(kind, table["text"], table["log"], error, file=table["file"])
+
+
+@dataclass(frozen=True)
+class Event:
+    """A unit's end.
+
+    Attributes
+    ----------
+    slot : int
+        The worker.
+    failure : Failure or None
+        None: it says that it is finished.
+    """
+
+    slot: int
+    failure: Failure | None = None
+
+
+class Executor(Protocol):
+    """Workers that take a unit each."""
+
+    @property
+    def slots(self) -> int:
+        """How many units can be in hand at once."""
+        ...
+
+    def begin(self, slot: int, unit: Unit, *, share: int) -> None:
+        """Give a unit to a worker that has none; see :meth:`Recipe.make`."""
+        ...
+
+    def wait(self, timeout_s: float | None) -> list[Event]:
+        """Wait until units end, or for so long. Reports are told meanwhile."""
+        ...
+
+    def close(self) -> None:
+        """Drop what is in hand and let the workers go. A second call does nothing."""
+        ...

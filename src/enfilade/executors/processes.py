@@ -1,0 +1,156 @@
+"""Worker processes on this machine, supervised: one that dies costs the unit in its hand and nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell
+from enfilade.executors.unit import Unit
+
+RECEIVED = 1 << 16  # bytes taken at once
+LOG_TAIL = 1 << 14  # bytes of a dead worker's log that are kept
+GRACE_S = 5.0  # in which a killed worker must be gone
+
+
+@dataclass(eq=False)
+class _Child:
+    process: subprocess.Popen[bytes]
+    line: socket.socket
+    log: IO[bytes]
+    received: bytes = b""
+    unit: Unit | None = None
+    events: list[Event] = field(default_factory=list)
+
+
+class Processes:
+    """So many worker processes, begun when they are needed, each with one unit in hand.
+
+    They are fresh interpreters, not forks: threads, kernels and devices of this process are not theirs. One
+    whose supervisor dies is killed by the kernel.
+
+    Parameters
+    ----------
+    recipe
+    tell
+        Takes the reports.
+    workers
+    logs
+        Folder for what they print.
+    """
+
+    def __init__(self, recipe: Recipe, tell: Tell, *, workers: int, logs: Path) -> None:
+        self._recipe = recipe
+        self._tell = tell
+        self._logs = logs
+        self._children: dict[int, _Child] = {}
+        self._selector = selectors.DefaultSelector()
+        self.slots = workers
+
+    @property
+    def pids(self) -> list[int]:
+        """Numbers of the worker processes."""
+        return [child.process.pid for child in self._children.values()]
+
+    def begin(self, slot: int, unit: Unit, *, share: int) -> None:
+        """Send a unit to a worker."""
+        child = self._children.get(slot) or self._spawn(slot)
+        child.unit = unit
+        order = {"kind": unit.kind, "facts": dict(unit.facts), "share": share}
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # it died: `wait` finds it
+            child.line.sendall(json.dumps(order).encode() + b"\n")
+
+    def wait(self, timeout_s: float | None) -> list[Event]:
+        """Hear what the workers report, and bury those that died."""
+        events: list[Event] = []
+        if not any(child.unit for child in self._children.values()):
+            return events
+        for key, _ in self._selector.select(timeout_s):
+            events += self._hear(key.data)
+        return events
+
+    def close(self) -> None:
+        """Kill the workers: what they have in hand is dropped."""
+        for slot in list(self._children):
+            self._end(slot)
+        self._selector.close()
+
+    def _spawn(self, slot: int) -> _Child:
+        self._logs.mkdir(parents=True, exist_ok=True)
+        ours, theirs = socket.socketpair()
+        log = (self._logs / f"worker-{slot}.log").open("wb+")
+        command = [sys.executable, "-m", "enfilade.executors.child", str(theirs.fileno()), str(os.getpid())]
+        with theirs:
+            process = subprocess.Popen(  # noqa: S603
+                command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=log, stderr=log
+            )
+        child = _Child(process, ours, log)
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            ours.sendall(json.dumps(asdict(self._recipe)).encode() + b"\n")
+        self._children[slot] = child
+        self._selector.register(ours, selectors.EVENT_READ, slot)
+        return child
+
+    def _hear(self, slot: int) -> list[Event]:
+        child = self._children[slot]
+        try:
+            data = child.line.recv(RECEIVED)
+        except ConnectionResetError:
+            data = b""
+        if not data:
+            return self._bury(slot)
+        *lines, child.received = (child.received + data).split(b"\n")
+        return [event for text in lines for event in self._said(slot, child, json.loads(text))]
+
+    def _said(self, slot: int, child: _Child, message: list[Any]) -> list[Event]:
+        what, value = message
+        if what not in ("done", "failed"):
+            self._tell(what, value)
+            return []
+        child.unit = None
+        return [Event(slot, None if what == "done" else Failure.from_json(value))]
+
+    def _bury(self, slot: int) -> list[Event]:
+        child = self._children[slot]
+        unit = child.unit
+        code = self._end(slot)
+        if unit is None:  # it had nothing in hand: the next unit gets a new worker
+            return []
+        text = f"its worker {_died_of(code)}"
+        return [Event(slot, Failure(FailureKind.DIED, text, _tail(child.log)))]
+
+    def _end(self, slot: int) -> int:
+        child = self._children.pop(slot)
+        self._selector.unregister(child.line)
+        child.line.close()
+        if child.process.poll() is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):  # it closes its end before it is gone
+                child.process.wait(0.2)
+        if child.process.poll() is None:
+            child.process.kill()
+        return child.process.wait(GRACE_S)
+
+
+def _died_of(code: int) -> str:
+    if code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        return f"was killed by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was killed by signal {-code}"
+
+
+def _tail(log: IO[bytes]) -> str:
+    with log:
+        log.seek(0, os.SEEK_END)
+        log.seek(max(log.tell() - LOG_TAIL, 0))
+        return log.read().decode(errors="replace")

@@ -1,0 +1,284 @@
+"""Who renders a run: the units of its blueprint, handed to the workers of an executor until all are done."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from enfilade.codec import whole_file
+from enfilade.device import active
+from enfilade.errors import EnfiladeError, NoSpaceError, UnfinishedError
+from enfilade.executors import (
+    ATTEMPTS,
+    Executor,
+    Failure,
+    FailureKind,
+    Graph,
+    Recipe,
+    Unit,
+    open_executor,
+    supervise,
+)
+from enfilade.executors.inprocess import InProcess
+from enfilade.monitor import Monitor
+from enfilade.pipeline.job import Job
+from enfilade.pipeline.units import Blueprint
+from enfilade.pipeline.worker import Worker, smaller
+from enfilade.store import Run
+
+ASIDE = "failed"  # folder for the logs of units that were set aside
+LOGS = "logs"  # folder for what worker processes print
+REPAIRS = 1000  # damaged files that are mended in one go, before something else must be wrong
+SHOWN = 5  # units named in a message
+MB = 1_000_000
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who does the work. It changes no result.
+
+    Attributes
+    ----------
+    executor : str
+        One of :data:`~enfilade.executors.EXECUTORS`.
+    workers : int or None
+        How many of them; None: one for each CPU core.
+    threads : int
+        Of each worker process; 0: its share of the cores.
+    """
+
+    executor: str = "in-process"
+    workers: int | None = None
+    threads: int = 0
+
+
+def carry_out(
+    job: Job,
+    run: Run,
+    crew: Crew,
+    monitor: Monitor,
+    *,
+    is_wanted: Callable[[Unit], bool] | None = None,
+) -> Blueprint:
+    """Do all units of a run that are not done.
+
+    Parameters
+    ----------
+    job
+    run
+        Opened to write in it. Whatever workers finish, this process records.
+    crew
+    monitor
+    is_wanted
+        Which units are this command's share; others must be finished before, or are left.
+
+    Returns
+    -------
+    Blueprint
+
+    Raises
+    ------
+    UnfinishedError
+        Some units failed again and again and were set aside; the rest is done.
+    NoSpaceError
+        The disk is full. What is finished stays.
+    EnfiladeError
+        What the stages raise.
+    """
+    for _ in range(REPAIRS):
+        shift = _Shift(job, run, crew, monitor, is_wanted or _everything)
+        damaged = shift.work()
+        if damaged is None:
+            return shift.blueprint
+        run.forget(damaged)
+        monitor.say(f"{damaged} is missing or damaged: what made it is done again")
+    raise EnfiladeError(f"more than {REPAIRS} files of {run.folder} were damaged while it was worked on")
+
+
+def _everything(_unit: Unit) -> bool:
+    return True
+
+
+class _Shift:
+    """One pass over the units, until all are done or a damaged file is found."""
+
+    def __init__(
+        self, job: Job, run: Run, crew: Crew, monitor: Monitor, is_wanted: Callable[[Unit], bool]
+    ) -> None:
+        self.blueprint = Blueprint(job, run)
+        self._job = job
+        self._run = run
+        self._crew = crew
+        self._monitor = monitor
+        self._is_wanted = is_wanted
+        self._graph = Graph()
+        self._progress = _Progress(monitor)
+
+    def work(self) -> str | None:
+        """Returns the name of a damaged file, if one is found."""
+        self._take_up(self.blueprint.first())
+        if not [unit for unit in self._graph.unfinished() if self._is_wanted(unit)]:
+            return None
+        executor = self._executor()
+        try:
+            ending = supervise(
+                self._graph,
+                executor,
+                follow=self._finished,
+                is_done=self.blueprint.is_done,
+                failed=self._failed,
+            )
+        except NoSpaceError as error:
+            raise self._no_space(error) from error
+        finally:
+            executor.close()
+        stopped = ending.stopped
+        if stopped is not None and stopped.kind is not FailureKind.DAMAGED:
+            reason = stopped.error or EnfiladeError(stopped.text)
+            raise self._no_space(reason) if stopped.kind is FailureKind.SPACE else reason
+        if ending.aside:
+            self._set_aside(ending.aside)
+        return None if stopped is None else stopped.file
+
+    def _executor(self) -> Executor:
+        if self._crew.executor == "in-process":
+            return InProcess(_Here(self._job, self._run, self._monitor), self._told)
+        threads = self._crew.threads or self._share_of_cores()
+        spec = {"folder": str(self._run.folder.resolve()), "device": active().backend, "threads": threads}
+        recipe = Recipe("enfilade.pipeline.hire:open_worker", spec)
+        return open_executor(
+            self._crew.executor,
+            recipe,
+            self._told,
+            workers=self._crew.workers,
+            logs=self._run.folder / LOGS,
+        )
+
+    def _share_of_cores(self) -> int:
+        cores = len(os.sched_getaffinity(0))
+        return max(cores // (self._crew.workers or cores), 1)
+
+    def _take_up(self, units: Any) -> None:
+        """Add units to the graph; those that are done bring theirs at once."""
+        pending = deque(units)
+        while pending:
+            unit = pending.popleft()
+            is_done = not unit.is_gate and self.blueprint.is_done(unit)
+            if not unit.is_gate and not is_done and not self._is_wanted(unit):
+                continue
+            if is_done:
+                self._graph.finish(unit.name)
+            self._graph.add(unit)
+            self._progress.add(unit)
+            if is_done:
+                self._progress.finish(unit)
+                pending.extend(self.blueprint.follow(unit))
+
+    def _finished(self, unit: Unit) -> tuple[Unit, ...]:
+        self._progress.finish(unit)
+        self._take_up(self.blueprint.follow(unit))
+        return ()
+
+    def _told(self, what: str, value: Any) -> None:
+        match what:
+            case "line":
+                self._run.record(value)
+            case "stage" | "advance" | "extend" | "say":
+                getattr(self._monitor, what)(*value)
+
+    def _failed(self, unit: Unit, failure: Failure, attempt: int) -> None:
+        after = "it is set aside" if attempt >= ATTEMPTS or failure.is_final else "it is tried again"
+        if failure.kind in (FailureKind.MEMORY, FailureKind.DIED) and attempt < ATTEMPTS:
+            after += " with fewer paths in flight"
+        self._monitor.say(f"{unit.name}: {failure.text}; {after}")
+
+    def _set_aside(self, aside: list[tuple[Unit, list[Failure]]]) -> None:
+        names = tuple(unit.name for unit, _ in aside)
+        for unit, failures in aside:
+            parts = [f"attempt {n}: {f.text}\n\n{f.log}\n" for n, f in enumerate(failures, 1)]
+            file = self._run.folder / ASIDE / f"{re.sub(r'[^a-z0-9-]+', '-', unit.name.lower())}.log"
+            with whole_file(file) as beside:
+                beside.write_text("".join(parts), encoding="utf-8")
+        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+        left = len(self._graph.unfinished())
+        raise UnfinishedError(
+            f"{len(names)} of the run's units failed again and again: {shown} ({aside[0][1][-1].text}); "
+            f"their logs are in {self._run.folder / ASIDE}. The rest is done but for {left} that need them; "
+            "the same command tries them again",
+            names,
+        )
+
+    def _no_space(self, error: Exception) -> NoSpaceError:
+        need = bytes_needed(self._run, [unit.name for unit in self._graph.unfinished()])
+        free = shutil.disk_usage(self._run.folder).free
+        told = (
+            f"what is left will need about {max(need / MB, 1.0):.0f} MB"
+            if need
+            else "what is left needs room"
+        )
+        return NoSpaceError(f"{error} ({told}; {free / MB:.1f} MB are free)")
+
+
+class _Here:
+    """The recipe of the worker that is this process: it writes in the run itself."""
+
+    def __init__(self, job: Job, run: Run, monitor: Monitor) -> None:
+        self._job = job
+        self._run = run
+        self._monitor = monitor
+
+    def make(self, tell: Any, *, share: int = 1) -> Callable[[str, Mapping[str, Any]], None]:
+        """Make the worker."""
+        del tell
+        return Worker(smaller(self._job, share), self._run, self._monitor).do
+
+
+class _Progress:
+    """Counts units for a monitor, by stage."""
+
+    def __init__(self, monitor: Monitor) -> None:
+        self._monitor = monitor
+        self._totals: dict[str, int] = {}
+        self._begun: set[str] = set()
+        self._now = ""
+
+    def add(self, unit: Unit) -> None:
+        """Take up a unit."""
+        if not unit.stage:
+            return
+        if unit.stage not in self._begun:
+            self._totals[unit.stage] = self._totals.get(unit.stage, 0) + 1
+        elif unit.stage == self._now:
+            self._monitor.extend(1)
+        else:
+            self._totals[unit.stage] = self._totals.get(unit.stage, 0) + 1
+
+    def finish(self, unit: Unit) -> None:
+        """Count a unit as done."""
+        if not unit.stage:
+            self._now = ""
+            return
+        if unit.stage != self._now:
+            self._now = unit.stage
+            self._begun.add(unit.stage)
+            self._monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
+        self._monitor.advance()
+
+
+def bytes_needed(run: Run, names: list[str]) -> float:
+    """What units of these names will take on the disk, from what others of their kind took."""
+    sizes: dict[str, list[int]] = {}
+    for line in run.lines():
+        sizes.setdefault(line["unit"].partition(" ")[0], []).append(
+            sum(record["bytes"] for record in line["files"].values())
+        )
+    kinds = [name.partition(" ")[0] for name in names]
+    # A frame nobody has finished yet takes as much as one on its way to it.
+    known = {kind: sum(found) / len(found) for kind, found in sizes.items()}
+    usual = max(known.values(), default=0.0)
+    return sum(known.get(kind, usual) for kind in kinds)

@@ -1,0 +1,63 @@
+"""How a worker begins in a process of its own: it chooses the device before anything binds to one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from enfilade.device import activate, load
+from enfilade.executors.executor import Tell
+
+
+def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
+    """Open a worker in a process of its own, or in a Ray worker.
+
+    Parameters
+    ----------
+    spec
+        ``folder`` of the run; ``device``: Dr.Jit's name of it; ``threads``, 0 for one a core; ``share``: see
+        :meth:`~enfilade.executors.Recipe.make`.
+    tell
+        Takes reports: ``line`` with a line of the ledger, or a call of a monitor by its name.
+
+    Returns
+    -------
+    callable
+        Takes kind and facts of a unit, and does it.
+
+    Raises
+    ------
+    RunFolderError
+    DeviceError
+    """
+    activate("gpu" if spec["device"] == "cuda" else "cpu")
+    load().set_thread_count(spec["threads"] or len(os.sched_getaffinity(0)))
+    from enfilade.pipeline.job import read_job
+    from enfilade.pipeline.worker import Worker, smaller
+    from enfilade.store import Run
+
+    folder = Path(spec["folder"])
+    job = smaller(read_job(folder), spec["share"])
+    run = Run.joining(folder, lambda line: tell("line", line))
+    return Worker(job, run, _Distant(tell)).do
+
+
+class _Distant:
+    """A monitor elsewhere."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+
+    def stage(self, name: str, total: int) -> None:
+        self._tell("stage", [name, total])
+
+    def advance(self, count: int = 1) -> None:
+        self._tell("advance", [count])
+
+    def extend(self, count: int) -> None:
+        self._tell("extend", [count])
+
+    def say(self, text: str) -> None:
+        self._tell("say", [text])
