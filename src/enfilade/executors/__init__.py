@@ -7,7 +7,7 @@ workers that die.
 from enfilade.executors.executor import Event, Executor, Failure, FailureKind, Recipe
 from enfilade.executors.graph import Graph
 from enfilade.executors.opener import EXECUTORS, open_executor
-from enfilade.executors.supervise import ATTEMPTS, supervise
+from enfilade.executors.supervisor import ATTEMPTS, supervise
 from enfilade.executors.unit import Unit
 
 __all__ = [

@@ -10,9 +10,9 @@ import signal
 import socket
 import subprocess
 import sys
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell
 from enfilade.executors.unit import Unit
@@ -26,10 +26,9 @@ GRACE_S = 5.0  # in which a killed worker must be gone
 class _Child:
     process: subprocess.Popen[bytes]
     line: socket.socket
-    log: IO[bytes]
+    log: Path
     received: bytes = b""
     unit: Unit | None = None
-    events: list[Event] = field(default_factory=list)
 
 
 class Processes:
@@ -87,13 +86,13 @@ class Processes:
     def _spawn(self, slot: int) -> _Child:
         self._logs.mkdir(parents=True, exist_ok=True)
         ours, theirs = socket.socketpair()
-        log = (self._logs / f"worker-{slot}.log").open("wb+")
+        file = self._logs / f"worker-{slot}.log"
         command = [sys.executable, "-m", "enfilade.executors.child", str(theirs.fileno()), str(os.getpid())]
-        with theirs:
+        with theirs, file.open("wb") as log:
             process = subprocess.Popen(  # noqa: S603
                 command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
-        child = _Child(process, ours, log)
+        child = _Child(process, ours, file)
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             ours.sendall(json.dumps(asdict(self._recipe)).encode() + b"\n")
         self._children[slot] = child
@@ -149,8 +148,5 @@ def _died_of(code: int) -> str:
         return f"was killed by signal {-code}"
 
 
-def _tail(log: IO[bytes]) -> str:
-    with log:
-        log.seek(0, os.SEEK_END)
-        log.seek(max(log.tell() - LOG_TAIL, 0))
-        return log.read().decode(errors="replace")
+def _tail(log: Path) -> str:
+    return log.read_bytes()[-LOG_TAIL:].decode(errors="replace")

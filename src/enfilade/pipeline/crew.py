@@ -7,6 +7,7 @@ import re
 import shutil
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -90,13 +91,20 @@ def carry_out(
     EnfiladeError
         What the stages raise.
     """
-    for _ in range(REPAIRS):
-        shift = _Shift(job, run, crew, monitor, is_wanted or _everything)
-        damaged = shift.work()
-        if damaged is None:
-            return shift.blueprint
-        run.forget(damaged)
-        monitor.say(f"{damaged} is missing or damaged: what made it is done again")
+    with ExitStack() as stack:
+        executor: Executor | None = None
+        for _ in range(REPAIRS):
+            shift = _Shift(job, run, monitor, is_wanted or _everything)
+            if not shift.has_work:
+                return shift.blueprint
+            if executor is None:
+                executor = _open(job, run, crew, monitor)
+                stack.callback(executor.close)
+            damaged = shift.work(executor)
+            if damaged is None:
+                return shift.blueprint
+            run.forget(damaged)
+            monitor.say(f"{damaged} is missing or damaged: what made it is done again")
     raise EnfiladeError(f"more than {REPAIRS} files of {run.folder} were damaged while it was worked on")
 
 
@@ -104,27 +112,42 @@ def _everything(_unit: Unit) -> bool:
     return True
 
 
+def _open(job: Job, run: Run, crew: Crew, monitor: Monitor) -> Executor:
+    def told(what: str, value: Any) -> None:
+        match what:
+            case "line":
+                run.record(value)
+            case "stage" | "advance" | "extend" | "say":
+                getattr(monitor, what)(*value)
+
+    if crew.executor == "in-process":
+        return InProcess(_Here(job, run, monitor), told)
+    cores = len(os.sched_getaffinity(0))
+    threads = crew.threads or max(cores // (crew.workers or cores), 1)
+    spec = {"folder": str(run.folder.resolve()), "device": active().backend, "threads": threads}
+    recipe = Recipe("enfilade.pipeline.hire:open_worker", spec)
+    return open_executor(crew.executor, recipe, told, workers=crew.workers, logs=run.folder / LOGS)
+
+
 class _Shift:
     """One pass over the units, until all are done or a damaged file is found."""
 
-    def __init__(
-        self, job: Job, run: Run, crew: Crew, monitor: Monitor, is_wanted: Callable[[Unit], bool]
-    ) -> None:
+    def __init__(self, job: Job, run: Run, monitor: Monitor, is_wanted: Callable[[Unit], bool]) -> None:
         self.blueprint = Blueprint(job, run)
-        self._job = job
         self._run = run
-        self._crew = crew
         self._monitor = monitor
         self._is_wanted = is_wanted
         self._graph = Graph()
         self._progress = _Progress(monitor)
-
-    def work(self) -> str | None:
-        """Returns the name of a damaged file, if one is found."""
         self._take_up(self.blueprint.first())
-        if not [unit for unit in self._graph.unfinished() if self._is_wanted(unit)]:
-            return None
-        executor = self._executor()
+
+    @property
+    def has_work(self) -> bool:
+        """Whether something is to be done."""
+        return any(self._is_wanted(unit) for unit in self._graph.unfinished())
+
+    def work(self, executor: Executor) -> str | None:
+        """Returns the name of a damaged file, if one is found."""
         try:
             ending = supervise(
                 self._graph,
@@ -135,8 +158,6 @@ class _Shift:
             )
         except NoSpaceError as error:
             raise self._no_space(error) from error
-        finally:
-            executor.close()
         stopped = ending.stopped
         if stopped is not None and stopped.kind is not FailureKind.DAMAGED:
             reason = stopped.error or EnfiladeError(stopped.text)
@@ -144,24 +165,6 @@ class _Shift:
         if ending.aside:
             self._set_aside(ending.aside)
         return None if stopped is None else stopped.file
-
-    def _executor(self) -> Executor:
-        if self._crew.executor == "in-process":
-            return InProcess(_Here(self._job, self._run, self._monitor), self._told)
-        threads = self._crew.threads or self._share_of_cores()
-        spec = {"folder": str(self._run.folder.resolve()), "device": active().backend, "threads": threads}
-        recipe = Recipe("enfilade.pipeline.hire:open_worker", spec)
-        return open_executor(
-            self._crew.executor,
-            recipe,
-            self._told,
-            workers=self._crew.workers,
-            logs=self._run.folder / LOGS,
-        )
-
-    def _share_of_cores(self) -> int:
-        cores = len(os.sched_getaffinity(0))
-        return max(cores // (self._crew.workers or cores), 1)
 
     def _take_up(self, units: Any) -> None:
         """Add units to the graph; those that are done bring theirs at once."""
@@ -183,13 +186,6 @@ class _Shift:
         self._progress.finish(unit)
         self._take_up(self.blueprint.follow(unit))
         return ()
-
-    def _told(self, what: str, value: Any) -> None:
-        match what:
-            case "line":
-                self._run.record(value)
-            case "stage" | "advance" | "extend" | "say":
-                getattr(self._monitor, what)(*value)
 
     def _failed(self, unit: Unit, failure: Failure, attempt: int) -> None:
         after = "it is set aside" if attempt >= ATTEMPTS or failure.is_final else "it is tried again"

@@ -1,0 +1,158 @@
+"""Workers that die, raise, starve or find the disk full: what is lost, tried again, set aside."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.executors import ATTEMPTS, FailureKind, Graph, Recipe, Unit, open_executor, supervise
+from enfilade.executors.processes import Processes
+
+TESTS = Path(__file__).parents[1]
+
+
+def nothing(*reports):
+    return ()
+
+
+@pytest.fixture(params=["in-process", "processes"])
+def name(request):
+    return request.param
+
+
+@pytest.fixture
+def work(tmp_path, monkeypatch):
+    """Do units with toy workers; returns the ending, who was told of what, and the folder."""
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.01)
+
+    def do(name, units, workers=2, follow=nothing, **spec):
+        told, failures, graph = [], [], Graph()
+        for unit in units:
+            graph.add(unit)
+        recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path), **spec})
+        executor = open_executor(
+            name, recipe, lambda *r: told.append(r), workers=workers, logs=tmp_path / "logs"
+        )
+        try:
+            ending = supervise(
+                graph,
+                executor,
+                follow=follow,
+                is_done=lambda unit: (tmp_path / unit.name).exists(),
+                failed=lambda unit, failure, attempt: failures.append((unit.name, failure.kind, attempt)),
+            )
+        finally:
+            executor.close()
+        return ending, told, failures
+
+    do.folder = tmp_path
+    return do
+
+
+def unit(name, kind="fine", needs=(), **facts):
+    return Unit(name, kind, {"name": name, **facts}, needs)
+
+
+def done(work):
+    return sorted(f.name for f in work.folder.iterdir() if f.is_file() and not f.suffix)
+
+
+def test_all_is_done_also_what_follows(work, name):
+    def follow(finished):
+        return [unit(finished.name + "x", needs=(finished.name,))] if len(finished.name) < 3 else []
+
+    ending, told, failures = work(name, [unit("a"), unit("b", needs=("a",))], follow=follow)
+    assert not ending.aside
+    assert not ending.stopped
+    assert not failures
+    assert done(work) == ["a", "ax", "axx", "b", "bx", "bxx"]
+    assert sorted(line["unit"] for _, line in told) == done(work)
+
+
+@pytest.mark.parametrize("kind", ["killed", "exits"])
+def test_a_worker_that_dies_costs_its_unit_alone(work, kind):
+    ending, _, failures = work(
+        "processes", [unit(c, seconds=0.05) for c in "abc"] + [unit("k", kind, times=2)]
+    )
+    assert not ending.aside
+    assert done(work) == ["a", "b", "c", "k"]
+    assert failures == [("k", FailureKind.DIED, 1), ("k", FailureKind.DIED, 2)]
+    tries = [line.split() for line in (work.folder / "k.tries").read_text().splitlines()]
+    assert [share for share, _ in tries] == ["1", "4", "16"]  # the kernel kills who takes too much memory
+    assert len({pid for _, pid in tries}) == 3
+    assert all(len((work.folder / f"{c}.tries").read_text().splitlines()) == 1 for c in "abc")
+
+
+def test_a_unit_that_kills_every_worker_is_set_aside_and_the_rest_goes_on(work):
+    units = [unit("p", "killed"), unit("a"), unit("b", needs=("p",)), unit("c")]
+    ending, _, _ = work("processes", units)
+    assert done(work) == ["a", "c"]
+    [(aside, failures)] = ending.aside
+    assert aside.name == "p"
+    assert len(failures) == ATTEMPTS == 4
+    assert failures[0].text == "its worker was killed by SIGKILL"
+    assert "last words" in failures[0].log
+
+
+def test_an_error_nobody_foresaw_is_tried_again_then_set_aside(work, name):
+    ending, _, failures = work(name, [unit("r", "raises", times=1), unit("s", "raises"), unit("a")])
+    assert done(work) == ["a", "r"]
+    [(aside, own)] = ending.aside
+    assert aside.name == "s"
+    assert own[0].text == "ZeroDivisionError: by nought"
+    assert "Traceback" in own[0].log
+    assert [f for f in failures if f[0] == "r"] == [("r", FailureKind.ERROR, 1)]
+    assert {line.split()[0] for line in (work.folder / "r.tries").read_text().splitlines()} == {"1"}
+
+
+def test_what_had_too_little_memory_is_done_with_less(work, name):
+    ending, _, _ = work(name, [unit("m", "starves", times=2)])
+    assert not ending.aside
+    assert [t.split()[0] for t in (work.folder / "m.tries").read_text().splitlines()] == ["1", "4", "16"]
+
+
+@pytest.mark.parametrize(("kind", "what"), [("damaged", FailureKind.DAMAGED), ("full", FailureKind.SPACE)])
+def test_what_another_try_would_not_mend_ends_it(work, name, kind, what):
+    units = [unit("a"), unit("f", kind, needs=("a",)), unit("z", needs=("f",))]
+    ending, _, _ = work(name, units, workers=1)
+    assert ending.stopped.kind is what
+    assert isinstance(ending.stopped.error, EnfiladeError)
+    assert ending.stopped.file == ("raw/0001.exr" if kind == "damaged" else "")
+    assert done(work) == ["a"]
+
+
+def test_a_worker_that_can_not_begin_says_why(work, name):
+    ending, _, _ = work(name, [unit("a")], refuses=True)
+    assert isinstance(ending.stopped.error, SettingsError)
+    assert str(ending.stopped.error) == "no such scene"
+
+
+def test_one_that_says_it_is_finished_and_is_not_has_failed(work, name):
+    ending, _, failures = work(name, [unit("l", "lies", times=1), unit("m", "lies")])
+    assert done(work) == ["l"]
+    assert [aside.name for aside, _ in ending.aside] == ["m"]
+    assert failures[0][1] is FailureKind.ERROR
+
+
+def test_workers_go_with_who_closes_them(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path)})
+    executor = Processes(recipe, nothing, workers=2, logs=tmp_path / "logs")
+    executor.begin(0, unit("h", "hangs"), share=1)
+    while not (tmp_path / "h.tries").exists():
+        time.sleep(0.01)
+    [pid] = executor.pids
+    begin = time.monotonic()
+    executor.close()
+    executor.close()
+    assert not Path(f"/proc/{pid}").exists()
+    assert time.monotonic() - begin < 4.0
+
+
+def test_unknown_executors_are_refused(tmp_path):
+    with pytest.raises(
+        SettingsError, match=r"'threads'; choose one of in-process, processes, ray, ray:ADDRESS"
+    ):
+        open_executor("threads", Recipe(""), nothing, workers=1, logs=tmp_path)
