@@ -12,6 +12,8 @@ from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import JOB_SECTIONS, crew_of, crew_options, job_of, job_options, output_options
 
+LEDGER = "ledger.jsonl"
+
 
 @click.command(
     "render", cls=SettingsCommand, short_help="Render a walkthrough: frames, video, report of the cost."
@@ -46,11 +48,10 @@ def command(
     from enfilade.cli.progress import watch
     from enfilade.pipeline.walkthrough import render
 
+    before = _size(folder / LEDGER)
     with watch(quiet=quiet) as monitor:
         summary = render(job, folder, monitor, crew, is_verified=is_verified)
-    from enfilade.report.plots import plot_run
-
-    plots = plot_run(folder)
+    plots = _plots(folder, has_changed=_size(folder / LEDGER) != before)
     if as_json:
         extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
         click.echo(json.dumps({**summary, **extra}, indent=2))
@@ -62,6 +63,20 @@ def command(
         ("run", folder),
     ):
         click.echo(f"{name:7} {file}")
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.exists() else -1
+
+
+def _plots(folder: Path, *, has_changed: bool) -> list[Path]:
+    """Draw what the run did; where nothing was done, what was drawn stays."""
+    there = sorted((folder / "plots").glob("*.png"))
+    if there and not has_changed:
+        return there
+    from enfilade.report.plots import plot_run
+
+    return plot_run(folder)
 
 
 def _show(summary: dict[str, Any]) -> None:

@@ -29,7 +29,6 @@ from enfilade.executors.inprocess import InProcess
 from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.units import Blueprint
-from enfilade.pipeline.worker import Worker, smaller
 from enfilade.store import Run
 
 ASIDE = "failed"  # folder for the logs of units that were set aside
@@ -230,6 +229,8 @@ class _Here:
 
     def make(self, tell: Any, *, share: int = 1) -> Callable[[str, Mapping[str, Any]], None]:
         """Make the worker."""
+        from enfilade.pipeline.worker import Worker, smaller
+
         del tell
         return Worker(smaller(self._job, share), self._run, self._monitor).do
 
