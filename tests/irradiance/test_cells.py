@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, Float
+from enfilade.arrays import Array3f, Float, UInt
 from enfilade.irradiance.cells import LEAST_ESTIMATES, LEVELS, Estimates, cell_key
 
 
-def keys(points, normals, width, coarser=0):
+def keys(points, normals, width, coarser=0, item=1):
     points, normals = np.asarray(points, np.float32).T, np.asarray(normals, np.float32).T
-    return np.array(cell_key(Array3f(points), Array3f(normals), Float(width), coarser))
+    return np.array(cell_key(Array3f(points), Array3f(normals), UInt(item), Float(width), coarser))
 
 
 def random_points(count, seed=0):
@@ -33,6 +33,11 @@ def test_a_key_is_a_cell_and_a_side():
     assert len(names) == len(set(cell))
 
 
+def test_items_do_not_meet():
+    points, normals = random_points(500)
+    assert set(keys(points, normals, 0.7, item=3)).isdisjoint(keys(points, normals, 0.7, item=4))
+
+
 def test_levels_do_not_meet():
     points, normals = random_points(500)
     levels = [set(keys(points, normals, 0.7, level)) for level in range(LEVELS)]
@@ -48,7 +53,11 @@ def test_what_was_estimated_is_found_again():
     mean = whole.sums / whole.counts[:, None]
     cells = whole.opened()
     found, is_known = cells.find(
-        Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), Float(0.7), Array3f(0.5)
+        Array3f(points.T.astype(np.float32)),
+        Array3f(normals.T.astype(np.float32)),
+        UInt(1),
+        Float(0.7),
+        Array3f(0.5),
     )
     found, is_known = np.array(found).T, np.array(is_known)
     enough = dict(zip(whole.keys, whole.counts >= LEAST_ESTIMATES, strict=True))
@@ -66,7 +75,7 @@ def test_far_away_nothing_is_known():
     points, _ = random_points(200)
     cells = Estimates.of(keys(points * 0.0, np.tile([0, 0, 1.0], (200, 1)), 0.7), np.ones((200, 3))).opened()
     _, is_known = cells.find(
-        Array3f((points + 50).T.astype(np.float32)), Array3f(0, 0, 1), Float(0.7), Array3f(0.5)
+        Array3f((points + 50).T.astype(np.float32)), Array3f(0, 0, 1), UInt(1), Float(0.7), Array3f(0.5)
     )
     assert not np.array(is_known).any()
 

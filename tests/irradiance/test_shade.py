@@ -10,6 +10,7 @@ from enfilade.irradiance import LightCache, Shader, open_cache, open_page
 from enfilade.pixels.estimate import Estimate, Samples, estimate
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose
+from enfilade.scenes import write_scene
 from enfilade.settings import TraceSettings
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -176,6 +177,13 @@ def test_what_no_page_saw_is_traced(diffuse):
     difference = ((cached.color - reference.color) @ LUMINANCE).mean()
     deviation = np.sqrt((cached.variance + reference.variance).sum()) / cached.variance.size
     assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
+
+
+def test_what_mitsuba_prepares_late_is_no_hindrance(tmp_path):
+    files = write_scene("room", tmp_path, preset="small")  # has meshes that emit
+    renderer = MitsubaRenderer(files.scene, TraceSettings())
+    camera = Camera(look_at((1, 1.5, 1.5), (0, 0.6, 0)), 45.0, 32, 24)
+    assert _shaded(renderer, LightCache(), camera, spp=1).color.any()
 
 
 def test_a_scene_opened_earlier_is_no_hindrance(tmp_path):

@@ -20,8 +20,9 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 LEAST_ESTIMATES = 4  # in a cell that is believed
 STEPS = 22  # of the binary search: up to 4 million cells
-COORDINATE_BITS = 17  # of a cell's place along an axis, which wraps around
+COORDINATE_BITS = 14  # of a cell's place along an axis, which wraps around
 LEVEL_BITS = 6
+ITEM_BITS = 13
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,13 @@ class Cells:
     light: Any
     last: Any
 
-    def find(self, position: Any, normal: Any, width: Any, jitter: Any) -> tuple[Any, Any]:
+    def find(self, position: Any, normal: Any, item: Any, width: Any, jitter: Any) -> tuple[Any, Any]:
         """Light at points of surfaces.
 
         Parameters
         ----------
         position, normal : Array3f
+        item : UInt
         width : Float
             Of the path there, scene units.
         jitter : Array3f
@@ -60,7 +62,7 @@ class Cells:
         """
         light, is_known = Array3f(0), Bool(False)
         for level in range(LEVELS):
-            key = cell_key(position, normal, width, level, jitter)
+            key = cell_key(position, normal, item, width, level, jitter)
             lane = self._search(key)
             is_here = dr.gather(UInt64, self.keys, lane) == key
             light = dr.select(is_here & ~is_known, dr.gather(Array3f, self.light, lane), light)
@@ -78,12 +80,14 @@ class Cells:
         return low
 
 
-def cell_key(position: Any, normal: Any, width: Any, coarser: int, jitter: Any = 0.5) -> Any:
+def cell_key(position: Any, normal: Any, item: Any, width: Any, coarser: int, jitter: Any = 0.5) -> Any:
     """Key of the cell of a point; UInt64.
 
     Parameters
     ----------
     position, normal : Array3f
+    item : UInt
+        Surfaces of several items never share a cell.
     width : Float
         Scene units: a cell is as wide, rounded down to a power of two.
     coarser
@@ -93,7 +97,8 @@ def cell_key(position: Any, normal: Any, width: Any, coarser: int, jitter: Any =
     level = Int(dr.floor(dr.log2(dr.maximum(width, 1e-9)))) + coarser
     size = dr.exp2(Float(level))
     place = Array3f(position) / size + (jitter - 0.5)
-    key = UInt64(UInt(level + (1 << (LEVEL_BITS - 1))) & ((1 << LEVEL_BITS) - 1))
+    key = UInt64(item & ((1 << ITEM_BITS) - 1))
+    key = (key << LEVEL_BITS) | UInt64(UInt(level + (1 << (LEVEL_BITS - 1))) & ((1 << LEVEL_BITS) - 1))
     for axis in place:
         at = UInt(Int(dr.floor(axis))) & ((1 << COORDINATE_BITS) - 1)
         key = (key << COORDINATE_BITS) | UInt64(at)

@@ -337,7 +337,9 @@ class Shader:
             rng.state ^= UNRELATED
             moved = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
             moved = 0.5 + jitter * (moved - 0.5)
-            light, is_in_cell = cache.cells.find(lit.position, lit.surfaces.normal, _width(path, lit), moved)
+            light, is_in_cell = cache.cells.find(
+                lit.position, lit.surfaces.normal, lit.surfaces.item, _width(path, lit), moved
+            )
             found = dr.select(is_known, found, light)
             is_known |= is_in_cell
         sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
@@ -393,7 +395,8 @@ class Shader:
         width = _width(path, lit)
         direct, indirect = self._renderer.light(lit, rng, edges=2 if path.bounce else 1)
         light = Array3f(direct + indirect)
-        keys = tuple(cell_key(lit.position, lit.surfaces.normal, width, level) for level in range(LEVELS))
+        at = lit.position, lit.surfaces.normal, lit.surfaces.item, width
+        keys = tuple(cell_key(*at, level) for level in range(LEVELS))
         return Array3f(path.throughput * lit.surfaces.albedo), light, keys, rng
 
     def _recorded(self, kernel: Any) -> Any:

@@ -7,7 +7,6 @@ since changing its size or crop compiles anew and its Gaussian filter adds in no
 from __future__ import annotations
 
 import re
-import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,9 +31,6 @@ from enfilade.settings import TraceSettings
 UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
-
-# Arrays that kernels read. Dr.Jit counts all materials there are, so that a scene must know of others.
-_states: weakref.WeakKeyDictionary[MitsubaRenderer, Any] = weakref.WeakKeyDictionary()
 
 
 class MitsubaRenderer:
@@ -76,8 +72,10 @@ class MitsubaRenderer:
         self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
         self._file = file
-        items, light = self._items, self._light.state
-        _states[self] = scene, self._integrator, self._onward, items.number, items.is_passable, light
+        # Mitsuba prepares the sampling of a mesh that emits when it is first asked for: now, and not while a
+        # kernel is recorded.
+        if scene.emitters():
+            dr.eval(scene.sample_emitter_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5)))
 
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""
@@ -98,7 +96,9 @@ class MitsubaRenderer:
     @property
     def state(self) -> Any:
         """See :meth:`enfilade.renderer.LightRenderer.state`."""
-        return _states[self], [state for renderer, state in _states.items() if renderer is not self]
+        items = self._items
+        own = self._scene, self._integrator, self._onward, items.number, items.is_passable, items.materials
+        return own, self._light.state
 
     def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
         """Find the first surface along rays, and the light it emits.
@@ -224,6 +224,7 @@ class _Items:
 
     number: Any  # UInt, of a shape
     is_passable: Any  # Bool, of a material
+    materials: Any  # BSDFPtr: tells Dr.Jit to look at all materials there are, also those of no shape
     any_passable: bool
     names: tuple[str, ...]
 
@@ -238,7 +239,8 @@ def _items(scene: Any) -> _Items:
         number[index] = item
         names.append(shape.id() or f"{shape.class_name()} {item}")
     is_passable = _passable_materials(scene)
-    return _Items(UInt(number), Bool(is_passable), bool(is_passable.any()), tuple(names))
+    materials = mi.BSDFPtr([shape.bsdf() for shape in shapes])
+    return _Items(UInt(number), Bool(is_passable), materials, bool(is_passable.any()), tuple(names))
 
 
 def _passable_materials(scene: Any) -> npt.NDArray[np.bool_]:
