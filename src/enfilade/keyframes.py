@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -68,8 +70,11 @@ def _adapted(speed: npt.NDArray[np.float64], spacing: int, adaptation: float) ->
 
 
 def _equal_flow(speed: npt.NDArray[np.float64], spacing: int) -> list[int]:
-    """Split the accumulated flow evenly: the paper's first attempt, which it found worse (§4.2)."""
+    """Split the accumulated flow evenly: the paper's first attempt, which it found worse (§4.2).
+
+    Into as many segments as uniform spacing makes, so that both can be compared.
+    """
     accumulated = np.concatenate([[0.0], np.cumsum(speed[:-1])])
-    count = max(round((len(speed) - 1) / spacing), 1)
+    count = math.ceil((len(speed) - 1) / spacing)
     marks = accumulated[-1] * np.arange(1, count) / count
     return sorted(set(np.searchsorted(accumulated, marks).tolist()))
