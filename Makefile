@@ -2,6 +2,7 @@
 # make test    set up, run the tests; Chromium, which tests the page, by apt where it is missing
 # make validate-metric   set up, judge the metric by what people saw
 # make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
+# make case-studies   set up, run the paper's experiments again, write docs/case-studies.md; PRESET=small is quick
 # make check   set up, run format, lint, type and import-floor checks
 # make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
 # make lock    write requirements.lock anew from pyproject.toml
@@ -11,7 +12,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python libraries browser demo test validate-metric bench check format lock clean
+.PHONY: help setup python libraries browser demo test validate-metric bench case-studies check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -42,6 +43,9 @@ validate-metric: setup
 
 bench: setup
 	$(BIN)/python benchmarks/bench.py $(BENCH)
+
+case-studies: setup
+	$(BIN)/python benchmarks/case_studies.py --preset $(or $(PRESET),full) $(CASES)
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -40,6 +40,18 @@ class Size(click.ParamType[tuple[int, int]]):
 
 
 def job_options(command: Command) -> Command:
+    """Decorate a command with the scene, the camera path, how to look at them, and the method."""
+    method = click.option(
+        "--method",
+        type=click.Choice(METHODS),
+        default="paper",
+        show_default=True,
+        help="Trace every frame (reference), or reuse what may be reused (paper).",
+    )
+    return path_options(method(command))
+
+
+def path_options(command: Command) -> Command:
     """Decorate a command with the scene, the camera path and how to look at them."""
     file = click.Path(path_type=Path)
     for decorate in reversed(
@@ -61,13 +73,6 @@ def job_options(command: Command) -> Command:
                 help="Frames to take, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
             ),
             click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
-            click.option(
-                "--method",
-                type=click.Choice(METHODS),
-                default="paper",
-                show_default=True,
-                help="Trace every frame (reference), or reuse what may be reused (paper).",
-            ),
         ]
     ):
         command = decorate(command)

@@ -106,12 +106,13 @@ def _expected_holes(job: Job, views: Views, segments: list[Segment], monitor: Mo
         length = segment.last - segment.first
         probed = {segment.first + round(length * share) for share in HOLE_PROBES}
         for frame in sorted(probed & set(segment.inbetweens)):
-            holes[frame] = _holes(job, views, segment, frame)
+            holes[frame] = hole_percent(job, views, segment, frame)
         monitor.advance()
     return holes
 
 
-def _holes(job: Job, views: Views, segment: Segment, frame: int) -> float:
+def hole_percent(job: Job, views: Views, segment: Segment, frame: int) -> float:
+    """Share of a frame's pixels that neither keyframe of its segment sees, percent, by geometry alone."""
     ends = [_unshaded(views, end) for end in (segment.first, segment.last)]
     settings = job.settings.warp
     before, after = (warp_keyframe(k, job.path.cameras[frame], settings) for k in ends)

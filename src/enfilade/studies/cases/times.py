@@ -1,0 +1,222 @@
+"""Table 2: how long a frame takes by each way of rendering it (§6).
+
+Under path tracing ART, "fully ray traced frames with antialiasing", is taken as: every frame traced with as
+many paths spread over the pixel as it takes until the metric sees neither aliasing nor noise against a
+reference. RT, "one sample per pixel", is: every frame traced with the keyframes' own number of paths through
+pixels' centres.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.codec import read_exr, read_shading, write_shading
+from enfilade.pipeline.job import Job
+from enfilade.records import F32, Shading
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.studies.cases.case import Case
+from enfilade.studies.cases.seen import Viewer, visible_percent
+
+__all__ = ["PAPER_MINUTES", "art_spp", "measure"]
+
+PAPER_MINUTES = {  # Table 2, for a frame
+    "atrium": {"art": 170.0, "rt": 40.0, "ibr_rt": 20.5},
+    "room": {"art": 6.9, "rt": 1.5, "ibr_rt": 1.1},
+}
+UNSEEN_PERCENT = 1.0  # of the pixels may lie above 1 JND where the metric is said to see nothing
+TIMED_SPP, WARM_SPP = 8, 1  # paths of which one's cost is taken; before that, kernels are compiled
+REFERENCE_SALT = 1  # of the seed: the reference draws other random numbers
+
+
+@dataclass(frozen=True)
+class _Crop:
+    """A part of a frame in its middle."""
+
+    rows: slice
+    columns: slice
+
+    @staticmethod
+    def of(job: Job, size: tuple[int, int]) -> _Crop:
+        width, height = min(size[0], job.path.width), min(size[1], job.path.height)
+        left, top = (job.path.width - width) // 2, (job.path.height - height) // 2
+        return _Crop(slice(top, top + height), slice(left, left + width))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width."""
+        return self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
+
+    def pixels(self, job: Job) -> npt.NDArray[np.uint32]:
+        """Flat indices of its pixels in the frame."""
+        every = np.arange(job.path.width * job.path.height, dtype=np.uint32)
+        chosen = every.reshape(job.path.height, job.path.width)[self.rows, self.columns]
+        return np.ascontiguousarray(chosen).ravel()
+
+    def cut(self, image: Any) -> Any:
+        """That part of an image."""
+        return np.ascontiguousarray(image[self.rows, self.columns])
+
+
+def measure(case: Case) -> dict[str, Any]:
+    """Time every way of rendering, and judge what it gives.
+
+    Returns
+    -------
+    dict
+        ``ways``: of ``art``, ``rt``, ``ibr_rt`` and ``decoupled`` wall and CPU seconds of a frame
+        (``wall_s``, ``cpu_s``), ``spp`` and by ``frames`` the ``score`` and ``visible_percent`` against the
+        reference in the crop, by the paper's metric in motion; ``stages`` where there are several.
+        ``art_series``: the same scores by number of paths. ``art_is_bound``: no number up to the most did.
+        ``path_us``: wall and CPU microseconds of a path.
+    """
+    summary, light = case.rendered(), case.decoupled()
+    frames = _judged_frames(case)
+    judge = _Judge(case)
+    case.monitor.stage(f"{case.name}: ART and reference", len(frames) * (len(_series(case)) + 1))
+    series = {spp: [judge.art(frame, spp) for frame in frames] for spp in _series(case)}
+    spp, is_bound = art_spp(series)
+    cost = {f: _path_cost(case, f, frames) for f in (PixelFilter.CENTRE, PixelFilter.GAUSSIAN)}
+    pixels = case.whole.path.width * case.whole.path.height
+    own = case.whole.settings.trace.spp
+    return {
+        "numbers": [case.whole.path.numbers[f] for f in frames],
+        "reference_spp": case.terms.reference_spp,
+        "crop": list(reversed(judge.crop.size)),
+        "art_is_bound": is_bound,
+        "art_series": [{"spp": n, "frames": said} for n, said in series.items()],
+        "path_us": {f.name.lower(): {k: 1e6 * v for k, v in of.items()} for f, of in cost.items()},
+        "ways": {
+            "art": {"spp": spp, "frames": series[spp], **_scaled(cost[PixelFilter.GAUSSIAN], spp * pixels)},
+            "rt": {"spp": own, "frames": None, **_scaled(cost[PixelFilter.CENTRE], own * pixels)},
+            "ibr_rt": {"spp": own, "frames": judge.run("paper", frames), **_per_frame(summary)},
+            "decoupled": {"spp": None, "frames": judge.run("decoupled", frames), **_per_frame(light)},
+        },
+    }
+
+
+def art_spp(series: dict[int, list[dict[str, float]]]) -> tuple[int, bool]:
+    """The least number of paths at which the metric sees nothing in any of the frames.
+
+    Returns
+    -------
+    int
+        That number, or the largest.
+    bool
+        Whether it is but a lower bound.
+    """
+    for spp in sorted(series):
+        if all(said["visible_percent"] <= UNSEEN_PERCENT for said in series[spp]):
+            return spp, False
+    return max(series), True
+
+
+def _judged_frames(case: Case) -> list[int]:
+    stretch, count = case.stretch, case.terms.crops
+    return [stretch.start + round((len(stretch) - 1) * (k + 0.5) / count) for k in range(count)]
+
+
+def _series(case: Case) -> list[int]:
+    return [2**k for k in range(2, int(np.log2(case.terms.most_spp)) + 1)]
+
+
+class _Judge:
+    """Looks at a part of frames of the whole walk."""
+
+    def __init__(self, case: Case) -> None:
+        self._case = case
+        self._job = case.whole
+        self.crop = _Crop.of(case.whole, case.terms.crop)
+        height, width = self.crop.size
+        self._viewer = Viewer(self._job.viewing.cropped(width, height), self._job.settings.viewing)
+        self._views = case.views(self._job)
+
+    def art(self, frame: int, spp: int) -> dict[str, float]:
+        """Judge a frame that was traced by itself with many paths."""
+        made = self._traced(frame, spp, 0)
+        self._case.monitor.advance()
+        return self._said(frame, made.color)
+
+    def run(self, name: str, frames: list[int]) -> list[dict[str, float]]:
+        """Judge frames of a run folder."""
+        found = []
+        for frame in frames:
+            number = self._job.path.numbers[frame]
+            color = read_exr(self._case.folder / name / "frames" / f"{number:04d}.exr")["RGB"]
+            found.append(self._said(frame, self.crop.cut(color.astype(np.float32))))
+        return found
+
+    def _said(self, frame: int, color: F32) -> dict[str, float]:
+        reference = self._reference(frame).color
+        velocity = self.crop.cut(self._views[frame].velocity_deg_s)
+        jnd = self._viewer.paper(color, reference, velocity)
+        everywhere = np.ones(jnd.shape, bool)
+        score = float(np.mean(jnd.astype(np.float64) ** 3.5) ** (1.0 / 3.5))
+        return {"score": score, "visible_percent": visible_percent(jnd, everywhere) or 0.0}
+
+    def _reference(self, frame: int) -> Shading:
+        file = self._file(frame)
+        if not file.is_file():
+            write_shading(file, self._traced(frame, self._case.terms.reference_spp, REFERENCE_SALT))
+            self._case.monitor.advance()
+        return read_shading(file)
+
+    def _file(self, frame: int) -> Path:
+        terms = self._case.terms
+        name = f"crop-{terms.size[0]}-{terms.crop[0]}x{terms.crop[1]}-{terms.reference_spp}"
+        return self._case.folder / "windows" / name / f"{self._job.path.numbers[frame]:04d}.exr"
+
+    def _traced(self, frame: int, spp: int, salt: int) -> Shading:
+        path, seed = self._job.path, self._job.settings.trace.seed
+        made = self._case.renderer.trace(
+            path.cameras[frame],
+            self.crop.pixels(self._job),
+            spp=spp,
+            seed=(seed + salt) % 2**32,
+            frame=path.numbers[frame],
+            purpose=Purpose.REFERENCE,
+            pixel_filter=PixelFilter.GAUSSIAN,
+        )
+        size = self.crop.size
+        return Shading(made.color.reshape(*size, 3), made.variance.reshape(size), made.dropped)
+
+
+def _path_cost(case: Case, pixel_filter: PixelFilter, frames: list[int]) -> dict[str, float]:
+    """Wall and CPU seconds of one path, the mean over whole frames."""
+    path, wall, cpu = case.whole.path, 0.0, 0.0
+    pixels = np.arange(path.width * path.height, dtype=np.uint32)
+    for frame in frames:
+        for spp in (WARM_SPP, TIMED_SPP):
+            begin, spent = time.perf_counter(), time.process_time()
+            case.renderer.trace(
+                path.cameras[frame],
+                pixels,
+                spp=spp,
+                seed=case.whole.settings.trace.seed,
+                frame=path.numbers[frame],
+                purpose=Purpose.REFERENCE,
+                pixel_filter=pixel_filter,
+            )
+            if spp == TIMED_SPP:
+                wall += time.perf_counter() - begin
+                cpu += time.process_time() - spent
+    paths = len(frames) * TIMED_SPP * len(pixels)
+    return {"wall": wall / paths, "cpu": cpu / paths}
+
+
+def _scaled(path_s: dict[str, float], paths: int) -> dict[str, float]:
+    return {"wall_s": path_s["wall"] * paths, "cpu_s": path_s["cpu"] * paths}
+
+
+def _per_frame(summary: dict[str, Any]) -> dict[str, Any]:
+    """Seconds of a frame, in total and by stage, as the ledger has them."""
+    count, spent = summary["frames"], summary["table2"]
+    stages = {
+        name: {kind: seconds / count for kind, seconds in of.items()} for name, of in spent["stages"].items()
+    }
+    return {"wall_s": spent["total_s"] / count, "cpu_s": spent["cpu_s"] / count, "stages": stages}

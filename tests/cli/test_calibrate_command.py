@@ -1,0 +1,84 @@
+"""``enfilade calibrate threshold``, from the command line to the table."""
+
+import json
+
+import pytest
+
+from enfilade.backends.analytic_scene import scene_text
+from enfilade.cli import main
+from enfilade.studies.cases import threshold
+from scenes_analytic import room
+
+
+@pytest.fixture
+def inputs(tmp_path):
+    """An analytic scene, and a path of ten frames along its front."""
+    scene = tmp_path / "scene.analytic.json"
+    scene.write_text(scene_text(room()))
+
+    def pose(x):
+        return [1, 0, 0, x, 0, 1, 0, 1.4, 0, 0, 1, 3.5, 0, 0, 0, 1]
+
+    cameras = [{"camera_to_world": pose(0.05 * k), "fov": 50, "aspect": 4 / 3} for k in range(10)]
+    file = tmp_path / "camera_path.json"
+    values = {"render_width": 64, "render_height": 48, "fps": 30, "camera_type": "perspective"}
+    file.write_text(json.dumps({**values, "seconds": 1 / 3, "camera_path": cameras}))
+    return [
+        str(scene),
+        "--path",
+        str(file),
+        "--viewing-diagonal-m",
+        "0.025",
+        "--probes",
+        "1",
+        "--spp",
+        "4",
+        "--quiet",
+    ]
+
+
+def test_it_says_the_threshold_with_its_curve(run, inputs, tmp_path):
+    plot = tmp_path / "curve.png"
+    result = run(
+        "calibrate", "threshold", *inputs, "--visible-percent", "100", "--plot", plot, "--device", "cpu"
+    )
+    assert result.exit_code == 0, result.output
+    assert "v_t     0 deg/s" in result.output
+    assert "--masks-slow-deg-s 0" in result.output
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_has_all_of_it_and_traced_frames_are_kept(run, inputs, tmp_path):
+    folder = tmp_path / "kept"
+    result = run("calibrate", "threshold", *inputs, "--out", folder, "--json", "--device", "cpu")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.output)
+    assert found["spp"] == 4
+    assert [row["threshold_deg_s"] for row in found["curve"]] == list(
+        threshold.Calibration().thresholds_deg_s
+    )
+    assert list(folder.rglob("*.exr"))
+    again = run("calibrate", "threshold", *inputs, "--out", folder, "--json", "--device", "cpu")
+    assert json.loads(again.output) == found
+
+
+def test_other_frames_in_the_folder_are_refused(run, inputs, tmp_path):
+    folder = tmp_path / "kept"
+    assert run("calibrate", "threshold", *inputs, "--out", folder, "--device", "cpu").exit_code == 0
+    other = run("calibrate", "threshold", *inputs, "--out", folder, "--seed", "7", "--device", "cpu")
+    assert other.exit_code == 2
+    assert "another run" in other.output
+
+
+def test_no_threshold_is_said(run, inputs):
+    result = run(
+        "calibrate", "threshold", *inputs, "--visible-percent", "0", "--light", "plain", "--device", "cpu"
+    )
+    assert result.exit_code == 0, result.output
+    assert "No threshold up to 5 deg/s" in result.output
+
+
+def test_help_says_what_is_calibrated(run):
+    assert "threshold" in run("calibrate", "--help").output
+    assert "Fig. 9" in run("calibrate", "threshold", "--help").output
+    assert "calibrate" in main.list_commands(None)
