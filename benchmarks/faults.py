@@ -1,0 +1,504 @@
+"""Try to break runs: kill them, fill their disk, flip their bits; compare with a run left alone.
+
+    python benchmarks/faults.py [--quick] [--only kills disk ...] [--seed 1]
+
+kills      SIGKILL for a whole command or one of its workers, at random moments, or in the middle of write,
+           fsync and rename; then resumed to the end
+executors  1, 2 and 7 workers, in process, worker processes and Ray
+cluster    Ray, with workers killed while it works
+disk       a disk that fills up at random points, then gets room; needs root, for a small tmpfs
+bits       a flipped bit in a stored file, found by use or by --verify, and what made it done again
+mitsuba    kills of a tiny Mitsuba scene by --method decoupled
+
+Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+FRAMES, SIZE = 48, "32x24"
+KINDS = ("kills", "executors", "cluster", "disk", "bits", "mitsuba")
+COUNTS = {"kills": 200, "disk": 50, "bits": 50, "mitsuba": 10}
+QUICK = {"kills": 5, "disk": 5, "bits": 5, "mitsuba": 1}
+CLUSTER_KILLS, QUICK_CLUSTER_KILLS = 10, 5
+POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
+STORED = ("keyframes", "cells", "drafts", "raw", "frames")
+TIMEOUT_S = 300
+
+
+@dataclass
+class Tally:
+    """What was tried, and what went wrong."""
+
+    tried: dict[str, int] = field(default_factory=dict)
+    wrong: dict[str, list[str]] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def note(self, kind: str, problem: str | None) -> None:
+        """Count a try; a problem is printed at once."""
+        self.tried[kind] = self.tried.get(kind, 0) + 1
+        if problem:
+            self.wrong.setdefault(kind, []).append(problem)
+            print(f"  {kind}: {problem}", flush=True)
+
+
+@dataclass(frozen=True)
+class Work:
+    """A run that can be made in any folder, and what it must come out as."""
+
+    inputs: tuple[str, ...]
+    whole: Path
+    seconds: float
+
+    @property
+    def digest(self) -> str:
+        """Of the run left alone."""
+        return digest(self.whole)
+
+
+def main() -> int:
+    """Try all; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", type=Path, help="write the tally into this file")
+    parser.add_argument("--die", help=argparse.SUPPRESS)
+    arguments, rest = parser.parse_known_args()
+    if arguments.die:
+        return die_at(arguments.die, rest)
+    tally = Tally()
+    with tempfile.TemporaryDirectory(prefix="faults-") as name:
+        try_all(Path(name), arguments, tally)
+    for kind in arguments.only:
+        wrong = len(tally.wrong.get(kind, []))
+        tried = tally.tried.get(kind, 0)
+        text = tally.skipped.get(kind) or f"{tried - wrong} of {tried} as if nothing had happened"
+        print(f"{kind:10} {text}, {tally.seconds.get(kind, 0.0):.0f} s")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(vars(tally), indent=2))
+    return 1 if tally.wrong else 0
+
+
+def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
+    """Try every kind that was asked for."""
+    chance = random.Random(arguments.seed)  # noqa: S311  (which moment, not a secret)
+    counts = QUICK if arguments.quick else COUNTS
+    work = analytic_work(folder)
+    print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
+    tries: dict[str, Callable[[], None]] = {
+        "kills": lambda: try_kills(work, folder, chance, counts["kills"], tally, "kills"),
+        "executors": lambda: try_executors(work, folder, arguments.quick, tally),
+        "cluster": lambda: try_cluster(folder, arguments.quick, tally),
+        "disk": lambda: try_disk(work, folder, chance, counts["disk"], tally),
+        "bits": lambda: try_bits(work, folder, chance, counts["bits"], tally),
+        "mitsuba": lambda: try_kills(
+            mitsuba_work(folder), folder, chance, counts["mitsuba"], tally, "mitsuba"
+        ),
+    }
+    for kind in arguments.only:
+        begin = time.monotonic()
+        tries[kind]()
+        tally.seconds[kind] = time.monotonic() - begin
+
+
+# What is rendered.
+
+
+def analytic_work(folder: Path) -> Work:
+    """A noisy walk through a room with a mirror, in closed form, by the paper's method."""
+    from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
+    from enfilade.records import SurfaceClass
+
+    wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
+    ball = Sphere((0.5, 0.0, 1.0), 0.5, Material((0.7, 0.2, 0.15)), "ball")
+    mirror = Sphere((-0.7, 0.3, 0.8), 0.4, Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR), "mirror")
+    scene = folder / "wall.analytic.json"
+    scene.write_text(scene_text(AnalyticScene((wall, ball, mirror), noise=0.1)))
+    path = walk(folder / "path.json")
+    flags = ("--spp", "4", "--keyframes-spacing", "12", "--viewing-diagonal-m", "0.0125")
+    return made(folder, "analytic", (str(scene), "--path", str(path), *flags))
+
+
+def mitsuba_work(folder: Path) -> Work:
+    """A few small frames of ROOM, by keyframes of light."""
+    from enfilade.scenes import write_scene
+
+    files = write_scene("room", folder / "room", preset="small")
+    flags = ("--size", "64x48", "--frames", "22-30", "--method", "decoupled", "--light-spacing", "4")
+    more = ("--light-paths", "8", "--light-samples", "8")
+    return made(folder, "mitsuba", (str(files.scene), "--path", str(files.path), *flags, *more))
+
+
+def walk(file: Path, frames: int = FRAMES) -> Path:
+    """A camera that slides to the right."""
+    width, height = SIZE.split("x")
+    eyes = {at / 30: [0.02 * at - 0.4, 0.0, 4.0] for at in (0, frames - 1)}
+    keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
+    table = {"format": "enfilade-path", "fps": 30, "size": [int(width), int(height)], "keys": keys}
+    file.write_text(json.dumps(table))
+    return file
+
+
+def made(folder: Path, name: str, inputs: tuple[str, ...]) -> Work:
+    """Make the run that is left alone."""
+    begin = time.monotonic()
+    finish(inputs, folder / name)
+    return Work(inputs, folder / name, time.monotonic() - begin)
+
+
+def command(inputs: tuple[str, ...], out: Path, *more: str) -> list[str]:
+    """The command line of a run."""
+    flags = ["--out", str(out), "--device", "cpu", "--quiet", *more]
+    return [sys.executable, "-m", "enfilade", "render", *inputs, *flags]
+
+
+def finish(inputs: tuple[str, ...], out: Path, *more: str, prefix: tuple[str, ...] = ()) -> None:
+    """Run to the end; anything but success is an error."""
+    line = [*prefix, *command(inputs, out, *more)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+    if done.returncode:
+        raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()[-2000:]}")
+
+
+# What must be the same.
+
+
+def digest(folder: Path) -> str:
+    """Checksum of a run: its ledger without times, which has the checksums of its files."""
+    from enfilade.store import Run
+
+    return Run.existing(folder).digest()
+
+
+def difference(work: Work, out: Path) -> str | None:
+    """What is not as in the run left alone; None if nothing."""
+    if digest(out) != work.digest:
+        return f"another ledger in {out.name}"
+    for file in stored(work.whole):
+        other = out / file.relative_to(work.whole)
+        if not other.exists() or sha(other) != sha(file):
+            return f"another {other.relative_to(out)}"
+    left = [f.name for f in out.rglob(".*.writing-*")]
+    return f"left over: {left[0]}" if left else None
+
+
+def stored(folder: Path) -> list[Path]:
+    """Files of a run that its ledger knows."""
+    files = [f for kind in STORED for f in (folder / kind).glob("[!.]*") if f.is_file()]
+    return sorted([*files, *folder.glob("video.*")])
+
+
+def sha(file: Path) -> str:
+    """Checksum of a file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@contextmanager
+def scratch(folder: Path) -> Iterator[Path]:
+    """A run folder that is removed afterwards."""
+    out = folder / "run"
+    shutil.rmtree(out, ignore_errors=True)
+    try:
+        yield out
+    finally:
+        shutil.rmtree(out, ignore_errors=True)
+
+
+# Kills.
+
+
+def try_kills(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally, kind: str) -> None:
+    """Kill a run somewhere, then let it go on to its end. What a kill misses does not count."""
+    kills = (kill_at_point, kill_all, kill_worker)
+    for number in range(count):
+        with scratch(folder) as out:
+            what = None
+            while what is None:  # it came too late
+                shutil.rmtree(out, ignore_errors=True)
+                what = kills[number % len(kills)](work, out, chance)
+            tally.note(kind, attempt(lambda: finish(work.inputs, out), work, out, what))
+
+
+def attempt(act: Callable[[], None], work: Work, out: Path, what: str) -> str | None:
+    """Do something, then compare; returns what went wrong."""
+    try:
+        act()
+        problem = difference(work, out)
+    except (RuntimeError, subprocess.TimeoutExpired, OSError, ValueError) as error:
+        problem = str(error)
+    return f"{what}: {problem}" if problem else None
+
+
+def kill_at_point(work: Work, out: Path, chance: random.Random) -> str | None:
+    """The process kills itself in the middle of writing a file or a line."""
+    point, number = chance.choice(POINTS), chance.randrange(1, 150)
+    line = command(work.inputs, out)[3:]
+    own = [sys.executable, __file__, "--die", f"{point}:{number}", *line]
+    done = subprocess.run(own, capture_output=True, check=False, timeout=TIMEOUT_S)
+    return f"killed {point} number {number}" if done.returncode == -signal.SIGKILL else None
+
+
+def kill_all(work: Work, out: Path, chance: random.Random) -> str | None:
+    """The whole process group is killed at a random moment, with or without workers."""
+    who = chance.choice((("--executor", "in-process"), ("--executor", "processes", "--workers", "2")))
+    moment = chance.uniform(0.1, 1.2) * work.seconds
+    process = start(command(work.inputs, out, *who))
+    try:
+        process.wait(moment)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+    return f"{who[1]}, all killed after {moment:.2f} s" if process.wait() == -signal.SIGKILL else None
+
+
+def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
+    """One worker is killed at a random moment; the command must go on by itself."""
+    moment = chance.uniform(0.3, 1.0) * work.seconds
+    process = start(command(work.inputs, out, "--executor", "processes", "--workers", "2"))
+    time.sleep(moment)
+    workers = children(process.pid)
+    if workers:
+        kill(chance.choice(workers))
+    code = process.wait(TIMEOUT_S)
+    if code:
+        raise RuntimeError(f"a worker killed after {moment:.2f} s ended the command with exit code {code}")
+    return f"a worker killed after {moment:.2f} s" if workers else None
+
+
+def start(line: list[str]) -> subprocess.Popen[bytes]:
+    """A command in a process group of its own."""
+    return subprocess.Popen(
+        line, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+def children(pid: int) -> list[int]:
+    """Child processes of a process."""
+    try:
+        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def kill(pid: int) -> None:
+    """Kill a process that may have ended."""
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+def die_at(where: str, arguments: list[str]) -> int:
+    """Be the command, and kill this process at the n-th passage of a point."""
+    point, _, number = where.partition(":")
+    left = [int(number)]
+
+    def passed() -> bool:
+        left[0] -= 1
+        return left[0] == 0
+
+    def die() -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def around(really: Callable, name: str) -> Callable:
+        def instead(*values: object, **named: object) -> object:
+            is_last = name in point and passed()
+            if is_last and point.startswith("before"):
+                die()
+            result = really(*values, **named)
+            if is_last:
+                die()
+            return result
+
+        return instead
+
+    def torn(handle: int, data: bytes) -> int:
+        if point == "torn line" and data.startswith(b'{"unit"') and passed():
+            really_write(handle, data[: len(data) // 2])
+            die()
+        return really_write(handle, data)
+
+    really_write = os.write
+    os.write = torn
+    os.fsync = around(os.fsync, "fsync")
+    Path.replace = around(Path.replace, "rename")
+    from enfilade.cli import main as enfilade
+
+    enfilade(arguments, prog_name="enfilade")
+    return 0
+
+
+# Executors.
+
+
+def try_executors(work: Work, folder: Path, is_quick: bool, tally: Tally) -> None:
+    """The same run by one, two and seven workers of each executor."""
+    counts = {"in-process": (1,), "processes": (1, 2, 7), "ray": (2,) if is_quick else (1, 2, 7)}
+    for name, numbers in counts.items():
+        for workers in numbers:
+            with scratch(folder) as out:
+                flags = ("--executor", name, "--workers", str(workers))
+                prefix = alone() if name == "ray" else ()
+                problem = attempt(
+                    lambda o=out, f=flags, p=prefix: finish(work.inputs, o, *f, prefix=p),
+                    work,
+                    out,
+                    f"{name}, {workers} workers",
+                )
+                tally.note("executors", problem)
+
+
+def alone() -> tuple[str, ...]:
+    """Prefix that runs a command in a network of its own: Ray listens on every interface it finds."""
+    line = ("unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")
+    works = subprocess.run([*line, "true"], capture_output=True, check=False).returncode == 0
+    return line if works else ()
+
+
+def try_cluster(folder: Path, is_quick: bool, tally: Tally) -> None:
+    """Ray, whose workers are killed one after the other while 50 units are done."""
+    kills = QUICK_CLUSTER_KILLS if is_quick else CLUSTER_KILLS
+    scene, path = folder / "wall.analytic.json", walk(folder / "fifty.json", 50)
+    inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", "20000")
+    work = made(folder, "reference", inputs)
+    with scratch(folder) as out:
+        line = [*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")]
+        process = start(line)
+        killed = 0
+        while process.poll() is None and killed < kills:
+            workers = [pid for pid in descendants(process.pid) if b"do_unit" in cmdline(pid)]
+            if workers:
+                kill(workers[0])
+                killed += 1
+            time.sleep(0.5)
+        code = process.wait(TIMEOUT_S)
+        problem = f"exit code {code}" if code else difference(work, out)
+        if killed < kills:
+            problem = f"only {killed} workers could be killed ({problem})"
+        tally.note("cluster", f"{killed} workers killed: {problem}" if problem else None)
+    shutil.rmtree(work.whole)
+
+
+def descendants(pid: int) -> list[int]:
+    """Processes that come of a process."""
+    own = children(pid)
+    return own + [p for child in own for p in descendants(child)]
+
+
+def cmdline(pid: int) -> bytes:
+    """Command line of a process, or nothing."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+# Disks.
+
+
+def try_disk(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+    """A disk that fills up, then gets room."""
+    if os.geteuid() != 0:
+        tally.skipped["disk"] = "skipped: only root can mount the small disk that is filled"
+        return
+    need = sum(f.stat().st_size + 4096 for f in work.whole.rglob("*") if f.is_file()) // 1024
+    place = folder / "disk"
+    place.mkdir(exist_ok=True)
+    for _ in range(count):
+        size = chance.randrange(24, need)
+        mounted = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if mounted.returncode:
+            tally.skipped["disk"] = f"skipped: no tmpfs can be mounted here ({mounted.stderr.strip()})"
+            return
+        try:
+            workers = chance.choice(((), ("--executor", "processes", "--workers", "2")))
+            tally.note("disk", fill(work, place, size, workers))
+        finally:
+            subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | None:
+    """Run into a full disk, look at what is there, make room, go on."""
+    out, what = place / "run", f"disk of {size} KiB, {workers[1:2] or 'in-process'}"
+    line = command(work.inputs, out, *workers)
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+    if done.returncode != 0 and ("no room" not in done.stderr or done.returncode != 1):
+        return f"{what}: exit code {done.returncode}, {done.stderr.strip()[-300:]}"
+    whole = {f.relative_to(work.whole): sha(f) for f in stored(work.whole)}
+    for file in stored(out):
+        if sha(file) != whole[file.relative_to(out)]:
+            return f"{what}: a partial {file.relative_to(out)}"
+    if done.returncode == 0:
+        return None if difference(work, out) is None else f"{what}: finished, with a difference"
+    subprocess.run(["mount", "-o", "remount,size=64m", str(place)], check=True)
+    return attempt(lambda: finish(work.inputs, out, *workers), work, out, what)
+
+
+# Bits.
+
+
+def try_bits(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+    """A flipped bit, found when its file is used, or by --verify."""
+    for number in range(count):
+        with scratch(folder) as out:
+            shutil.copytree(work.whole, out)
+            is_used = number % 2 == 0
+            kinds = ("raw", "frames", "") if is_used else ("keyframes", "raw", "frames", "video", "")
+            file = chance.choice(candidates(out, chance.choice(kinds)))
+            if is_used:
+                forget_users(out, file)
+            flip(file, chance)
+            name = file.relative_to(out)
+            how = () if is_used else ("--verify",)
+            what = f"a bit of {name} flipped, {'used' if is_used else 'verified'}"
+            tally.note("bits", attempt(lambda o=out, h=how: finish(work.inputs, o, *h), work, out, what))
+
+
+def candidates(out: Path, kind: str) -> list[Path]:
+    """Files of a kind; of none, the run's own."""
+    match kind:
+        case "":
+            return [out / "run.json", out / "ledger.jsonl", out / "job.json"]
+        case "video":
+            return list(out.glob("video.*"))
+        case _:
+            return sorted((out / kind).iterdir())
+
+
+def forget_users(out: Path, file: Path) -> None:
+    """Remove what is made of a file, so that it is used again."""
+    if file.parent.name == "raw":
+        (out / "frames" / file.name).unlink()
+    elif file.parent.name == "frames":
+        for video in out.glob("video.*"):
+            video.unlink()
+
+
+def flip(file: Path, chance: random.Random) -> None:
+    """Flip a bit."""
+    data = bytearray(file.read_bytes())
+    data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    file.write_bytes(data)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
