@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import tomllib
 from dataclasses import dataclass, field, fields
 from enum import Enum
@@ -219,6 +220,26 @@ class VideoSettings(Section):
 
 
 @dataclass(frozen=True)
+class LimitSettings(Section):
+    """What a scene may ask for before it is loaded; no result depends on it."""
+
+    allow: str = option(
+        "", f"Folders beside the scene's own in which its files may lie, with {os.pathsep!r} between them."
+    )
+    file_mb: int = option(4096, "Largest file of a scene, megabytes.", least=1, most=1_000_000)
+    megapixels: int = option(
+        268, "Largest image or film of a scene, millions of pixels.", least=1, most=100_000
+    )
+    elements_m: int = option(200, "Most vertices or faces of a mesh, millions.", least=1, most=100_000)
+    trial_mb: int = option(
+        16_384,
+        "Memory in which a process of its own must be able to load the scene before it is rendered, MB.",
+        least=512, most=10_000_000,
+    )  # fmt: skip
+    trial_s: float = option(600.0, "... and in so many seconds.", least=1.0, most=86_400.0)
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings of a run."""
 
@@ -231,6 +252,7 @@ class Settings:
     antialias: AntialiasSettings = field(default_factory=AntialiasSettings)
     light: LightSettings = field(default_factory=LightSettings)
     video: VideoSettings = field(default_factory=VideoSettings)
+    limits: LimitSettings = field(default_factory=LimitSettings)
 
     @classmethod
     def from_tables(cls, tables: dict[str, Any]) -> Self:

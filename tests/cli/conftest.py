@@ -39,7 +39,7 @@ def jobs(monkeypatch):
             raise told.error
         return told.answer
 
-    def render(job, folder, monitor, crew, *, is_verified):
+    def render(job, folder, monitor, crew, *, is_verified, is_tried):
         told.crew, told.is_verified = crew, is_verified
         answer = take(job)
         folder.mkdir(parents=True, exist_ok=True)

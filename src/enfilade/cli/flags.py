@@ -21,6 +21,7 @@ _META = "enfilade.settings"
 SHORT = {
     ("trace", "spp"): "--spp",
     ("trace", "seed"): "--seed",
+    ("limits", "allow"): "--allow",
     ("video", "codec"): "--codec",
     ("video", "ocio"): "--ocio",
     ("video", "view"): "--view",

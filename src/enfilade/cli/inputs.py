@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 METHODS = ("reference", "paper", "decoupled")
-JOB_SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video")
+JOB_SECTIONS = (
+    "trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video", "limits",
+)  # fmt: skip
 
 
 class Size(click.ParamType[tuple[int, int]]):

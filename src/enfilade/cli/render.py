@@ -50,7 +50,7 @@ def command(
 
     before = _size(folder / LEDGER)
     with watch(quiet=quiet) as monitor:
-        summary = render(job, folder, monitor, crew, is_verified=is_verified)
+        summary = render(job, folder, monitor, crew, is_verified=is_verified, is_tried=True)
     plots = _plots(folder, has_changed=_size(folder / LEDGER) != before)
     if as_json:
         extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}

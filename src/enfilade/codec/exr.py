@@ -19,7 +19,7 @@ import OpenEXR
 from enfilade.codec.whole import unwritable, whole_file
 from enfilade.errors import ImageError
 
-__all__ = ["Array", "read_attributes", "read_exr", "write_exr"]
+__all__ = ["Array", "exr_pixels", "read_attributes", "read_exr", "write_exr"]
 
 Array = npt.NDArray[Any]
 
@@ -106,6 +106,18 @@ def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:
                 key = name if name not in channels else f"{header.get('name', index)}.{name}"
                 channels[key] = _placed(np.asarray(channel.pixels), header)
     return _layers(channels)
+
+
+def exr_pixels(file: Path) -> int:
+    """Pixels of an OpenEXR file, the largest window of all parts, from its headers alone.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, is no OpenEXR, or its headers are damaged.
+    """
+    sizes = [_size(header[w]) for header in _part_headers(file) for w in ("dataWindow", "displayWindow")]
+    return max(height * width for height, width in sizes)
 
 
 def read_attributes(file: Path) -> dict[str, Any]:

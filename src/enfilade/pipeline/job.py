@@ -60,7 +60,7 @@ class Job:
     def identity(self, renderer: Renderer | None = None) -> dict[str, Any]:
         """What makes the results what they are: a run folder holds one such identity.
 
-        The number of paths in flight is left out: it changes no result.
+        The number of paths in flight is left out, and what a scene may ask for: they change no result.
 
         Parameters
         ----------
@@ -76,6 +76,7 @@ class Job:
         items = {} if renderer is None else {"items": len(renderer.describe().items)}
         settings = self.settings.to_tables()
         del settings["trace"]["chunk"]
+        del settings["limits"]
         return {
             "method": self.method,
             "scene": {"fingerprint": fingerprint, **items},
@@ -93,6 +94,27 @@ class Job:
                 "variant": _variant(self.scene),
             },
         }
+
+    def check_scene(self, *, is_tried: bool = False) -> None:
+        """Refuse a scene that reaches for what is not its own, or for too much, before it is loaded.
+
+        Parameters
+        ----------
+        is_tried
+            Let a process of its own load it, too.
+
+        Raises
+        ------
+        SceneError
+        """
+        if self.scene.name.endswith(ANALYTIC_SUFFIX):
+            return  # its files are its own, and it has no plugins
+        from enfilade.backends.scenecheck import check_scene
+        from enfilade.backends.trial import try_scene
+
+        check_scene(self.scene, self.settings.limits)
+        if is_tried:
+            try_scene(self.scene, self.settings.limits, active().variant)
 
     def to_json(self) -> dict[str, Any]:
         """All of it, fit for JSON, for workers elsewhere; :meth:`from_json` reads back the very same."""

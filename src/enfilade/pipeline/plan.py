@@ -67,6 +67,7 @@ def plan(job: Job, monitor: Monitor) -> Plan:
     SceneError
     DeviceError
     """
+    job.check_scene()
     renderer = open_renderer(job.scene, job.settings.trace)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)

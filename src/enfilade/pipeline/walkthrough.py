@@ -20,7 +20,13 @@ LEAST_SPP = 2  # of the paper's method
 
 
 def render(
-    job: Job, folder: Path, monitor: Monitor, crew: Crew | None = None, *, is_verified: bool = False
+    job: Job,
+    folder: Path,
+    monitor: Monitor,
+    crew: Crew | None = None,
+    *,
+    is_verified: bool = False,
+    is_tried: bool = False,
 ) -> dict[str, Any]:
     """Render a walkthrough into a run folder, or go on with one.
 
@@ -39,6 +45,8 @@ def render(
     is_verified
         Compare every file with its checksum first, and make again what is damaged. Otherwise sizes are
         looked at now, and a file's checksum when it is used.
+    is_tried
+        Let a process of its own load the scene before a new run begins.
 
     Returns
     -------
@@ -57,6 +65,8 @@ def render(
     """
     crew = crew or Crew()
     _check(job, crew)
+    if is_tried and not folder.exists():
+        job.check_scene(is_tried=True)
     with Run.open(folder, job.identity()) as run:
         for note in run.notes:
             monitor.say(note)
@@ -102,6 +112,7 @@ def _verify(run: Run, monitor: Monitor) -> None:
 def _check(job: Job, crew: Crew) -> None:
     """Refuse now what would fail, or mislead, after a night of rendering."""
     check_executor(crew.executor)
+    job.check_scene()
     if job.method not in METHODS:
         raise ValueError(f"there is no method {job.method!r}")
     check_encodable(

@@ -1,0 +1,57 @@
+"""Sizes of pictures from their headers, before anything of them is decoded."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+from enfilade.codec.exr import MAGIC, exr_pixels
+from enfilade.errors import ImageError
+
+__all__ = ["PICTURES", "picture_pixels"]
+
+PICTURES = frozenset({".exr", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".pfm", ".ppm", ".hdr", ".rgbe"})
+HEADER = 1 << 16  # bytes in which the size of a Radiance picture must stand
+
+
+def picture_pixels(file: Path) -> int:
+    """Pixels of a picture of any kind that Mitsuba reads, from its header alone.
+
+    Raises
+    ------
+    ImageError
+        The file is missing or is no such picture.
+    """
+    try:
+        with file.open("rb") as raw:
+            start = raw.read(HEADER)
+    except OSError as error:
+        raise ImageError(f"can't read {file}: {error.strerror}") from error
+    if start.startswith(MAGIC):
+        return exr_pixels(file)
+    if start.startswith(b"#?"):
+        return _radiance(file, start)
+    return _other(file)
+
+
+def _radiance(file: Path, start: bytes) -> int:
+    # Radiance's own format: lines of text, an empty one, then "-Y 480 +X 640".
+    words = start.partition(b"\n\n")[2].partition(b"\n")[0].split()
+    if len(words) == 4 and words[1].isdigit() and words[3].isdigit():
+        return int(words[1]) * int(words[3])
+    raise ImageError(f"{file} is a Radiance picture without a size")
+
+
+def _other(file: Path) -> int:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", Image.DecompressionBombWarning
+            )  # the caller has a bound of its own
+            with Image.open(file) as image:
+                width, height = image.size
+    except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise ImageError(f"{file} is no picture that can be read: {error}") from error
+    return int(width) * int(height)

@@ -1,0 +1,186 @@
+"""Scenes that reach for what is not theirs are refused before Mitsuba reads them."""
+
+import os
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from enfilade.backends.scenecheck import check_scene
+from enfilade.backends.trial import try_scene
+from enfilade.codec import write_exr
+from enfilade.errors import SceneError
+from enfilade.settings import LimitSettings
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """Write a scene of one element, in a folder with a picture; returns its file."""
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    write_exr(folder / "picture.exr", {"RGB": np.zeros((4, 8, 3), np.float32)})
+
+    def write(body, head='<scene version="3.0.0">'):
+        file = folder / "scene.xml"
+        file.write_text(f"{head}{body}</scene>")
+        return file
+
+    return write
+
+
+def refused(file, words, **limits):
+    with pytest.raises(SceneError, match=words) as error:
+        check_scene(file, LimitSettings(**limits))
+    assert str(file.parent) in str(error.value)
+
+
+def texture(name):
+    return f'<texture type="bitmap"><string name="filename" value="{name}"/></texture>'
+
+
+def test_a_plain_scene_passes(scene):
+    file = scene(f'<shape type="sphere"><bsdf type="diffuse">{texture("picture.exr")}</bsdf></shape>')
+    assert [f.name for f in check_scene(file, LimitSettings())] == ["picture.exr"]
+
+
+@pytest.mark.parametrize("kind", ["../../evil", "/tmp/evil", "Sphere", "a b", "", "$which", "sphere&#10;"])  # noqa: S108
+def test_names_of_plugins(scene, kind):
+    refused(scene(f'<shape type="{kind}"/>'), "no name of a plugin|has no <default>")
+
+
+def test_parameters_are_filled_in_before_they_are_judged(scene):
+    head = '<scene version="3.0.0"><default name="kind" value="../evil"/><default name="at" value="/etc"/>'
+    refused(scene('<shape type="$kind"/>', head), "no name of a plugin")
+    refused(scene(texture("$at/passwd"), head), "outside the scene's folder")
+    loop = '<scene version="3.0.0"><default name="a" value="$b$b"/><default name="b" value="$a"/>'
+    refused(scene(texture("$a"), loop), "has no <default>")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        texture("/etc/passwd"),
+        texture("../../../../etc/passwd"),
+        '<include filename="/etc/passwd"/>',
+        '<path value="/etc"/>',
+        '<spectrum name="x" filename="/etc/passwd"/>',
+        '<shape type="x"><string name="table" value="/etc/passwd"/></shape>',
+        '<texture type="bitmap"><string value="/etc/passwd" name="filename"/></texture>',
+    ],
+)
+def test_files_elsewhere(scene, body):
+    refused(scene(body), r"outside the scene's folder; allow it with --allow /")
+
+
+def test_links_that_lead_out(scene, tmp_path):
+    file = scene(texture("link.exr"))
+    (tmp_path / "elsewhere").mkdir()
+    (file.parent / "picture.exr").rename(tmp_path / "elsewhere" / "p.exr")
+    (file.parent / "link.exr").symlink_to(tmp_path / "elsewhere" / "p.exr")
+    refused(file, "outside the scene's folder")
+    allowed = os.pathsep.join(["/nowhere", str(tmp_path / "elsewhere")])
+    assert len(check_scene(file, LimitSettings(allow=allowed))) == 1
+
+
+def test_includes_are_read_too(scene):
+    file = scene('<include filename="part.xml"/>')
+    part = file.parent / "part.xml"
+    part.write_text('<scene version="3.0.0"><shape type="../evil"/></scene>')
+    refused(file, "no name of a plugin")
+    part.write_text('<scene version="3.0.0"><include filename="part.xml"/></scene>')
+    refused(file, "more than 16 deep")
+    part.unlink()
+    refused(file, "can't read the scene")
+
+
+@pytest.mark.parametrize("name", ["pipe", "device"])
+def test_what_is_no_ordinary_file(scene, name):
+    file = scene(texture(name))
+    os.mkfifo(file.parent / name)
+    refused(file, "no ordinary file")
+
+
+BOMB = '<!DOCTYPE s [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><scene version="3.0.0">&b;'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [(BOMB, "document type"), ("<scene>", "not well-formed"), ("\0", "not well-formed"),
+     ("", "not well-formed"), ('<?xml version="1.0" encoding="latin-99"?><scene/>', "XML")],
+)  # fmt: skip
+def test_what_is_no_scene(scene, text, words):
+    file = scene("")
+    file.write_text(text)
+    refused(file, words)
+
+
+@pytest.mark.parametrize("value", ["1000000000000", "-4", "x", "0x10"])
+def test_films_are_bounded(scene, value):
+    film = f'<film type="hdrfilm"><integer name="width" value="{value}"/></film>'
+    refused(scene(f'<sensor type="perspective">{film}</sensor>'), "a film")
+
+
+def test_films_are_bounded_by_a_setting(scene):
+    sides = '<integer name="width" value="40000"/><integer name="height" value="30000"/>'
+    file = scene(f'<sensor type="perspective"><film type="hdrfilm">{sides}</film></sensor>')
+    refused(file, r"1200 million pixels; at most 268 are taken: raise --limits-megapixels")
+    check_scene(file, LimitSettings(megapixels=1200))
+
+
+def test_pictures_are_bounded_by_their_headers(scene):
+    file = scene(texture("large.png"))
+    chunk = b"IHDR" + struct.pack(">IIBBBBB", 90_000, 90_000, 8, 2, 0, 0, 0)
+    data = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    (file.parent / "large.png").write_bytes(data)
+    refused(file, "8100 million pixels|no picture that can be read")
+    (file.parent / "large.png").write_bytes(b"GIF89a")
+    refused(file, "no picture")
+    file = scene(texture("sky.hdr"))
+    (file.parent / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n")
+    refused(file, "9999.8 million pixels")
+    (file.parent / "sky.hdr").write_bytes(b"#?RADIANCE\n\n-Y x +X 9\n")
+    refused(file, "without a size")
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (
+            "ply\nformat binary_little_endian 1.0\nelement vertex 900000000\nend_header\n",
+            "900 million elements",
+        ),
+        ("ply\nformat binary_little_endian 1.0\nelement face 9000\nend_header\n", "too short"),
+        ("ply\nelement vertex 3\n", "header is damaged"),
+        ("solid", "no PLY"),
+    ],
+)
+def test_meshes_are_bounded_by_their_headers(scene, header, words):
+    file = scene('<shape type="ply"><string name="filename" value="mesh.ply"/></shape>')
+    (file.parent / "mesh.ply").write_text(header)
+    refused(file, words)
+
+
+def test_large_files(scene):
+    file = scene(texture("huge.bin"))
+    with (file.parent / "huge.bin").open("wb") as raw:
+        raw.truncate(3_000_000)
+    check_scene(file, LimitSettings(file_mb=3))
+    with (file.parent / "huge.bin").open("ab") as raw:
+        raw.write(b"x")
+    refused(file, "at most 3 are taken: raise --limits-file-mb", file_mb=3)
+
+
+def test_a_trial_says_why_a_scene_can_not_be_loaded(scene):
+    with pytest.raises(SceneError, match=r"can't load .*scene\.xml"):
+        try_scene(scene('<shape type="nonesuch"/>'), LimitSettings(), "llvm_ad_rgb")
+
+
+def test_a_trial_that_needs_too_much_is_refused(scene):
+    file = scene(f'<shape type="sphere"><bsdf type="diffuse">{texture("large.png")}</bsdf></shape>')
+    Image.new("L", (12_000, 12_000)).save(file.parent / "large.png", compress_level=1)
+    with pytest.raises(SceneError, match=r"was too much for the process|can't load"):
+        try_scene(file, LimitSettings(trial_mb=512), "llvm_ad_rgb")
+    with pytest.raises(SceneError, match="was not loaded in 1 s"):
+        try_scene(file, LimitSettings(trial_s=1.0), "llvm_ad_rgb")
