@@ -25,6 +25,7 @@ from enfilade.studies.cases.document import replaced
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from enfilade.studies.cases.plain import PlainlyLit
+from enfilade.studies.cases.runner import ITEMS
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
 from enfilade.studies.cases.terms import TERMS
 from enfilade.studies.cases.windows import Windows, probes_of
@@ -303,20 +304,27 @@ def test_a_little_filter_is_better_than_none_and_a_wide_one_is_worse(plain):
 # --- 7 and 8: separation, reflections
 
 
-def test_ghosts_are_where_separation_makes_a_difference(plain):
-    found, example = separation.measure(plain, [8, 12])
-    assert {r["frame"] for r in found["frames"]} == {9, 13}
-    most = max(found["frames"], key=lambda r: r["ghost_percent"])
+def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them(tmp_path):
+    plain = windows_of(tmp_path, count=10)  # fast: the ball moves before the wall by a pixel a frame
+    found, example = separation.measure(plain, [4, 5])
+    assert {r["frame"] for r in found["frames"]} == {5, 6}
+    most = max(found["frames"], key=lambda r: r["ghosts"]["pixels"])
     assert found["example"] == most["frame"]
-    assert 0.0 < most["ghost_percent"] < 30.0
-    ghost = example["ghost"] > 0.0
-    np.testing.assert_array_equal(
-        ghost,
-        separation.ghost_pixels(
-            Viewer(plain.job.viewing, plain.job.settings.viewing), example["together"], example["apart"]
-        ),
-    )
-    assert example["motion"][ghost].mean() > example["motion"][~ghost].mean()
+    assert 0.0 < most["ghosts"]["pixels"] < 20.0
+    near = separation.outlines(plain.geometry(most["frame"] - 1).item)
+    viewer = Viewer(plain.job.viewing, plain.job.settings.viewing)
+    changed = separation.changed_pixels(viewer, example["together"], example["apart"])
+    np.testing.assert_array_equal(example["ghost"] > 0.0, changed & ~near)
+    assert most["outlines"]["pixels"] == pytest.approx(100.0 * (changed & near).mean())
+    effect = {where: most[where]["effect"]["motion"]["score"] for where in ("ghosts", "outlines")}
+    assert effect["ghosts"] == pytest.approx(score_in(example["motion"], changed & ~near))
+    assert min(effect.values()) > score_in(example["motion"], ~changed)
+
+
+def test_outlines_by_hand():
+    item = np.ones((9, 9), np.uint32)
+    item[:, 5:] = 2
+    assert separation.outlines(item)[4].tolist() == [False] * 3 + [True] * 4 + [False] * 2
 
 
 def test_the_flow_of_the_reflection_keeps_what_the_mirror_shows(tmp_path):
@@ -354,12 +362,21 @@ def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):
         calls.append(1)
         return {"value": len(calls)}
 
-    case = Case("room", TERMS["small"], tmp_path, Silence())
-    assert case.stored("item", make) == {"value": 1}
-    assert case.stored("item", make) == {"value": 1}
-    other = Case("room", dataclasses.replace(TERMS["small"], spp=99), tmp_path, Silence())
-    assert other.stored("item", make) == {"value": 2}
-    assert read_json(tmp_path / "item.json")["made_by"]["terms"]["spp"] == 99
+    def stored(**other):
+        terms = dataclasses.replace(TERMS["small"], **other)
+        return Case("room", terms, tmp_path, Silence()).stored("item", make, ("spp", "size"))
+
+    assert stored() == {"value": 1}
+    assert stored() == {"value": 1}
+    assert stored(crops=7) == {"value": 1}  # on which it does not depend
+    assert stored(spp=99) == {"value": 2}
+    assert read_json(tmp_path / "item.json")["made_by"]["terms"] == {"spp": 99, "size": [160, 120]}
+
+
+@pytest.mark.parametrize("item", ITEMS.values(), ids=ITEMS)
+def test_items_depend_on_terms_that_exist(item):
+    assert set(item.fields) <= set(TERMS["small"].to_dict())
+    assert "preset" in item.fields
 
 
 def test_a_block_is_replaced_and_the_rest_stays():

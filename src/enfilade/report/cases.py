@@ -77,7 +77,7 @@ def draw_placement(found: Scenes, file: Path) -> Path:
         even = next(row for row in rows if row["adaptation"] is None)
         right.axhline(even["mean"], color=GREEN, linestyle=":", label="equal flow")
         _titled(right, "mean over all frames", "A", "pixels, %")
-        right.set_ylim(bottom=0.0)
+        right.set_ylim(0.0, 1.1 * max(row["mean"] for row in rows))
         right.legend(fontsize=8, frameon=False)
     return save(figure, file)
 
@@ -249,7 +249,7 @@ def draw_ghosts(example: Mapping[str, F32], file: Path) -> Path:
         "as it should be": _encoded(example["reference"]),
         "ghosts, JND in motion": _bytes(overlay(example["motion"], grey)),
         "ghosts, JND as a still": _bytes(overlay(example["still"], grey)),
-        "pixels that differ": _bytes(np.repeat(example["ghost"][..., None], 3, axis=2)),
+        "ghosts": _bytes(np.repeat(example["ghost"][..., None], 3, axis=2)),
         "velocity": VELOCITY.paint(example["speed_deg_s"]),
     }
     return _pictures({name: image[crop] for name, image in pictures.items()}, 4, file)
@@ -268,6 +268,8 @@ def draw_mirrors(example: Mapping[str, F32], file: Path) -> Path:
     wanted = _encoded(example["reference"]).astype(np.float32)
     pictures = {title: _encoded(example[name])[crop] for name, title in names.items()}
     for name, title in names.items():
+        if name == "reference":
+            continue
         difference = 128.0 + 4.0 * (_encoded(example[name]).astype(np.float32) - wanted)
         pictures[f"4 x difference: {title}"] = np.clip(difference, 0.0, 255.0).astype(np.uint8)[crop]
     return _pictures(pictures, len(names), file)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -72,19 +72,21 @@ class Case:
     @cached_property
     def survey(self) -> Survey:
         """Velocities of the whole walk."""
-        return Survey.from_dict(self.stored("survey", lambda: self._surveyed(self.whole)))
+        return Survey.from_dict(self.stored("survey", lambda: self._surveyed(self.whole), ("preset", "size")))
 
     @cached_property
     def short_survey(self) -> Survey:
         """Velocities of the walk at the size of the windows."""
-        return Survey.from_dict(self.stored("survey-short", lambda: self._surveyed(self.short)))
+        return Survey.from_dict(
+            self.stored("survey-short", lambda: self._surveyed(self.short), ("preset", "window_size"))
+        )
 
     @cached_property
     def windows(self) -> Windows:
         """Short sequences under the scene's own light."""
         return Windows(
             self.short, self.renderer, self.short_survey, self.folder / "windows", self.monitor,
-            self.views(self.short), self.terms.reference_spp,
+            self.views(self.short), self.terms.window_reference_spp,
         )  # fmt: skip
 
     @cached_property
@@ -116,10 +118,19 @@ class Case:
         )
         return self._rendered("decoupled", replace(self.whole, path=part, method="decoupled"))
 
-    def stored(self, name: str, make: Callable[[], Any]) -> Any:
-        """A result from its file, made now where the file is missing or was made on other terms."""
+    def stored(self, name: str, make: Callable[[], Any], fields: Sequence[str]) -> Any:
+        """A result from its file, made now where the file is missing or was made on other terms.
+
+        Parameters
+        ----------
+        name
+        make
+        fields
+            Of the terms, on which the result depends.
+        """
         file = self.folder / f"{name}.json"
-        made_by = {"version": __version__, "terms": self.terms.to_dict()}
+        terms = self.terms.to_dict()
+        made_by = {"version": __version__, "terms": {field: terms[field] for field in fields}}
         if file.is_file():
             held = read_json(file)
             if held.get("made_by") == made_by:

@@ -96,10 +96,11 @@ def _placement(found: Results, terms: Terms, _folder: Path, place: Path) -> tupl
             is_papers = row["adaptation"] in (0.0, placement.PAPER_A)
             said = f"{papers:.2f}" if papers is not None and is_papers else ""
             cells = (scene, "uniform" if is_plain else name, said, f"{row['mean']:.2f}")
-            rows.append((*cells, len(row["keyframes"])))
+            keyframes = 100.0 * len(row["keyframes"]) / len(of["numbers"])
+            rows.append((*cells, len(row["keyframes"]), f"{row['mean'] + keyframes:.2f}"))
     answers = [_placement_answer(scene, of["placements"]) for scene, of in found.items()]
     file = figures.draw_placement(found, place / "placement.png")
-    heads = ("scene", "placement", "paper, %", "ours, %", "keyframes")
+    heads = ("scene", "placement", "paper, %", "ours, %", "keyframes", "with them, %")
     return _block(_size(terms), _table(heads, rows), *answers, figure=file), [file]
 
 
@@ -291,18 +292,20 @@ def _separation(found: Results, terms: Terms, folder: Path, place: Path) -> tupl
         (
             scene,
             row["frame"],
-            f"{row['ghost_percent']:.1f}",
-            _or_dash(row["ghost_deg_s"]),
-            *(_or_dash(row["effect"][how]["score"]) for how in HOWS),
-            *(_or_dash(row["reference"][kind]["motion"]["score"]) for kind in ("together", "apart")),
-            *(_or_dash(row["raw"]["together"][how]["visible_percent"]) for how in HOWS),
+            where,
+            f"{row[where]['pixels']:.2f}",
+            _or_dash(row[where]["deg_s"]),
+            *(_or_dash(row[where]["effect"][how]["score"]) for how in HOWS),
+            *(_or_dash(row[where][f"reference {kind}"]["motion"]["score"]) for kind in ("together", "apart")),
+            _or_dash(row[where]["raw together"]["motion"]["visible_percent"]),
         )
         for scene, of in found.items()
         for row in of["frames"]
+        for where in ("ghosts", "outlines")
     ]
     heads = (
-        "scene", "frame", "ghost pixels, %", "their velocity, deg/s", "ghosts, JND in motion", "as stills",
-        "error without separation, JND", "with it", "against unfiltered, above 1 JND, %", "as stills",
+        "scene", "frame", "what", "pixels, %", "deg/s", "made by separation, JND in motion", "as stills",
+        "error without separation, JND", "with it", "against unfiltered, above 1 JND, %",
     )  # fmt: skip
     names = list(_example("separation", folder, found))
     drawn = []
@@ -310,7 +313,7 @@ def _separation(found: Results, terms: Terms, folder: Path, place: Path) -> tupl
         example = _arrays(folder / scene / "separation.npz")
         drawn.append(figures.draw_ghosts(example, place / f"ghosts-{scene}.png"))
     pictures = "\n\n".join(f"![{f.stem}]({FIGURES}/{f.name})" for f in drawn)
-    return _block(_size(terms), _table(heads, rows), pictures), drawn
+    return _block(_plain_size(terms), _table(heads, rows), pictures), drawn
 
 
 def _reflections(found: Results, terms: Terms, folder: Path, place: Path) -> tuple[str, list[Path]]:
@@ -337,7 +340,7 @@ def _reflections(found: Results, terms: Terms, folder: Path, place: Path) -> tup
     without = [scene.upper() for scene, of in found.items() if not of["frames"]]
     note = f"{' and '.join(without)} has no mirrors." if without else ""
     pictures = "\n\n".join(f"![{f.stem}]({FIGURES}/{f.name})" for f in drawn)
-    return _block(_size(terms), _table(heads, rows), note, pictures), drawn
+    return _block(_plain_size(terms), _table(heads, rows), note, pictures), drawn
 
 
 BLOCKS: dict[str, Callable[[Any, Terms, Path, Path], tuple[str, list[Path]]]] = {
@@ -380,12 +383,17 @@ def _size(terms: Terms) -> str:
     return f"*{terms.size[0]}x{terms.size[1]} pixels, the {terms.preset} walks, {terms.spp} paths a pixel.*"
 
 
+def _plain_size(terms: Terms) -> str:
+    width, height = terms.size
+    return f"*{terms.windows} frames of the {terms.preset} walks, {width}x{height} pixels, without noise.*"
+
+
 def _windows(terms: Terms) -> str:
     (w, h), (ws, hs) = terms.size, terms.window_size
     return (
-        f"*{terms.windows} frames of a walk with their neighbours, at even quantiles of its velocities; "
-        f"without noise at {w}x{h}, path traced at {ws}x{hs} with {terms.window_spp} paths, references with "
-        f"{terms.reference_spp}; 28 pixels to a degree.*"
+        f"*Frames of a walk with their neighbours, at even quantiles of its velocities: {terms.windows} "
+        f"without noise at {w}x{h}, {terms.traced_windows} path traced at {ws}x{hs} with {terms.window_spp} "
+        f"paths, references with {terms.window_reference_spp}; 28 pixels to a degree.*"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,31 +38,22 @@ LENGTHS = {"full": {"room": 448, "atrium": 200}, "small": {"room": 60, "atrium":
 def _threshold(case: Case) -> dict[str, Any]:
     terms = threshold.Calibration()
     plain, traced = case.plain_windows, case.windows
-    count = case.terms.windows
     return {
-        "plain": threshold.calibrate(plain, probes_of(case.survey, len(case.whole.path), count), terms),
-        "traced": threshold.calibrate(
-            traced, probes_of(case.short_survey, len(case.short.path), count), terms
-        ),
+        "plain": threshold.calibrate(plain, _probes(case), terms),
+        "traced": threshold.calibrate(traced, _traced_probes(case), terms),
     }
 
 
 def _supports(case: Case) -> dict[str, Any]:
     terms = supports.Supports()
-    count = case.terms.windows
     return {
-        "plain": supports.measure(
-            case.plain_windows, probes_of(case.survey, len(case.whole.path), count), terms
-        ),
-        "traced": supports.measure(
-            case.windows, probes_of(case.short_survey, len(case.short.path), count), terms
-        ),
+        "plain": supports.measure(case.plain_windows, _probes(case), terms),
+        "traced": supports.measure(case.windows, _traced_probes(case), terms),
     }
 
 
 def _separation(case: Case) -> dict[str, Any]:
-    probes = probes_of(case.survey, len(case.whole.path), case.terms.windows)
-    rows, example = separation.measure(case.plain_windows, probes)
+    rows, example = separation.measure(case.plain_windows, _probes(case))
     write_arrays(case.folder / "separation.npz", example)
     return rows
 
@@ -75,15 +67,43 @@ def _reflections(case: Case) -> dict[str, Any]:
     return rows
 
 
-ITEMS: dict[str, Callable[[Case], Any]] = {  # in the order of the paper's figures and tables
-    "placement": placement.measure,
-    "statistics": statistics.measure,
-    "shares": shares.measure,
-    "times": times.measure,
-    "threshold": _threshold,
-    "supports": _supports,
-    "separation": _separation,
-    "reflections": _reflections,
+def _probes(case: Case) -> list[int]:
+    return probes_of(case.survey, len(case.whole.path), case.terms.windows)
+
+
+def _traced_probes(case: Case) -> list[int]:
+    return probes_of(case.short_survey, len(case.short.path), case.terms.traced_windows)
+
+
+@dataclass(frozen=True)
+class Item:
+    """One question.
+
+    Attributes
+    ----------
+    measure : callable
+        Takes a case, and returns what is kept as JSON.
+    fields : tuple of str
+        Of the terms, on which that depends.
+    """
+
+    measure: Callable[[Case], Any]
+    fields: tuple[str, ...]
+
+
+WHOLE = ("preset", "size", "spp")
+PLAIN = ("preset", "size", "windows")
+BOTH = (*PLAIN, "window_size", "window_spp", "window_reference_spp", "traced_windows")
+JUDGED = ("decoupled_frames", "reference_spp", "crop", "crops", "most_spp")
+ITEMS = {  # in the order of the paper's figures and tables
+    "placement": Item(placement.measure, ("preset", "size", "sweep_step")),
+    "statistics": Item(statistics.measure, WHOLE),
+    "shares": Item(shares.measure, WHOLE),
+    "times": Item(times.measure, (*WHOLE, *JUDGED)),
+    "threshold": Item(_threshold, BOTH),
+    "supports": Item(_supports, BOTH),
+    "separation": Item(_separation, PLAIN),
+    "reflections": Item(_reflections, PLAIN),
 }
 
 
@@ -112,7 +132,10 @@ def measure(
     found: dict[str, dict[str, Any]] = {}
     for scene in scenes:
         case = Case(scene, terms, folder / scene, monitor)
-        found[scene] = {name: case.stored(name, partial(ITEMS[name], case)) for name in items}
+        asked = {name: ITEMS[name] for name in items}
+        found[scene] = {
+            name: case.stored(name, partial(item.measure, case), item.fields) for name, item in asked.items()
+        }
     return found
 
 
@@ -124,9 +147,9 @@ def forecast_s(scenes: Sequence[str], terms: Terms, cores: int) -> float:
     for scene in scenes:
         frames = LENGTHS[terms.preset][scene]
         spp = PATHS[scene] * frames * terms.spp
-        windows = terms.windows * (25 * terms.window_spp + terms.reference_spp)
+        windows = terms.traced_windows * (25 * terms.window_spp + terms.window_reference_spp)
         judged = terms.crops * (terms.reference_spp + 2 * terms.most_spp)
         total += PATH_S * (whole * spp + short * windows + crop * judged)
         total += FRAME_S * (frames + 3 * terms.decoupled_frames) * max(whole / VGA, 0.2)
-        total += VARIANT_S * VARIANTS * terms.windows * (whole + short) / VGA
+        total += VARIANT_S * VARIANTS * (terms.windows * whole + terms.traced_windows * short) / VGA
     return total / max(cores, 1)

@@ -1,4 +1,8 @@
-"""§5.3 and Fig. 10: whether the ghosts are seen that the filter leaves beside what occludes."""
+"""§5.3 and Fig. 10: whether the ghosts are seen that the filter leaves beside what occludes.
+
+Where trajectories meet another surface, separation ends them. Away from outlines that takes away ghosts; at
+outlines it takes away the samples that would have antialiased them. Both are told apart here.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
-from enfilade.records import F32, Mask
+from enfilade.pipeline.views import View
+from enfilade.records import F32, U32, Mask
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
 from enfilade.studies.cases.windows import Windows
 
-__all__ = ["Example", "ghost_pixels", "measure"]
+__all__ = ["Example", "changed_pixels", "measure", "outlines"]
 
-GHOST_CD_M2 = (
-    1.0  # difference on the screen, of 100, that separation makes: below it there is no ghost to see
-)
+GHOST_CD_M2 = 1.0  # difference on the screen, of 100, that separation makes: below it nothing is to be seen
+OUTLINE_PX = 2  # from an outline: what differs nearer to it is a matter of antialiasing
 Example = dict[str, F32]
 
 
@@ -26,12 +31,13 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
     Returns
     -------
     rows : dict
-        ``frames``: of each probe its number, mean velocity, share of ghost pixels, and there, for
-        ``together`` (without separation) and ``apart``, in motion and as stills: the score, JND, and the
-        share above 1 JND, percent, against the frame as it should be (``reference``), and against the
-        unfiltered one as the paper does (``raw``); ``effect``: the one against the other.
+        ``frames``: of each probe its number, and for ``ghosts`` and ``outlines`` the share of ``pixels``,
+        percent, their median velocity (None where there are none), and, in motion and as stills, the score,
+        JND, and the share above 1 JND, percent: of ``together`` (without separation) and ``apart`` against
+        the frame as it should be (``reference``) and against the unfiltered one as the paper does (``raw``);
+        ``effect``: the one against the other.
     example : dict
-        Images of the probe with most ghosts, as Fig. 10 has them: ``raw``, ``together``, ``apart``
+        Images of the probe with most ghost pixels, as Fig. 10 has them: ``raw``, ``together``, ``apart``
         colours, ``ghost``, ``motion`` and ``still`` JND of together against apart, ``speed_deg_s``.
     """
     windows.monitor.stage("flow separation", len(probes))
@@ -42,45 +48,64 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
         rows.append(row)
         examples.append(example)
         windows.monitor.advance()
-    most = int(np.argmax([row["ghost_percent"] for row in rows]))
+    most = int(np.argmax([row["ghosts"]["pixels"] for row in rows]))
     return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
 
 
-def ghost_pixels(viewer: Viewer, together: F32, apart: F32) -> Mask:
+def outlines(item: U32) -> Mask:
+    """Pixels at most :data:`OUTLINE_PX` from another item, (H, W)."""
+    edge = np.zeros(item.shape, bool)
+    across, down = item[:, 1:] != item[:, :-1], item[1:] != item[:-1]
+    edge[:, 1:] |= across
+    edge[:, :-1] |= across
+    edge[1:] |= down
+    edge[:-1] |= down
+    near: Mask = binary_dilation(edge, np.ones((3, 3), bool), iterations=OUTLINE_PX - 1)
+    return near
+
+
+def changed_pixels(viewer: Viewer, together: F32, apart: F32) -> Mask:
     """Pixels that separation changes on the screen, (H, W): samples of another surface were mixed in."""
-    ghost: Mask = np.abs(viewer.shown(together) - viewer.shown(apart)) > GHOST_CD_M2
-    return ghost
+    changed: Mask = np.abs(viewer.shown(together) - viewer.shown(apart)) > GHOST_CD_M2
+    return changed
 
 
 def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[dict[str, Any], Example]:
     settings, view = windows.job.settings.antialias, windows.view(frame)
     raw, reference = windows.traced(frame).color, windows.reference(frame).color
 
-    def filtered(separate: bool) -> F32:
+    def filtered(*, separate: bool) -> F32:
         chosen = replace(settings, separate_items=separate)
         return antialiased(windows, frame, lambda f: windows.traced(f).color, chosen)
 
-    made = {"together": filtered(separate=False), "apart": filtered(separate=True)}
-    ghost = ghost_pixels(viewer, made["together"], made["apart"])
-
-    def judged(test: F32, wanted: F32) -> tuple[dict[str, Any], dict[str, F32]]:
-        maps = {"motion": viewer.paper(test, wanted, view.velocity_deg_s)}
-        maps["still"] = viewer.paper(test, wanted, None)
-        numbers = {
-            name: {"score": score_in(jnd, ghost), "visible_percent": visible_percent(jnd, ghost)}
-            for name, jnd in maps.items()
-        }
-        return numbers, maps
-
-    effect, maps = judged(made["together"], made["apart"])
-    row = {
-        "frame": windows.job.path.numbers[frame],
-        "mean_deg_s": float(view.speed_deg_s.mean()),
-        "ghost_deg_s": float(np.median(view.speed_deg_s[ghost])) if ghost.any() else None,
-        "ghost_percent": 100.0 * float(ghost.mean()),
-        "effect": effect,
-        "reference": {name: judged(color, reference)[0] for name, color in made.items()},
-        "raw": {name: judged(color, raw)[0] for name, color in made.items()},
+    together, apart = filtered(separate=False), filtered(separate=True)
+    changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.item)
+    places = {"ghosts": changed & ~near, "outlines": changed & near}
+    maps = {
+        kind: {how: viewer.paper(test, wanted, velocity) for how, velocity in _hows(view).items()}
+        for kind, (test, wanted) in {
+            "effect": (together, apart),
+            "reference together": (together, reference),
+            "reference apart": (apart, reference),
+            "raw together": (together, raw),
+            "raw apart": (apart, raw),
+        }.items()
     }
-    images = {**made, "raw": raw, "reference": reference, **maps, "ghost": ghost.astype(np.float32)}
-    return row, {**images, "speed_deg_s": view.speed_deg_s}
+    row: dict[str, Any] = {"frame": windows.job.path.numbers[frame]}
+    for place, where in places.items():
+        row[place] = {
+            "pixels": 100.0 * float(where.mean()),
+            "deg_s": float(np.median(view.speed_deg_s[where])) if where.any() else None,
+            **{kind: {how: _said(jnd, where) for how, jnd in by.items()} for kind, by in maps.items()},
+        }
+    images = {"together": together, "apart": apart, "raw": raw, "reference": reference, **maps["effect"]}
+    shown = {"ghost": places["ghosts"].astype(np.float32), "speed_deg_s": view.speed_deg_s}
+    return row, {**images, **shown}
+
+
+def _hows(view: View) -> dict[str, F32 | None]:
+    return {"motion": view.velocity_deg_s, "still": None}
+
+
+def _said(jnd: F32, where: Mask) -> dict[str, float | None]:
+    return {"score": score_in(jnd, where), "visible_percent": visible_percent(jnd, where)}

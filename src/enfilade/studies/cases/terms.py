@@ -28,10 +28,12 @@ class Terms:
         Size of the short sequences that are filtered in many ways.
     window_spp : int
         Their paths a pixel.
+    window_reference_spp : int
+        Paths a pixel of what is taken for the truth of them.
+    windows, traced_windows : int
+        How many such sequences a scene has without noise, and path traced.
     reference_spp : int
-        Paths a pixel of what is taken for the truth.
-    windows : int
-        How many such sequences a scene has.
+        Paths a pixel of what is taken for the truth of whole walkthroughs.
     crop : (int, int)
         Part of a frame, in its middle, in which the quality of whole walkthroughs is judged.
     crops : int
@@ -48,8 +50,10 @@ class Terms:
     sweep_step: int
     window_size: tuple[int, int]
     window_spp: int
-    reference_spp: int
+    window_reference_spp: int
     windows: int
+    traced_windows: int
+    reference_spp: int
     crop: tuple[int, int]
     crops: int
     most_spp: int
@@ -68,11 +72,13 @@ TERMS = {
         sweep_step=2,
         window_size=(160, 120),
         window_spp=32,
-        reference_spp=1024,
+        window_reference_spp=512,
         windows=3,
+        traced_windows=2,
+        reference_spp=512,
         crop=(160, 120),
         crops=2,
-        most_spp=256,
+        most_spp=128,
         decoupled_frames=24,
     ),
     "full": Terms(
@@ -80,10 +86,12 @@ TERMS = {
         size=(640, 480),
         spp=8,
         sweep_step=4,
-        window_size=(320, 240),
-        window_spp=32,
-        reference_spp=1024,
+        window_size=(240, 180),
+        window_spp=24,
+        window_reference_spp=384,
         windows=4,
+        traced_windows=2,
+        reference_spp=1024,
         crop=(256, 192),
         crops=2,
         most_spp=256,
