@@ -12,6 +12,7 @@ from enfilade.backends.scenecheck import check_scene
 from enfilade.backends.trial import try_scene
 from enfilade.codec import write_exr
 from enfilade.errors import SceneError
+from enfilade.scenes import write_scene
 from enfilade.settings import LimitSettings
 
 
@@ -43,6 +44,14 @@ def texture(name):
 def test_a_plain_scene_passes(scene):
     file = scene(f'<shape type="sphere"><bsdf type="diffuse">{texture("picture.exr")}</bsdf></shape>')
     assert [f.name for f in check_scene(file, LimitSettings())] == ["picture.exr"]
+
+
+@pytest.mark.parametrize("name", ["room", "atrium"])
+def test_the_generated_scenes_pass(name, tmp_path):
+    files = write_scene(name, tmp_path, preset="small")
+    named = check_scene(files.scene, LimitSettings())
+    assert set(named) >= {f.resolve() for f in tmp_path.rglob("*.pfm")}
+    assert named
 
 
 @pytest.mark.parametrize("kind", ["../../evil", "/tmp/evil", "Sphere", "a b", "", "$which", "sphere&#10;"])  # noqa: S108
@@ -141,6 +150,11 @@ def test_pictures_are_bounded_by_their_headers(scene):
     (file.parent / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n")
     refused(file, "9999.8 million pixels")
     (file.parent / "sky.hdr").write_bytes(b"#?RADIANCE\n\n-Y x +X 9\n")
+    refused(file, "without a size")
+    file = scene(texture("map.pfm"))
+    (file.parent / "map.pfm").write_bytes(b"PF\n40000 30000\n-1.0\n\0")
+    refused(file, "1200 million pixels")
+    (file.parent / "map.pfm").write_bytes(b"PF\n4 ")
     refused(file, "without a size")
 
 

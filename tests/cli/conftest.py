@@ -54,6 +54,6 @@ def jobs(monkeypatch):
         monkeypatch.setitem(sys.modules, f"enfilade.pipeline.{name}", SimpleNamespace(**members))
 
     fake("job", Job=SimpleNamespace)
-    fake("walkthrough", render=render)
+    fake("walkthrough", render=render, prepare=lambda job, folder: take(job))
     fake("plan", plan=plan)
     return told

@@ -11,7 +11,19 @@ import click
 from enfilade import __version__
 from enfilade.errors import EnfiladeError, InputError
 
-COMMANDS = ("render", "plan", "compare", "report", "bench", "calibrate", "scene", "validate", "doctor")
+COMMANDS = (
+    "render",
+    "work",
+    "farm",
+    "plan",
+    "compare",
+    "report",
+    "bench",
+    "calibrate",
+    "scene",
+    "validate",
+    "doctor",
+)
 FAILURE = 1
 WRONG_INPUT = 2
 INTERRUPTED = 130

@@ -139,6 +139,44 @@ class LineMonitor:
         self._write(text)
 
 
+class OpenJdMonitor:
+    """Progress as Open Job Description wants it on stdout, in percent of the present stage.
+
+    Parameters
+    ----------
+    write
+        Takes one line.
+    """
+
+    def __init__(self, write: Callable[[str], object]) -> None:
+        self._write = write
+        self._stages: dict[str, list[int]] = {}  # done, total
+        self._now = ""
+
+    def stage(self, name: str, total: int) -> None:
+        """Say that a stage begins or goes on."""
+        self._now = name
+        if name not in self._stages:
+            self._write(f"openjd_status: {name}")
+        self._stages.setdefault(name, [0, 0])[1] += total
+
+    def advance(self, count: int = 1) -> None:
+        """Say how far the stage is."""
+        stage = self._stages.get(self._now)
+        if stage is not None:
+            stage[0] += count
+            self._write(f"openjd_progress: {min(100.0 * stage[0] / max(stage[1], 1), 100.0):.1f}")
+
+    def extend(self, count: int) -> None:
+        """Count the added units."""
+        if self._now in self._stages:
+            self._stages[self._now][1] += count
+
+    def say(self, text: str) -> None:
+        """Write a line."""
+        self._write(text)
+
+
 def _times(stage: _Count, now: float) -> str:
     elapsed = now - stage.started_s
     if stage.done >= stage.total:

@@ -33,12 +33,26 @@ LEDGER = "ledger.jsonl"
     is_flag=True,
     help="Compare every file that is there with its checksum first; what is damaged is made again.",
 )
+@click.option(
+    "--prepare",
+    "is_prepared",
+    is_flag=True,
+    help="Begin the run folder and render nothing: for `enfilade farm` and `enfilade work`.",
+)
 @output_options
 @debug_option
 @settings_options(*JOB_SECTIONS)
 @click.pass_context
 def command(
-    ctx: click.Context, /, *, folder: Path, is_verified: bool, as_json: bool, quiet: bool, **inputs: Any
+    ctx: click.Context,
+    /,
+    *,
+    folder: Path,
+    is_verified: bool,
+    is_prepared: bool,
+    as_json: bool,
+    quiet: bool,
+    **inputs: Any,
 ) -> None:
     """Render a walkthrough of SCENE (Mitsuba 3 XML) into frames, a video and a report of the cost."""
     mark_resumable(ctx)
@@ -46,8 +60,12 @@ def command(
     job = job_of(ctx, **inputs)
     crew = crew_of(*who)
     from enfilade.cli.progress import watch
-    from enfilade.pipeline.walkthrough import render
+    from enfilade.pipeline.walkthrough import prepare, render
 
+    if is_prepared:
+        prepare(job, folder)
+        click.echo(f"run     {folder}")
+        return
     before = _size(folder / LEDGER)
     with watch(quiet=quiet) as monitor:
         summary = render(job, folder, monitor, crew, is_verified=is_verified, is_tried=True)

@@ -31,6 +31,8 @@ def picture_pixels(file: Path) -> int:
         return exr_pixels(file)
     if start.startswith(b"#?"):
         return _radiance(file, start)
+    if start[:2] in (b"PF", b"Pf"):
+        return _portable(file, start)
     return _other(file)
 
 
@@ -40,6 +42,14 @@ def _radiance(file: Path, start: bytes) -> int:
     if len(words) == 4 and words[1].isdigit() and words[3].isdigit():
         return int(words[1]) * int(words[3])
     raise ImageError(f"{file} is a Radiance picture without a size")
+
+
+def _portable(file: Path, start: bytes) -> int:
+    # Portable float map: "PF", width, height, and a scale, with white space between them.
+    words = start[:256].split(maxsplit=3)
+    if len(words) == 4 and words[1].isdigit() and words[2].isdigit():
+        return int(words[1]) * int(words[2])
+    raise ImageError(f"{file} is a portable float map without a size")
 
 
 def _other(file: Path) -> int:

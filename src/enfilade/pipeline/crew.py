@@ -64,7 +64,7 @@ def carry_out(
     monitor: Monitor,
     *,
     is_wanted: Callable[[Unit], bool] | None = None,
-) -> Blueprint:
+) -> list[str]:
     """Do all units of a run that are not done.
 
     Parameters
@@ -79,7 +79,8 @@ def carry_out(
 
     Returns
     -------
-    Blueprint
+    list of str
+        Names of units of this command's share that wait for others.
 
     Raises
     ------
@@ -94,14 +95,14 @@ def carry_out(
         executor: Executor | None = None
         for _ in range(REPAIRS):
             shift = _Shift(job, run, monitor, is_wanted or _everything)
-            if not shift.has_work:
-                return shift.blueprint
+            if not shift.left:
+                return []
             if executor is None:
                 executor = _open(job, run, crew, monitor)
                 stack.callback(executor.close)
             damaged = shift.work(executor)
             if damaged is None:
-                return shift.blueprint
+                return shift.left
             run.forget(damaged)
             monitor.say(f"{damaged} is missing or damaged: what made it is done again")
     raise EnfiladeError(f"more than {REPAIRS} files of {run.folder} were damaged while it was worked on")
@@ -132,18 +133,18 @@ class _Shift:
     """One pass over the units, until all are done or a damaged file is found."""
 
     def __init__(self, job: Job, run: Run, monitor: Monitor, is_wanted: Callable[[Unit], bool]) -> None:
-        self.blueprint = Blueprint(job, run)
+        self._blueprint = Blueprint(job, run)
         self._run = run
         self._monitor = monitor
         self._is_wanted = is_wanted
         self._graph = Graph()
         self._progress = _Progress(monitor)
-        self._take_up(self.blueprint.first())
+        self._take_up(self._blueprint.first())
 
     @property
-    def has_work(self) -> bool:
-        """Whether something is to be done."""
-        return any(self._is_wanted(unit) for unit in self._graph.unfinished())
+    def left(self) -> list[str]:
+        """Names of units that are to be done."""
+        return [unit.name for unit in self._graph.unfinished() if self._is_wanted(unit)]
 
     def work(self, executor: Executor) -> str | None:
         """Returns the name of a damaged file, if one is found."""
@@ -152,7 +153,7 @@ class _Shift:
                 self._graph,
                 executor,
                 follow=self._finished,
-                is_done=self.blueprint.is_done,
+                is_done=self._blueprint.is_done,
                 failed=self._failed,
             )
         except NoSpaceError as error:
@@ -170,7 +171,7 @@ class _Shift:
         pending = deque(units)
         while pending:
             unit = pending.popleft()
-            is_done = not unit.is_gate and self.blueprint.is_done(unit)
+            is_done = not unit.is_gate and self._blueprint.is_done(unit)
             if not unit.is_gate and not is_done and not self._is_wanted(unit):
                 continue
             if is_done:
@@ -179,11 +180,11 @@ class _Shift:
             self._progress.add(unit)
             if is_done:
                 self._progress.finish(unit)
-                pending.extend(self.blueprint.follow(unit))
+                pending.extend(self._blueprint.follow(unit))
 
     def _finished(self, unit: Unit) -> tuple[Unit, ...]:
         self._progress.finish(unit)
-        self._take_up(self.blueprint.follow(unit))
+        self._take_up(self._blueprint.follow(unit))
         return ()
 
     def _failed(self, unit: Unit, failure: Failure, attempt: int) -> None:

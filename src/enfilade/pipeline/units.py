@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from enfilade.executors import Unit
@@ -12,9 +12,51 @@ from enfilade.pipeline.survey import Survey, initial_segments
 from enfilade.records import Segment
 from enfilade.store import Run
 
+
+@dataclass(frozen=True)
+class Step:
+    """Units that can be done at the same time, by commands that share a run.
+
+    Attributes
+    ----------
+    name : str
+    kinds : set of str
+        Of the units.
+    is_shared : bool
+        Whether there are so many that several commands may share them.
+    """
+
+    name: str
+    kinds: set[str]
+    is_shared: bool = False
+
+
 BLOCK = 16  # frames that one worker does in a row where it can: they share what is in memory
 # Stages, in the order in which their units are begun.
 SURVEY, DRAFTS, CELLS, PILOT, KEYFRAMES, LIGHT, INBETWEENS, FRAMES, VIDEO = range(9)
+
+# Steps of a run by method, one after the other.
+STEPS: dict[str, list[Step]] = {
+    "reference": [
+        Step("plan", {"survey"}),
+        Step("frames", {"reference"}, is_shared=True),
+    ],
+    "paper": [
+        Step("plan", {"survey"}),
+        Step("keyframes", {"keyframe"}, is_shared=True),
+        Step("segments", {"keyframe", "segment", "raw"}, is_shared=True),
+        Step("frames", {"antialias"}, is_shared=True),
+    ],
+    "decoupled": [
+        Step("plan", {"survey"}),
+        Step("drafts", {"draft"}, is_shared=True),
+        Step("cells", {"cells"}, is_shared=True),
+        Step("pilot", {"pilot"}),
+        Step("keyframes", {"page"}, is_shared=True),
+        Step("light", {"light"}, is_shared=True),
+        Step("frames", {"decoupled"}, is_shared=True),
+    ],
+}
 
 
 class Blueprint:
@@ -46,7 +88,7 @@ class Blueprint:
             case "paper", "survey":
                 yield from self._paper()
             case "paper", "segment":
-                yield from self._after_segment(_segment(unit.facts["segment"]), unit.name)
+                yield from self._after_segment(unit)
             case "decoupled", "survey":
                 yield from self._decoupled()
 
@@ -76,14 +118,18 @@ class Blueprint:
 
     def _paper(self) -> Iterator[Unit]:
         path = self._job.path
-        for segments in self.shots():
-            for frame in sorted({s.first for s in segments} | {s.last for s in segments}):
-                yield from self._keyframe(frame)
+        for shot, segments in zip(path.shots(), self.shots(), strict=True):
+            keyframes = {s.first for s in segments} | {s.last for s in segments}
+            for frame in sorted(keyframes):
+                yield from self._keyframe(frame, frame)
             for segment in segments:
-                yield self._segment(segment)
-        for frame in range(len(path)):
-            if path.original(frame) != frame:
-                yield self._raw(frame, {"copy": True}, f"raw {self._numbers[path.original(frame)]}")
+                yield self._segment(segment, segment.first)
+            for frame in shot:
+                original = path.original(frame)
+                if original != frame:
+                    owners = [s.first for s in segments if s.first < original < s.last]
+                    facts = {"copy": True, "root": next(iter(owners), original)}
+                    yield self._raw(frame, facts, f"raw {self._numbers[original]}")
         reach = max(self._job.settings.antialias.frames, self._job.settings.antialias.slow_frames) // 2
         for shot in path.shots():
             for frame in shot:
@@ -92,34 +138,35 @@ class Blueprint:
                 yield self._frame(frame, "antialias", stage="antialiasing", needs=needs)
         yield self._video()
 
-    def _keyframe(self, frame: int) -> Iterator[Unit]:
+    def _keyframe(self, frame: int, root: int) -> Iterator[Unit]:
         name = f"keyframe {self._numbers[frame]}"
         order, group = (KEYFRAMES, frame, 0), f"keyframe {frame // BLOCK}"
         stage = "keyframes and segments"
-        yield Unit(name, "keyframe", {"frame": frame}, ("survey",), order, group, stage)
-        yield self._raw(frame, {"keyframe": True}, name)
+        yield Unit(name, "keyframe", {"frame": frame, "root": root}, ("survey",), order, group, stage)
+        yield self._raw(frame, {"keyframe": True, "root": root}, name)
 
-    def _segment(self, segment: Segment, whole: str | None = None) -> Unit:
+    def _segment(self, segment: Segment, root: int, whole: str | None = None) -> Unit:
         ends = self._numbers[segment.first], self._numbers[segment.last]
         return Unit(
             segment_name(*ends),
             "segment",
-            {"segment": [segment.first, segment.last, segment.depth], "whole": whole},
+            {"segment": [segment.first, segment.last, segment.depth], "whole": whole, "root": root},
             tuple(f"keyframe {number}" for number in ends),
             (KEYFRAMES, segment.last, 1, segment.depth),
             f"keyframe {segment.last // BLOCK}",
             "keyframes and segments",
         )
 
-    def _after_segment(self, segment: Segment, name: str) -> Iterator[Unit]:
+    def _after_segment(self, unit: Unit) -> Iterator[Unit]:
+        segment, root, name = Segment(*unit.facts["segment"]), unit.facts["root"], unit.name
         line = self._run.done(name)
         verdict: dict[str, Any] = line["verdict"] if line else {}
         if verdict["is_split"] and verdict["middle"] is not None:
-            yield from self._keyframe(verdict["middle"])
+            yield from self._keyframe(verdict["middle"], root)
             for half in segment.split(verdict["middle"]):
-                yield self._segment(half, name)
+                yield self._segment(half, root, name)
             return
-        facts = {"segment": [segment.first, segment.last, segment.depth]}
+        facts = {"segment": [segment.first, segment.last, segment.depth], "root": root}
         for frame in segment.inbetweens:
             if self._job.path.original(frame) == frame:
                 yield self._raw(frame, facts, name)
@@ -199,5 +246,9 @@ def segment_name(first: int, last: int) -> str:
     return f"segment {first}-{last}"
 
 
-def _segment(facts: list[int]) -> Segment:
-    return Segment(*facts)
+def place_of(unit: Unit) -> int:
+    """The frame by which a unit is shared out: all that comes of one initial segment goes together."""
+    facts = unit.facts
+    if "root" in facts:
+        return int(facts["root"])
+    return int(facts["segment"][0] if "segment" in facts else facts.get("frame", 0))

@@ -12,6 +12,7 @@ from enfilade.monitor import Monitor
 from enfilade.pipeline.crew import Crew, carry_out
 from enfilade.pipeline.job import JOB_FILE, Job
 from enfilade.pipeline.summary import summarize
+from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.video import check_encodable
 
@@ -73,9 +74,11 @@ def render(
         _write_job(run, job)
         if is_verified:
             _verify(run, monitor)
-        blueprint = carry_out(job, run, crew, monitor)
+        carry_out(job, run, crew, monitor)
         video = next(iter((run.done("video") or {})["files"]))
-        summary = summarize(run, blueprint.survey(), video, has_workers=crew.executor != "in-process")
+        summary = summarize(
+            run, Blueprint(job, run).survey(), video, has_workers=crew.executor != "in-process"
+        )
         run.write_json("summary.json", summary)
     return summary
 

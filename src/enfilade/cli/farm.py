@@ -1,0 +1,63 @@
+"""``enfilade farm``: a run for a render manager, or for Slurm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from enfilade.cli.group import debug_option
+
+
+@click.command("farm", short_help="Give a run to a render farm (Open Job Description) or to Slurm.")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option(
+    "--chunks",
+    type=click.IntRange(1),
+    help="How many tasks share a step.  [default: one for each 16 frames]",
+)
+@click.option(
+    "--out",
+    "file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="The job template.  [default: farm.template.json in the run folder]",
+)
+@click.option(
+    "--submit",
+    "cluster",
+    type=click.Choice(("slurm", "local")),
+    help="Give it to Slurm now, or to processes of this machine to try that, instead of writing a template.",
+)
+@click.option(
+    "--slurm",
+    "options",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="A parameter of submitit's, such as slurm_partition=cpu or timeout_min=120; as often as wanted.",
+)
+@debug_option
+def command(
+    *, run: Path, chunks: int | None, file: Path | None, cluster: str | None, options: tuple[str, ...]
+) -> None:
+    """Write a job template for the run in the folder RUN, which `enfilade render --prepare` begins.
+
+    All hosts must see the folder, and the scene, under the same names. Each task is an `enfilade work`
+    command and can be given to any host again.
+    """
+    from enfilade.pipeline.farm import TEMPLATE, submit, write_template
+
+    if cluster is not None:
+        jobs = submit(run, cluster, chunks, dict(_pair(text) for text in options))
+        click.echo(f"jobs    {', '.join(jobs)}")
+        return
+    out = run / TEMPLATE if file is None else file
+    write_template(run, out, chunks)
+    click.echo(f"template {out}")
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    key, _, value = text.partition("=")
+    if not key or not value:
+        raise click.BadParameter(f"{text!r} is not KEY=VALUE", param_hint="--slurm")
+    return key, int(value) if value.isdigit() else value
