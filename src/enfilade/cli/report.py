@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -44,6 +46,15 @@ PAGE = "report.html"
     show_default=True,
     help="Size of the page that is not exceeded: pictures are scaled, then frames left out. At least 8.",
 )
+@click.option(
+    "--serve",
+    "is_served",
+    is_flag=True,
+    help="Show it to browsers of this machine and follow the run, until interrupted; nothing is written.",
+)
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Port of --serve.  [default: any that is free]"
+)
 @quiet_option
 @debug_option
 def command(
@@ -54,6 +65,8 @@ def command(
     has_metric: bool,
     frames: str | None,
     max_mb: float,
+    is_served: bool,
+    port: int,
     quiet: bool,
 ) -> None:
     """Write a page about the finished or running run in the folder RUN.
@@ -67,8 +80,21 @@ def command(
 
     numbers = None if frames is None else parse_frames(frames)
     page = run / PAGE if file is None else file
+    wishes = Wishes(reference, numbers, max_mb, has_metric)
+    if is_served:
+        _serve(run, wishes, port)
+        return
     with watch(quiet=quiet) as monitor:
-        notes = write_page(run, page, Wishes(reference, numbers, max_mb, has_metric), monitor)
+        notes = write_page(run, page, wishes, monitor)
     for note in notes:
         click.echo(f"note    {note}", err=True)
     click.echo(f"report  {page}")
+
+
+def _serve(run: Path, wishes: Any, port: int) -> None:
+    from enfilade.report.live import Live
+
+    with Live(run, wishes, port) as live:
+        click.echo(f"report  {live.address}")
+        with contextlib.suppress(KeyboardInterrupt):
+            live.wait()
