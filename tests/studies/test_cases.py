@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from enfilade.codec import read_json
-from enfilade.errors import InputError
 from enfilade.geometry import find_geometry, image_flow
 from enfilade.keyframes import place_keyframes
 from enfilade.monitor import Silence
@@ -21,7 +20,6 @@ from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement
 from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
 from enfilade.studies.cases import times as table2
 from enfilade.studies.cases.case import Case, stretch_of
-from enfilade.studies.cases.document import replaced
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from enfilade.studies.cases.plain import PlainlyLit
@@ -377,15 +375,6 @@ def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):
 def test_items_depend_on_terms_that_exist(item):
     assert set(item.fields) <= set(TERMS["small"].to_dict())
     assert "preset" in item.fields
-
-
-def test_a_block_is_replaced_and_the_rest_stays():
-    text = "before\n<!-- a -->\nold\n<!-- /a -->\nafter\n<!-- b -->\n<!-- /b -->\n"
-    new = replaced(text, "a", r"new \1")
-    assert new == "before\n<!-- a -->\n\nnew \\1\n\n<!-- /a -->\nafter\n<!-- b -->\n<!-- /b -->\n"
-    assert replaced(new, "a", r"new \1") == new
-    with pytest.raises(InputError, match="no block"):
-        replaced(text, "c", "x")
 
 
 def test_still_settings_are_the_paper_s():
