@@ -225,6 +225,14 @@ def test_art_is_the_least_number_of_paths_at_which_nothing_is_seen():
     assert table2.art_spp({4: said(20.0), 8: said(3.0)}) == (8, True)
 
 
+def test_equal_quality_is_read_off_the_series():
+    series = [{"spp": n, "frames": [{"score": 40.0 / n}, {"score": 80.0 / n}]} for n in (4, 8, 16)]  # 60 / n
+    assert table2.equal_spp(series, 7.5) == pytest.approx(8.0)
+    assert table2.equal_spp(series, 60.0 / 11.0) == pytest.approx(11.0)
+    assert table2.equal_spp(series, 2.0) is None
+    assert table2.equal_spp(series, 99.0) is None
+
+
 def test_the_paper_s_ratios():
     of = table2.PAPER_MINUTES
     assert of["atrium"]["art"] / of["atrium"]["ibr_rt"] == pytest.approx(8.3, abs=0.05)

@@ -136,6 +136,8 @@ def _times(found: Results, terms: Terms, _folder: Path, place: Path) -> tuple[st
                     *seen,
                 )
             )
+    heads_equal = ("scene", "as good as", "ART takes, paths", "ART, CPU s", "times as long", "paper")
+    equal = _table(heads_equal, _equal_rows(found))
     stages = _table(("scene", "way", "stage", "CPU, s"), _stage_rows(found))
     series = _table(("scene", "ART, paths", "JND", "above 1 JND, %"), _series_rows(found))
     said = [
@@ -145,7 +147,26 @@ def _times(found: Results, terms: Terms, _folder: Path, place: Path) -> tuple[st
         for scene, of in found.items()
     ]
     file = figures.draw_times(found, place / "times.png")
-    return _block(_size(terms), _table(heads, rows), *said, stages, series, figure=file), [file]
+    return _block(_size(terms), _table(heads, rows), *said, equal, stages, series, figure=file), [file]
+
+
+def _equal_rows(found: Results) -> list[tuple[Any, ...]]:
+    """ART with as many paths as make it as good by the metric, beside what it is compared with."""
+    rows: list[tuple[Any, ...]] = []
+    for scene, of in found.items():
+        art, papers = of["ways"]["art"], times.PAPER_MINUTES[scene]
+        for way in ("ibr_rt", "decoupled"):
+            one = of["ways"][way]
+            spp = times.equal_spp(of["art_series"], _mean([f["score"] for f in one["frames"]]))
+            if spp is None:
+                rows.append((scene, WAYS[way], "beyond the series", "–", "–", ""))
+                continue
+            cost = art["cpu_s"] * spp / art["spp"]
+            papers_ratio = f"{papers['art'] / papers['ibr_rt']:.1f}" if way == "ibr_rt" else ""
+            rows.append(
+                (scene, WAYS[way], f"{spp:.0f}", f"{cost:.1f}", f"{cost / one['cpu_s']:.1f}", papers_ratio)
+            )
+    return rows
 
 
 def _stage_rows(found: Results) -> list[tuple[Any, ...]]:

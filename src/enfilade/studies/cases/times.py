@@ -23,7 +23,7 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.studies.cases.case import Case
 from enfilade.studies.cases.seen import Viewer, visible_percent
 
-__all__ = ["PAPER_MINUTES", "art_spp", "measure"]
+__all__ = ["PAPER_MINUTES", "art_spp", "equal_spp", "measure"]
 
 PAPER_MINUTES = {  # Table 2, for a frame
     "atrium": {"art": 170.0, "rt": 40.0, "ibr_rt": 20.5},
@@ -114,6 +114,29 @@ def art_spp(series: dict[int, list[dict[str, float]]]) -> tuple[int, bool]:
         if all(said["visible_percent"] <= UNSEEN_PERCENT for said in series[spp]):
             return spp, False
     return max(series), True
+
+
+def equal_spp(series: list[dict[str, Any]], score: float) -> float | None:
+    """Number of paths at which ART is as good as something of that score, JND, by straight lines on log axes.
+
+    Parameters
+    ----------
+    series
+        ``art_series`` of :func:`measure`.
+    score
+
+    Returns
+    -------
+    float or None
+        None where the score lies beyond the series.
+    """
+    spp = [float(row["spp"]) for row in series]
+    scores = [float(np.mean([said["score"] for said in row["frames"]])) for row in series]
+    if not min(scores) <= score <= max(scores):
+        return None
+    by_score = np.argsort(scores)
+    known = np.log(np.array(scores)[by_score])
+    return float(np.exp(np.interp(np.log(score), known, np.log(np.array(spp)[by_score]))))
 
 
 def _judged_frames(case: Case) -> list[int]:
