@@ -39,6 +39,9 @@ STAGE_COLORS = {
     "geometry": ORANGE,
     "files": "#56B4E9",
     "video": "#CC79A7",
+    "gather": "#882255",
+    "scatter": "#332288",
+    "scout": "#999933",
 }
 Scenes = Mapping[str, Any]
 
@@ -110,27 +113,44 @@ def _predictions(ax: Any, segments: Sequence[Mapping[str, Any]], limit: float) -
 
 
 def draw_times(found: Scenes, file: Path) -> Path:
-    """Table 2: CPU seconds of a frame by each way, what it is spent on, and how ART gains by paths."""
-    figure, axes = _grid(len(found), 2, (5.6, 2.7), ratios=(1.6, 1.0))
+    """Table 2: CPU time of a frame and what it is spent on; error over CPU time, ART by its paths."""
+    figure, axes = _grid(len(found), 2, (5.6, 2.7), ratios=(1.3, 1.0))
     for (left, right), (scene, of) in zip(axes, found.items(), strict=True):
-        for place, way in enumerate(WAYS):
+        shown = [way for way in WAYS if way != "art"]
+        for place, way in enumerate(shown):
             _bar(left, place, of["ways"][way])
             total = of["ways"][way]["cpu_s"]
             left.text(total, place, f" {total:.2f} s", va="center", fontsize=8.5, color=INK)
-        left.set_yticks(range(len(WAYS)), list(WAYS.values()))
+        left.set_yticks(range(len(shown)), [WAYS[way] for way in shown])
         left.invert_yaxis()
         left.margins(x=0.16)
         _titled(left, f"{scene}: a frame", "CPU time, s", "")
         left.grid(axis="x", color="#DDDDDD", linewidth=0.6)
-        spp = [row["spp"] for row in of["art_series"]]
-        seen = [float(np.mean([f["visible_percent"] for f in row["frames"]])) for row in of["art_series"]]
-        right.plot(spp, seen, "o-", color=BLUE)
-        right.set_xscale("log", base=2)
-        right.axhline(1.0, color=INK, linestyle=":", linewidth=1.1)
-        _titled(right, "ART against its reference", "paths a pixel", "above 1 JND, %")
+        _error_over_time(right, of)
+        _titled(right, "error against the reference", "CPU time of a frame, s", "JND")
     handles, labels = _by_label(axes[:, 0])
-    axes[0][0].legend(handles, labels, fontsize=7.5, frameon=False, loc="lower right", ncols=2)
+    figure.legend(handles, labels, loc="outside lower left", fontsize=8, frameon=False, ncols=len(labels))
+    axes[0][1].legend(fontsize=7.5, frameon=False)
     return save(figure, file)
+
+
+def _error_over_time(ax: Any, of: Mapping[str, Any]) -> None:
+    art = of["ways"]["art"]
+    cost = [art["cpu_s"] * row["spp"] / art["spp"] for row in of["art_series"]]
+    error = [_mean_score(row) for row in of["art_series"]]
+    ax.plot(cost, error, "o--", color="#7A7A7A", markersize=4, label="ART, 4 paths and more")
+    for way, color, mark in (("ibr_rt", GREEN, "^"), ("decoupled", BLUE, "D")):
+        one = of["ways"][way]
+        ax.plot([one["cpu_s"]], [_mean_score(one)], mark, color=color, markersize=8, label=WAYS[way])
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
+    ax.minorticks_off()
+    ax.set_xlim(left=0.5 * min(*cost, *(of["ways"][w]["cpu_s"] for w in ("ibr_rt", "decoupled"))))
+
+
+def _mean_score(row: Mapping[str, Any]) -> float:
+    return float(np.mean([said["score"] for said in row["frames"]]))
 
 
 def _bar(ax: Any, place: int, way: Mapping[str, Any]) -> None:
@@ -181,9 +201,10 @@ def draw_threshold(found: Scenes, file: Path) -> Path:
         ax.set_xscale("symlog", linthresh=0.1)
         ax.set_yscale("symlog", linthresh=1.0)
         ax.set_ylim(bottom=0.0)
+        ax.set_xlim(left=0.0)
         ax.set_xticks([0.0, 0.1, 0.5, 1.0, 5.0, 20.0], ["0", "0.1", "0.5", "1", "5", "20"])
         ax.set_yticks([0.0, 0.5, 1.0, 3.0, 10.0, 30.0, 100.0], ["0", "0.5", "1", "3", "10", "30", "100"])
-    left.legend(fontsize=8, frameon=False, loc="upper right")
+    figure.legend(loc="outside lower center", fontsize=8.5, frameon=False, ncols=4)
     _titled(left, "I_c against I_rt, pixels that are reused", "v_t, deg/s", "above 1 JND, %")
     _titled(right, "I_ibr against I_rt, by velocity", "velocity, deg/s", "above 1 JND, %")
     return save(figure, file)
