@@ -46,6 +46,9 @@ def jobs(monkeypatch):
         (folder / "summary.json").write_text(json.dumps(answer))
         return answer
 
+    def prepare(job, folder):
+        take(job)
+
     def plan(job, monitor):
         answer = take(job)
         return SimpleNamespace(to_dict=lambda: answer)
@@ -54,6 +57,6 @@ def jobs(monkeypatch):
         monkeypatch.setitem(sys.modules, f"enfilade.pipeline.{name}", SimpleNamespace(**members))
 
     fake("job", Job=SimpleNamespace)
-    fake("walkthrough", render=render, prepare=lambda job, folder: take(job))
+    fake("walkthrough", render=render, prepare=prepare)
     fake("plan", plan=plan)
     return told

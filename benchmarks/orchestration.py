@@ -1,0 +1,180 @@
+"""What it costs to keep a run restartable, and what workers gain.
+
+    python benchmarks/orchestration.py [length overhead workers ray] [--frames 2000]
+
+length     a long run: memory and open files on the way, then how fast it is resumed, and another run refused
+overhead   what a unit costs beside its work, in process and in worker processes
+workers    two workers of one thread against one, wall time of the tracing of a Mitsuba scene
+ray        a local Ray cluster against worker processes, units of more than 5 s
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+KINDS = ("length", "overhead", "workers", "ray")
+UNITS = 1000
+SAMPLE_S = 0.25
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("kinds", nargs="*", choices=[*KINDS, []], default=list(KINDS))
+    parser.add_argument("--frames", type=int, default=2000)
+    arguments = parser.parse_args()
+    print(f"{len(os.sched_getaffinity(0))} CPU cores, load {os.getloadavg()[0]:.1f}")
+    with tempfile.TemporaryDirectory(prefix="orchestration-") as name:
+        for kind in arguments.kinds:
+            match kind:
+                case "length":
+                    measure_length(Path(name), arguments.frames)
+                case "overhead":
+                    measure_overhead(Path(name))
+                case "workers":
+                    measure_workers(Path(name))
+                case "ray":
+                    measure_ray(Path(name))
+
+
+def measure_length(folder: Path, frames: int) -> None:
+    """Memory and open files over a long run, then resuming and refusing it."""
+    line = analytic(folder, frames)
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    samples = []
+    while process.poll() is None:
+        samples.append(look(process.pid, folder / "run" / "ledger.jsonl"))
+        time.sleep(SAMPLE_S)
+    if process.returncode:
+        raise RuntimeError(f"exit code {process.returncode}")
+    print(f"length: {frames} frames; by tenths of the ledger, MiB of memory and open files at most")
+    done = [s for s in samples if s is not None]
+    most = max(size for size, _, _ in done)
+    for tenth in range(10):
+        here = [s for s in done if tenth * most / 10 <= s[0] <= (tenth + 1) * most / 10]
+        if here:
+            print(f"  {tenth + 1:2}  {max(m for _, m, _ in here):7.1f}  {max(f for _, _, f in here):3}")
+    begin = time.perf_counter()
+    subprocess.run(line, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    print(f"resumed, with nothing left to do, in {time.perf_counter() - begin:.2f} s")
+    begin = time.perf_counter()
+    other = subprocess.run([*line, "--spp", "3"], check=False, capture_output=True, text=True)
+    print(
+        f"another run refused in {time.perf_counter() - begin:.2f} s: {other.stderr.splitlines()[1].strip()}"
+    )
+
+
+def look(pid: int, ledger: Path) -> tuple[int, float, int] | None:
+    """Size of the ledger, memory in MiB and open files of a process; None where it has just ended."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        files = len(list(Path(f"/proc/{pid}/fd").iterdir()))
+        return ledger.stat().st_size, pages * os.sysconf("SC_PAGE_SIZE") / 2**20, files
+    except OSError:
+        return None
+
+
+def analytic(folder: Path, frames: int) -> list[str]:
+    """Command of a run of small frames in closed form."""
+    from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
+
+    wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
+    scene, path = folder / "wall.analytic.json", folder / "path.json"
+    scene.write_text(scene_text(AnalyticScene((wall, Sphere((0.5, 0.0, 1.0), 0.5)), noise=0.1)))
+    eyes = {at / 30: [0.02 * at, 0.0, 4.0] for at in (0, frames - 1)}
+    keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
+    path.write_text(json.dumps({"format": "enfilade-path", "fps": 30, "size": [32, 24], "keys": keys}))
+    flags = ["--spp", "2", "--viewing-diagonal-m", "0.0125", "--device", "cpu", "--quiet"]
+    out = ["--out", str(folder / "run")]
+    return [sys.executable, "-m", "enfilade", "render", str(scene), "--path", str(path), *out, *flags]
+
+
+def idle(_spec: object, tell: object) -> object:
+    """A worker that does nothing, at once."""
+    del tell
+
+    def do(kind: str, facts: object) -> None:
+        del kind, facts
+
+    return do
+
+
+def measure_overhead(folder: Path) -> None:
+    """Units that do nothing, but for a line in the ledger each."""
+    from enfilade.executors import Graph, Recipe, Unit, open_executor, supervise
+    from enfilade.store import Run
+
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    for name in ("in-process", "processes"):
+        with Run.open(folder / f"overhead-{name}", {"x": 1}) as run:
+            executor = open_executor(
+                name, Recipe("orchestration:idle"), print, workers=2, logs=folder / "logs"
+            )
+            graph = Graph()
+            for number in range(UNITS):
+                needs = (f"u{number - 2}",) if number > 1 else ()
+                graph.add(Unit(f"u{number}", "idle", needs=needs, order=(0, number)))
+
+            def is_done(unit: Unit, to: Run = run) -> bool:
+                to.record({"unit": unit.name, "files": {}, "cost": {}})
+                return True
+
+            begin = time.perf_counter()
+            supervise(graph, executor, follow=lambda _: (), is_done=is_done, failed=lambda *_: None)
+            seconds = time.perf_counter() - begin
+            executor.close()
+            print(f"overhead, {name}: {1000 * seconds / UNITS:.2f} ms a unit, its line on the disk included")
+
+
+def mitsuba(folder: Path, spp: int, frames: str) -> list[str]:
+    """Inputs of a run that traces every frame of ROOM."""
+    from enfilade.scenes import write_scene
+
+    files = write_scene("room", folder / "room", preset="small")
+    flags = ["--size", "160x120", "--frames", frames, "--method", "reference", "--spp", str(spp)]
+    line = [sys.executable, "-m", "enfilade", "render", str(files.scene), "--path", str(files.path)]
+    return [*line, *flags, "--device", "cpu", "--quiet", "--threads", "1"]
+
+
+def measure_workers(folder: Path) -> None:
+    """The same frames by one worker and by two, each of one thread."""
+    line = mitsuba(folder, 256, "20-35")
+    seconds = {count: run_seconds(folder, line, "processes", count) for count in (1, 2)}
+    times = ", ".join(f"{count} workers {s:.1f} s" for count, s in seconds.items())
+    print(f"workers: {times}, gain {seconds[1] / seconds[2]:.2f}")
+
+
+def measure_ray(folder: Path) -> None:
+    """The same long units by worker processes and by Ray."""
+    line = mitsuba(folder, 4096, "20-27")
+    seconds = {name: run_seconds(folder, line, name, 2) for name in ("processes", "ray")}
+    times = ", ".join(f"{name} {s:.1f} s" for name, s in seconds.items())
+    print(f"ray: {times}, overhead {100 * (seconds['ray'] / seconds['processes'] - 1):.1f} %")
+
+
+def run_seconds(folder: Path, line: list[str], executor: str, workers: int) -> float:
+    """Wall time from the first frame of a run to its last, without starting and the video."""
+    out = folder / "run"
+    shutil.rmtree(out, ignore_errors=True)
+    flags = ["--out", str(out), "--executor", executor, "--workers", str(workers)]
+    process = subprocess.Popen([*line, *flags], stdout=subprocess.DEVNULL)
+    moments: dict[int, float] = {}
+    while process.poll() is None:
+        count = sum(1 for _ in (out / "frames").glob("*.exr"))
+        moments.setdefault(count, time.perf_counter())
+        time.sleep(0.02)
+    if process.returncode:
+        raise RuntimeError(f"exit code {process.returncode}")
+    first, last = min(c for c in moments if c >= workers), max(moments)
+    units = last - first
+    return (moments[last] - moments[first]) / units * last
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""Commands that share a run: `render --prepare`, `work`, `farm`; and who does the work."""
+
+import json
+
+import pytest
+
+import scenes_analytic
+from enfilade.backends.analytic_scene import scene_text
+from enfilade.pipeline.crew import Crew
+
+
+@pytest.fixture
+def begun(run, camera_path, tmp_path):
+    scene = tmp_path / "room.analytic.json"
+    scene.write_text(scene_text(scenes_analytic.room()))
+    line = (
+        "render",
+        scene,
+        "--path",
+        camera_path,
+        "--device",
+        "cpu",
+        "--spp",
+        "2",
+        "--out",
+        tmp_path / "run",
+    )
+    result = run(*line, "--prepare")
+    assert result.exit_code == 0, result.output
+    assert result.stdout == f"run     {tmp_path / 'run'}\n"
+    assert not (tmp_path / "run" / "frames").exists()
+    return line
+
+
+def test_prepared_and_worked_on(run, begun, tmp_path):
+    out = tmp_path / "run"
+    plan = run("work", out, "--step", "plan", "--openjd")
+    assert plan.exit_code == 0, plan.output
+    assert plan.stdout.splitlines()[0] == "openjd_status: plan"
+    assert plan.stdout.splitlines()[-1] == "openjd_progress: 100.0"
+    assert run("work", out, "--step", "frames", "--quiet").exit_code == 1
+    rest = run("work", out, "--quiet")
+    assert rest.exit_code == 0, rest.output
+    assert rest.stdout == f"video   {out / 'video.mp4'}\n"
+    again = run(*begun, "--quiet", "--verify", "--json")
+    assert again.exit_code == 0, again.output
+    assert json.loads(again.stdout)["frames"] == 3
+
+
+def test_a_farm_gets_a_template(run, begun, tmp_path):
+    result = run("farm", tmp_path / "run", "--chunks", "2")
+    assert result.exit_code == 0, result.output
+    file = tmp_path / "run" / "farm.template.json"
+    assert result.stdout == f"template {file}\n"
+    steps = json.loads(file.read_text())["steps"]
+    assert steps[2]["script"]["actions"]["onRun"]["args"] == [
+        "work", "{{Param.Run}}", "--openjd", "--step", "segments",
+        "--chunk", "{{Task.Param.Chunk}}", "--of", "2",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["work", "farm"])
+def test_what_is_no_run_is_refused(run, tmp_path, command):
+    result = run(command, tmp_path)
+    assert result.exit_code == 2
+    assert "job.json" in result.stderr
+
+
+def test_farm_options_are_pairs(run, begun, tmp_path):
+    result = run("farm", tmp_path / "run", "--submit", "local", "--slurm", "partition")
+    assert result.exit_code == 2
+    assert "'partition' is not KEY=VALUE" in result.stderr
+
+
+def test_who_does_the_work(run, jobs, camera_path):
+    line = ("render", "s.xml", "--path", camera_path, "--out", "my run", "--json", "--quiet")
+    assert run(*line).exit_code == 0
+    assert (jobs.crew, jobs.is_verified) == (Crew(), False)
+    assert (
+        run(*line, "--executor", "ray:head:6379", "--workers", "3", "--threads", "2", "--verify").exit_code
+        == 0
+    )
+    assert (jobs.crew, jobs.is_verified) == (Crew("ray:head:6379", 3, 2), True)
+    refused = run(*line, "--executor", "threads")
+    assert refused.exit_code == 2
+    assert "choose one of in-process, processes, ray, ray:ADDRESS" in refused.stderr
