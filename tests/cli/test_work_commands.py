@@ -72,8 +72,8 @@ def test_farm_options_are_pairs(run, begun, tmp_path):
     assert "'partition' is not KEY=VALUE" in result.stderr
 
 
-def test_who_does_the_work(run, jobs, camera_path):
-    line = ("render", "s.xml", "--path", camera_path, "--out", "my run", "--json", "--quiet")
+def test_who_does_the_work(run, jobs, camera_path, tmp_path):
+    line = ("render", "s.xml", "--path", camera_path, "--out", tmp_path / "run", "--json", "--quiet")
     assert run(*line).exit_code == 0
     assert (jobs.crew, jobs.is_verified) == (Crew(), False)
     assert (
