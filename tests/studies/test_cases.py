@@ -23,7 +23,7 @@ from enfilade.studies.cases.case import Case, stretch_of
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from enfilade.studies.cases.plain import PlainlyLit
-from enfilade.studies.cases.runner import ITEMS
+from enfilade.studies.cases.runner import ITEMS, measure
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
 from enfilade.studies.cases.terms import TERMS
 from enfilade.studies.cases.windows import Windows, probes_of
@@ -388,3 +388,57 @@ def test_items_depend_on_terms_that_exist(item):
 def test_still_settings_are_the_paper_s():
     assert threshold.PAPER_DEG_S == 0.5
     assert (AntialiasSettings().frames, AntialiasSettings().slow_frames) == (11, 15)
+
+
+# --- from end to end
+
+
+class Told:
+    """A monitor that keeps the names of stages."""
+
+    def __init__(self):
+        self.stages = []
+
+    def stage(self, name, _total):
+        self.stages.append(name)
+
+    def advance(self, count=1):
+        pass
+
+    def extend(self, count):
+        pass
+
+    def say(self, text):
+        pass
+
+
+@pytest.mark.slow
+def test_a_scene_is_measured_once(tmp_path):
+    """The small ROOM at 32x24: its run, its predictions with and without noise, its shares."""
+    terms = dataclasses.replace(TERMS["small"], size=(32, 24), spp=2)
+    items = ("statistics", "shares")
+    told = Told()
+    found = measure(("room",), items, terms, tmp_path, told)["room"]
+    assert told.stages
+    summary = found["statistics"]["summary"]
+    assert summary["frames"] == 60
+    initial = [s for s in summary["segments"] if s["depth"] == 0]
+    plain = [s for s in found["statistics"]["plain_segments"] if s["depth"] == 0]
+    assert [(s["first"], s["last"]) for s in initial] == [(s["first"], s["last"]) for s in plain]
+    assert found["statistics"]["plain"]["before"] > found["statistics"]["predictions"]["before"]
+    assert found["shares"]["table1"] == summary["table1"]
+    assert found["shares"]["specular_seen"] == 0.0
+
+    again = Told()
+    assert measure(("room",), items, terms, tmp_path, again)["room"] == found
+    assert again.stages == []
+
+
+def test_crops_are_cut_from_the_middle(tmp_path):
+    job = job_of(tmp_path, room(), room_walk(4, size=(64, 48)))
+    crop = table2.Crop.of(job, (10, 8))
+    assert crop.size == (8, 10)
+    image = np.arange(64 * 48).reshape(48, 64)
+    np.testing.assert_array_equal(crop.cut(image).ravel(), crop.pixels(job))
+    assert image[24, 32] in crop.cut(image)
+    assert table2.Crop.of(job, (999, 999)).size == (48, 64)

@@ -23,7 +23,7 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.studies.cases.case import Case
 from enfilade.studies.cases.seen import Viewer, visible_percent
 
-__all__ = ["PAPER_MINUTES", "art_spp", "equal_spp", "measure"]
+__all__ = ["PAPER_MINUTES", "Crop", "art_spp", "equal_spp", "measure"]
 
 PAPER_MINUTES = {  # Table 2, for a frame
     "atrium": {"art": 170.0, "rt": 40.0, "ibr_rt": 20.5},
@@ -35,17 +35,18 @@ REFERENCE_SALT = 1  # of the seed: the reference draws other random numbers
 
 
 @dataclass(frozen=True)
-class _Crop:
+class Crop:
     """A part of a frame in its middle."""
 
     rows: slice
     columns: slice
 
     @staticmethod
-    def of(job: Job, size: tuple[int, int]) -> _Crop:
+    def of(job: Job, size: tuple[int, int]) -> Crop:
+        """Cut width and height from the middle, or all there is."""
         width, height = min(size[0], job.path.width), min(size[1], job.path.height)
         left, top = (job.path.width - width) // 2, (job.path.height - height) // 2
-        return _Crop(slice(top, top + height), slice(left, left + width))
+        return Crop(slice(top, top + height), slice(left, left + width))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -154,7 +155,7 @@ class _Judge:
     def __init__(self, case: Case) -> None:
         self._case = case
         self._job = case.whole
-        self.crop = _Crop.of(case.whole, case.terms.crop)
+        self.crop = Crop.of(case.whole, case.terms.crop)
         height, width = self.crop.size
         self._viewer = Viewer(self._job.viewing.cropped(width, height), self._job.settings.viewing)
         self._views = case.views(self._job)
