@@ -1,5 +1,7 @@
 """Workers that die, raise, starve or find the disk full: what is lost, tried again, set aside."""
 
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -149,6 +151,40 @@ def test_workers_go_with_who_closes_them(tmp_path, monkeypatch):
     executor.close()
     assert not Path(f"/proc/{pid}").exists()
     assert time.monotonic() - begin < 4.0
+
+
+SUPERVISOR = """
+import sys, time
+from pathlib import Path
+from enfilade.executors import Recipe, Unit
+from enfilade.executors.processes import Processes
+folder = Path(sys.argv[1])
+recipe = Recipe("toy_worker:open_toy", {"folder": str(folder)})
+executor = Processes(recipe, print, workers=1, logs=folder / "logs")
+executor.begin(0, Unit("h", "hangs", {"name": "h"}), share=1)
+print(executor.pids[0], flush=True)
+time.sleep(600)
+"""
+
+
+def test_workers_go_with_a_supervisor_that_is_killed(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    line = [sys.executable, "-c", SUPERVISOR, str(tmp_path)]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as supervisor:  # noqa: S603
+        assert supervisor.stdout is not None
+        pid = int(supervisor.stdout.readline())
+        while not (tmp_path / "h.tries").exists():
+            time.sleep(0.01)
+        supervisor.kill()
+    deadline = time.monotonic() + 30.0
+    while Path(f"/proc/{pid}").exists() and not is_dead(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def is_dead(pid):
+    # In a container nobody may be there to bury it.
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
 
 
 def test_unknown_executors_are_refused(tmp_path):

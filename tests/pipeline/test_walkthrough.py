@@ -14,6 +14,7 @@ from enfilade.codec import read_exr
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.monitor import Silence
 from enfilade.pipeline.plan import plan
+from enfilade.pipeline.walkthrough import kept
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import CameraPath, Source, SurfaceClass
 from keyframes_analytic import psnr
@@ -106,13 +107,32 @@ def test_another_run_is_refused(paper):
     tables = job.settings.to_tables()
     tables["trace"]["spp"] = 5
     other = dataclasses.replace(job, settings=type(job.settings).from_tables(tables))
-    with pytest.raises(RunFolderError, match=r"holds another run(.|\n)*spp"):
+    with pytest.raises(RunFolderError, match=r"holds another run(.|\n)*spp") as error:
         rendered(folder.parent, other)
+    assert "would be the same" not in str(error.value)
     shorter = dataclasses.replace(job, path=part_of(PATH, range(5)))
     with pytest.raises(RunFolderError, match="holds another run"):
         rendered(folder.parent, shorter)
     with pytest.raises(RunFolderError, match="method"):
         rendered(folder.parent, dataclasses.replace(job, method="reference"))
+
+
+@pytest.mark.parametrize(
+    ("method", "keys", "words"),
+    [
+        ("paper", ["settings.video.codec", "settings.video.quality"], "everything but the video"),
+        ("decoupled", ["settings.video.codec"], "everything but the video"),
+        ("paper", ["settings.antialias.frames"], "the keyframes"),
+        ("paper", ["settings.antialias.frames", "settings.metric.mask_slope"], "the keyframes"),
+        ("decoupled", ["settings.antialias.frames"], ""),
+        ("paper", ["settings.video.codec", "scene.fingerprint"], ""),
+        ("paper", ["versions.enfilade"], ""),
+    ],
+)
+def test_what_could_be_kept_of_another_run(method, keys, words):
+    text = kept(method, keys)
+    assert words in text
+    assert bool(text) == bool(words)
 
 
 class Killer(Silence):

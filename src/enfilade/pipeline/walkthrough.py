@@ -68,7 +68,7 @@ def render(
     _check(job, crew)
     if is_tried and not folder.exists():
         job.check_scene(is_tried=True)
-    with Run.open(folder, job.identity()) as run:
+    with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
         for note in run.notes:
             monitor.say(note)
         _write_job(run, job)
@@ -83,6 +83,35 @@ def render(
     return summary
 
 
+# What does not depend on a section of the settings, by method; what depends on all of them stands nowhere.
+KEPT: dict[str, dict[str, str]] = {
+    "paper": {
+        "video": "everything but the video",
+        "antialias": "the keyframes",
+        "warp": "the keyframes",
+        "metric": "the keyframes",
+    },
+    "decoupled": {"video": "everything but the video"},
+    "reference": {"video": "everything but the video"},
+}
+
+
+def kept(method: str, keys: list[str]) -> str:
+    """Say what of another run would have been the same, by the keys in which it differs; empty: nothing.
+
+    Parameters
+    ----------
+    method
+    keys
+        Such as ``settings.video.codec``.
+    """
+    sections = {key.split(".")[1] if key.startswith("settings.") else key for key in keys}
+    found = {KEPT.get(method, {}).get(section, "") for section in sections}
+    if len(found) != 1 or "" in found:
+        return ""
+    return f"Of what is there, this would be the same: {found.pop()}\n"
+
+
 def prepare(job: Job, folder: Path) -> None:
     """Begin a run folder without doing any of its work: for commands elsewhere that share it.
 
@@ -92,7 +121,7 @@ def prepare(job: Job, folder: Path) -> None:
         The scene, the settings, or a folder that holds another run.
     """
     _check(job, Crew())
-    with Run.open(folder, job.identity()) as run:
+    with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
         _write_job(run, job)
 
 

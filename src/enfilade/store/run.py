@@ -59,7 +59,9 @@ class Run:
         self._report = report
 
     @classmethod
-    def open(cls, folder: Path, identity: Mapping[str, Any]) -> Self:
+    def open(
+        cls, folder: Path, identity: Mapping[str, Any], *, kept: Callable[[list[str]], str] | None = None
+    ) -> Self:
         """Begin a run in a new or empty folder, or continue the same run in its own.
 
         Parameters
@@ -67,6 +69,8 @@ class Run:
         folder
         identity
             What makes the results what they are; fit for JSON, nested as you like.
+        kept
+            Says of another run, by the keys in which it differs, what of it would have been the same.
 
         Raises
         ------
@@ -79,7 +83,7 @@ class Run:
         _prepare(folder)
         lock = Lock(folder)
         try:
-            notes = _claim(folder, wanted)
+            notes = _claim(folder, wanted, kept)
             if left := sweep(folder):
                 notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
             ledger = Ledger(folder / LEDGER_FILE, writable=True)
@@ -355,13 +359,13 @@ def _found(folder: Path) -> dict[str, Any]:
     return identity
 
 
-def _claim(folder: Path, wanted: dict[str, Any]) -> list[str]:
+def _claim(folder: Path, wanted: dict[str, Any], kept: Callable[[list[str]], str] | None) -> list[str]:
     """Say in ``run.json`` what the folder holds, or check that it is that; returns what was mended."""
     file, text = folder / RUN_FILE, {"format": FORMAT, "identity": wanted}
     head, data = head_of(folder / LEDGER_FILE), json_bytes(text)
     is_there = file.exists()
     if is_there and (head is None or _record(file) == head):
-        _check_same(folder, _read_identity(folder), wanted)
+        _check_same(folder, _read_identity(folder), wanted, kept)
         return []
     if head is not None and head != {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}:
         raise RunFolderError(
@@ -402,7 +406,12 @@ def _read_identity(folder: Path) -> dict[str, Any]:
     return identity
 
 
-def _check_same(folder: Path, there: dict[str, Any], now: dict[str, Any]) -> None:
+def _check_same(
+    folder: Path,
+    there: dict[str, Any],
+    now: dict[str, Any],
+    kept: Callable[[list[str]], str] | None,
+) -> None:
     before, after = _flat(there), _flat(now)
     keys = [k for k in {**before, **after} if before.get(k, _ABSENT) != after.get(k, _ABSENT)]
     if not keys:
@@ -413,7 +422,8 @@ def _check_same(folder: Path, there: dict[str, Any], now: dict[str, Any]) -> Non
     )
     more = f"\n  and {len(keys) - SHOWN_DIFFERENCES} more" if len(keys) > SHOWN_DIFFERENCES else ""
     raise RunFolderError(
-        f"{folder} holds another run:{shown}{more}\nChoose another --out, or delete {folder} to begin anew"
+        f"{folder} holds another run:{shown}{more}\n{'' if kept is None else kept(keys)}"
+        f"Choose another --out, or delete {folder} to begin anew"
     )
 
 
