@@ -56,7 +56,7 @@ class Ledger:
         self._is_lenient = is_lenient or writable
         self._writable = writable
         self._handle = -1
-        self._units: dict[str, dict[str, Any]] = {}
+        self._units: dict[str, bytes] = {}  # lines as they stand: a long run has many, seldom asked for
         self._writers: dict[str, str] = {}  # file -> unit that wrote it last
         self._read: dict[Path, int] = {}  # bytes of each file that are known
         self._file = file
@@ -67,15 +67,16 @@ class Ledger:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Newest line of each unit, in the order in which they were finished."""
-        return iter(list(self._units.values()))
+        return map(_read, list(self._units.values()))
 
     def get(self, unit: str) -> dict[str, Any] | None:
         """Newest line of a unit, or None."""
-        return self._units.get(unit)
+        raw = self._units.get(unit)
+        return None if raw is None else _read(raw)
 
     def writer(self, name: str) -> dict[str, Any] | None:
         """Newest line of the unit that wrote a file last, or None."""
-        line = self._units.get(self._writers.get(name, ""))
+        line = self.get(self._writers.get(name, ""))
         return line if line is not None and name in line["files"] else None
 
     def begin(self, head: Mapping[str, Any]) -> None:
@@ -91,7 +92,7 @@ class Ledger:
         RunFolderError, NoSpaceError
         """
         if self.head is None:
-            self._write([{HEAD: dict(head)}, *self._units.values()])
+            self._write([{HEAD: dict(head)}, *self])
             self.head = dict(head)
 
     def append(self, line: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,13 +124,16 @@ class Ledger:
             os.ftruncate(self._handle, size)
             raise whole.unwritable(self._file, error) from error
         self._read[self._file] = size + len(data)
-        return self.keep(json.loads(data))
+        return self._keep(data)
 
-    def keep(self, line: dict[str, Any]) -> dict[str, Any]:
-        """Know a line without writing it."""
-        line.pop(SUM, None)
+    def keep(self, line: Mapping[str, Any]) -> dict[str, Any]:
+        """Know a line without writing it; returns it as it would be read again."""
+        return self._keep(sealed(line))
+
+    def _keep(self, raw: bytes) -> dict[str, Any]:
+        line = _read(raw)
         self._units.pop(line["unit"], None)  # a unit done again counts where it was done last
-        self._units[line["unit"]] = line
+        self._units[line["unit"]] = raw
         self._writers.update(dict.fromkeys(line["files"], line["unit"]))
         return line
 
@@ -167,7 +171,7 @@ class Ledger:
             return
         if has_damage:
             head = [] if self.head is None else [{HEAD: self.head}]
-            self._write([*head, *self._units.values()])
+            self._write([*head, *self])
             return
         self._handle = _appending(self._file)
         if size < len(data):
@@ -196,7 +200,7 @@ class Ledger:
             elif HEAD in line:
                 self.head = line[HEAD]
             else:
-                self.keep(line)
+                self._keep(raw)
         return good, has_damage
 
     def _refuse(self, file: Path, number: int) -> None:
@@ -241,6 +245,12 @@ def sealed(line: Mapping[str, Any]) -> bytes:
 
 def _sum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:SUM_LETTERS]
+
+
+def _read(raw: bytes) -> dict[str, Any]:
+    line: dict[str, Any] = json.loads(raw)
+    line.pop(SUM, None)
+    return line
 
 
 def _parsed(raw: bytes) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ from typing import Any, Self
 from enfilade.codec import read_json, sweep, write_json
 from enfilade.codec.whole import MARK, json_bytes
 from enfilade.errors import DamagedFileError, RunFolderError
-from enfilade.store.ledger import Ledger, covered, head_of, sealed
+from enfilade.store.ledger import Ledger, covered, head_of
 from enfilade.store.lock import LOCK_NAME, Lock, writer_of
 
 __all__ = ["KINDS", "Run"]
@@ -244,7 +244,7 @@ class Run:
         if self._report is None:
             self._ledger.append(line)
         else:
-            self._report(self._ledger.keep(json.loads(sealed(line))))
+            self._report(self._ledger.keep(line))
 
     def record(self, line: Mapping[str, Any]) -> None:
         """Put a line into the ledger that a run which joined this one has reported.
