@@ -404,6 +404,29 @@ def test_several_commands_share_a_run(folder):
     assert not list((folder / "parts").glob("*.jsonl"))
 
 
+@pytest.mark.parametrize("name", ["run.lock", "ledger.jsonl"])
+def test_links_in_a_foreign_run_folder_lead_nowhere(folder, tmp_path, name):
+    (tmp_path / "precious").write_text("keep me")
+    Run.open(folder, IDENTITY).close()
+    (folder / name).unlink()
+    (folder / name).symlink_to(tmp_path / "precious")
+    with pytest.raises(RunFolderError, match=r"Too many levels of symbolic links|damaged"):
+        Run.open(folder, IDENTITY)
+    assert (tmp_path / "precious").read_text() == "keep me"
+
+
+def test_nothing_outside_the_folder_is_removed(folder, tmp_path):
+    with Run.open(folder, IDENTITY) as run:
+        run.finish("frame 1", files=[write(run, "frames", 1)], facts={})
+        (folder / "frames").rename(tmp_path / "elsewhere")
+        (folder / "frames").symlink_to(tmp_path / "elsewhere")
+        (tmp_path / "elsewhere" / "0001.exr").write_bytes(b"precious")
+        assert run.damaged() == ["frames/0001.exr"]
+        with pytest.raises(RunFolderError, match="outside the run folder"):
+            run.forget("frames/0001.exr")
+    assert (tmp_path / "elsewhere" / "0001.exr").exists()
+
+
 def test_ten_thousand_units_open_quickly(folder):
     with Run.open(folder, IDENTITY):
         record = {"bytes": 1, "sha256": "0" * 64}

@@ -288,7 +288,8 @@ def _is_record(name: str, record: Any) -> bool:
 
 
 def _appending(file: Path) -> int:
-    return os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW
+    return os.open(file, flags, 0o666)
 
 
 def _write_all(handle: int, data: bytes) -> None:

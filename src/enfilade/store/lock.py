@@ -64,7 +64,7 @@ class Lock:
 
 def _locked(file: Path, kind: int) -> int:
     try:
-        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
     except OSError as error:
         raise RunFolderError(
             f"can't write in {file.parent}: {error.strerror}; choose another --out"

@@ -293,12 +293,15 @@ class Run:
         Raises
         ------
         RunFolderError
-            It can't be removed.
+            It can't be removed, or a link leads out of the folder.
         """
+        file = self.folder / name
+        if not file.parent.resolve().is_relative_to(self.folder.resolve()):
+            raise RunFolderError(f"{file} lies outside the run folder: a link leads there; remove the link")
         try:
-            (self.folder / name).unlink(missing_ok=True)
+            file.unlink(missing_ok=True)
         except OSError as error:
-            raise RunFolderError(f"can't remove {self.folder / name}: {error.strerror}") from error
+            raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
 
     def digest(self) -> str:
         """Checksum of the run: of all that the ledger says but times and tries, whatever the order.
