@@ -74,7 +74,7 @@ def open_cache(pages: Sequence[Page], shares: Sequence[float], cells: Cells | No
 
 def open_page(page: LightPage) -> Page:
     """Make a page ready to be looked up."""
-    layers = [(_even(of), lanes(of.variance)) for of in (page.direct, page.indirect)]
+    layers = [(lanes(of.color), lanes(of.variance)) for of in (page.direct, page.indirect)]
     return _page(page.geometry, lanes(page.is_known), layers)
 
 
