@@ -7,7 +7,7 @@ from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.geometry import find_geometry
 from enfilade.irradiance import LightCache, Shader, open_cache, open_page
-from enfilade.pixels.estimate import Estimate, Samples, estimate
+from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.scenes import write_scene
@@ -72,24 +72,25 @@ def _camera(width: int = 48, height: int = 36, x: float = 0.0) -> Camera:
     return Camera(look_at((x, 1.8, 6), (0.6 * x, 1.5, 0)), 36, width, height)
 
 
-def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2) -> Shading:
-    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-    return estimate(
+def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2, **more) -> Shading:
+    whole = Estimate(
         camera,
-        pixels,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
         _shade(renderer, cache),
-        spp=spp,
-        chunk=1 << 20,
-        pixel_filter=PixelFilter.CENTRE,
+        chunk=more.get("chunk", 1 << 20),
+        pixel_filter=more.get("pixel_filter", PixelFilter.CENTRE),
         random={"seed": seed, "frame": 0, "purpose": int(Purpose.GATHER)},
+        is_stratified=True,
     )
+    whole.add(spp)
+    return whole.shading
 
 
 def _shade(renderer, cache: LightCache):
     shader = Shader(renderer, pixel_angle=0.02)
 
-    def radiance(rays, rng):
-        return shader.seen(cache, cache, rays, rng).layers[0] + shader.scattered(cache, rays, rng)
+    def radiance(rays, rng, square):
+        return shader.seen(cache, cache, rays, rng).layers[0] + shader.scattered(cache, rays, rng, square)
 
     return radiance
 
@@ -200,17 +201,9 @@ def test_a_scene_opened_earlier_is_no_hindrance(tmp_path):
 def test_same_seed_same_bytes_whatever_the_chunks(diffuse):
     renderer, pages = diffuse
     camera, cache = _camera(24, 18), _opened_cache(pages)
-    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-    random = {"seed": 5, "frame": 1, "purpose": int(Purpose.GATHER)}
     images = [
-        estimate(
-            camera,
-            pixels,
-            _shade(renderer, cache),
-            spp=4,
-            chunk=chunk,
-            pixel_filter=PixelFilter.GAUSSIAN,
-            random=random,
+        _shaded(
+            renderer, cache, camera, spp=4, chunk=chunk, pixel_filter=PixelFilter.GAUSSIAN
         ).color.tobytes()
         for chunk in (1 << 20, 1024)
     ]

@@ -15,7 +15,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import PCG32, Array3f, Array4f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera import Camera
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
@@ -142,7 +142,7 @@ class Shader:
         """
         step = self._meet(view, self._begun(rays, rng))
         radiance = Array3f(step.sent)
-        self._add_missing(radiance, cache, step, 1.0)
+        self._add_missing(radiance, cache, step, jitter=1.0, is_asked=False)
         return Samples((radiance,), step.goes_on)
 
     def scattered(
@@ -150,14 +150,17 @@ class Shader:
         cache: LightCache,
         rays: Rays,
         rng: Any,
+        square: Any,
         heard: Callable[[Estimates], None] | None = None,
     ) -> Any:
         """Radiance that the surfaces seen send by all their other lobes.
 
-        Parameters and random numbers are those of :meth:`seen`.
+        Parameters are those of :meth:`seen`.
 
         Parameters
         ----------
+        square : Array4f
+            In [0, 1): which lobe, and where it sends the ray.
         heard
             Told of the light that was not known and had to be estimated.
 
@@ -168,7 +171,7 @@ class Shader:
         radiance = dr.zeros(Array3f, dr.width(rng.state))
         path = self._begun(rays, rng)
         path = _chosen(path, dr.compress(self._meet(LightCache(), path).goes_on))
-        self._follow(radiance, cache, path, 0, heard)
+        self._follow(radiance, cache, path, 0, heard, square)
         return radiance
 
     def gathered(
@@ -197,7 +200,7 @@ class Shader:
         dr.eval(square)  # for the same reason as in _begun
         direct, step = self._gather(cache, self._begun(rays, rng), square)
         indirect = Array3f(step.sent)
-        self._add_missing(indirect, _cells_of(cache), step, 0.0, heard)
+        self._add_missing(indirect, cache, step, heard=heard)
         self._follow(indirect, cache, _chosen(step.path, dr.compress(step.goes_on)), 1, heard)
         return Samples((direct, indirect))
 
@@ -208,18 +211,25 @@ class Shader:
         path: _Path,
         bounce: int,
         heard: Callable[[Estimates], None] | None,
+        square: Any = None,
     ) -> None:
-        """Add what paths find on their way from lobe to lobe, of which some bounces lie behind them."""
+        """Add what paths find on their way from lobe to lobe, of which some bounces lie behind them.
+
+        The numbers of the first of these bounces may be given, by lane.
+        """
         # What is seen in a mirror is smoothed over cells; where light comes from needs no smoothing.
         jitter = 1.0 if bounce == 0 else 0.0
         while bounce < BOUNCES and dr.width(path.lane):
             # The first bounce off what is seen counts; then faint paths are ended at random.
             least = 1.0 if bounce == 0 else LEAST_CHANCE
             most = MOST_CHANCE[min(bounce, len(MOST_CHANCE) - 1)]
-            direct, step = self._go_on(cache, path, opaque(least), opaque(most))
+            first = None if square is None else dr.gather(Array4f, square, path.lane)
+            dr.eval(first)
+            square = None
+            direct, step = self._go_on(cache, path, opaque(least), opaque(most), first)
             _scatter_add(radiance, direct, path.lane)
             _scatter_add(radiance, step.sent, step.path.lane)
-            self._add_missing(radiance, _cells_of(cache), step, jitter, heard)
+            self._add_missing(radiance, cache, step, jitter=jitter, heard=heard)
             path = _chosen(step.path, dr.compress(step.goes_on))
             bounce += 1
 
@@ -272,29 +282,41 @@ class Shader:
         radiance: Any,
         cache: LightCache,
         step: _Step,
-        jitter: float,
+        *,
+        jitter: float = 0.0,
+        is_asked: bool = True,
         heard: Callable[[Estimates], None] | None = None,
     ) -> None:
-        """Add what diffuse lobes send whose light was not found: look further, or estimate it."""
+        """Add what diffuse lobes send whose light was not found: look further, or estimate it.
+
+        Parameters
+        ----------
+        radiance
+        cache
+        step
+        jitter
+            Of lookups in cells, in cells.
+        is_asked
+            Whether the pages of the cache did not know.
+        heard
+        """
         path = step.path
         missing: Any = dr.compress(step.is_missing)
-        if (cache.pages or cache.cells) and dr.width(missing):
-            further = self._look_up(cache, _chosen(path, missing), opaque(jitter))
-            _scatter_add(radiance, further.sent, further.path.lane)
-            still: Any = dr.compress(further.is_missing)
+        further = LightCache(cells=cache.cells) if is_asked else cache
+        if (further.pages or further.cells) and dr.width(missing):
+            found = self._look_up(further, _chosen(path, missing), opaque(jitter))
+            _scatter_add(radiance, found.sent, found.path.lane)
+            still: Any = dr.compress(found.is_missing)
             missing = dr.gather(UInt, _padded(missing)[0], still)
         if not dr.width(missing):
             return
         unknown = _chosen(path, missing)
         weight, light, keys, rng = self._estimate(unknown)
         _scatter_add(radiance, weight * light, unknown.lane)
+        if heard:
+            _tell(heard, keys, light, dr.width(missing))
         # The paths go on with other random numbers than the estimates were made with.
         dr.scatter(path.rng.state, rng.state, _padded(missing)[0])
-        if heard:
-            count = dr.width(missing)
-            values = np.array(light).T[:count]
-            for key in keys:
-                heard(Estimates.of(np.array(key)[:count], values))
 
     def _look_on_kernel(self, path: _Path) -> tuple[_Path, Any, Any, Any]:
         """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
@@ -345,11 +367,13 @@ class Shader:
         sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
         return _Step(Array3f(sent), Bool(is_diffuse & ~is_known & _carries(path)), Bool(False), path)
 
-    def _go_on_kernel(self, cache: LightCache, path: _Path, least: Any, most: Any) -> tuple[Any, _Step]:
+    def _go_on_kernel(
+        self, cache: LightCache, path: _Path, least: Any, most: Any, square: Any
+    ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
-        scattered = self._renderer.scatter(lit, rng)
+        scattered = self._renderer.scatter(lit, rng if square is None else Leading(square, rng))
         throughput = path.throughput * scattered.throughput
         chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, most)
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
@@ -428,9 +452,10 @@ def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, 
     return Rays(vector3(camera.eye), direction), PCG32(dr.width(pixel))
 
 
-def _cells_of(cache: LightCache) -> LightCache:
-    """What is left to ask when the pages do not know."""
-    return LightCache(cells=cache.cells)
+def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any, count: int) -> None:
+    values = np.array(light).T[:count]
+    for key in keys:
+        heard(Estimates.of(np.array(key)[:count], values))
 
 
 def _diffuse(lit: Lit) -> tuple[Any, Any]:

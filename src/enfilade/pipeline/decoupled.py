@@ -73,10 +73,11 @@ def _scattered(
     scattered = Estimate(
         path.cameras[frame],
         np.flatnonzero(where).astype(np.uint32),
-        lambda rays, rng: table.shader.scattered(cache, rays, rng),
+        lambda rays, rng, square: table.shader.scattered(cache, rays, rng, square),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.SCATTER),
+        is_stratified=True,
     )
     least, most = settings.light.least_lobe_samples, settings.light.lobe_samples
     scattered.add(least)

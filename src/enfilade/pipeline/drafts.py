@@ -17,7 +17,7 @@ from enfilade.irradiance import Estimates, LightCache, Shader, open_cache, open_
 from enfilade.irradiance.cells import Cells
 from enfilade.pipeline.kept import Kept, nearest
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import Estimate, Samples, estimate
+from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.pixels.lookup import Page
 from enfilade.records import LightPage
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
@@ -138,15 +138,16 @@ class Drafts:
 
     def _heard_by_lobes(self, frame: int, parts: list[Estimates]) -> None:
         path, cache = self._workshop.job.path, self._pages(frame)
-        estimate(
+        rays = Estimate(
             path.cameras[frame],
             np.arange(path.width * path.height, dtype=np.uint32),
-            lambda rays, rng: self._shader.scattered(cache, rays, rng, parts.append),
-            spp=LOBE_SPP,
+            lambda rays, rng, square: self._shader.scattered(cache, rays, rng, square, parts.append),
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.BOX,
             random=self._workshop.random(frame, Purpose.SCOUT),
+            is_stratified=True,
         )
+        rays.add(LOBE_SPP)
 
     def _heard_by_gathering(self, frame: int, parts: list[Estimates]) -> None:
         page, cache = self.trace(frame), self._pages(frame)

@@ -14,6 +14,7 @@ from drjit.auto.ad import Philox4x32
 from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, opaque
 
 WHOLE_PIXEL = 0xFFFFFFFF  # the path's number in draws that all paths of a pixel share
+WHOLE_PIXEL_4 = 0xFFFFFFFE  # ... in four dimensions
 R4 = (3679390609, 3152041523, 2700274806, 2313257605)  # 2**32 over powers of the root of x^5 = x + 1
 R2 = (3242174889, 2447445414)  # 2**32 over the plastic number, and over its square: Roberts 2018
 
@@ -55,11 +56,9 @@ def stratified(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) ->
 
 
 def stratified4(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
-    """The same in the unit cube of four dimensions (Roberts 2018); Array4f.
-
-    Its points are not related to those of :func:`stratified` for another purpose only.
+    """The same in the unit cube of four dimensions; Array4f.
     """
-    starts = _drawn(pixel, UInt(WHOLE_PIXEL), seed=seed, frame=frame, purpose=purpose)
+    starts = _drawn(pixel, UInt(WHOLE_PIXEL_4), seed=seed, frame=frame, purpose=purpose)
     return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
 
 

@@ -87,8 +87,8 @@ class Light:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
         seen = lit.native
         material = seen.bsdf()
-        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, lit.has_lobe)
         wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng, choice)
+        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, lit.has_lobe)
         ray = seen.spawn_ray(seen.to_world(wo))
         return Scattered(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
