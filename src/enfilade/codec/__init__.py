@@ -6,9 +6,11 @@ from enfilade.codec.exr import read_attributes, read_exr, write_exr
 from enfilade.codec.frames import (
     read_frame,
     read_light,
+    read_parts,
     read_shading,
     write_frame,
     write_light,
+    write_parts,
     write_result,
     write_shading,
 )
@@ -22,6 +24,7 @@ __all__ = [
     "read_frame",
     "read_json",
     "read_light",
+    "read_parts",
     "read_shading",
     "sweep",
     "whole_file",
@@ -30,6 +33,7 @@ __all__ = [
     "write_frame",
     "write_json",
     "write_light",
+    "write_parts",
     "write_result",
     "write_shading",
 ]

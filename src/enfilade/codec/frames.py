@@ -15,9 +15,11 @@ from enfilade.records import F32, U8, Flow, Frame, Geometry, Mask, Shading
 __all__ = [
     "read_frame",
     "read_light",
+    "read_parts",
     "read_shading",
     "write_frame",
     "write_light",
+    "write_parts",
     "write_result",
     "write_shading",
 ]
@@ -53,10 +55,7 @@ def read_shading(file: Path) -> Shading:
         The file is missing, damaged, or holds no shading.
     """
     layers = _required(file, {"RGB": np.float32, "variance": np.float32})
-    dropped = str(read_attributes(file).get("dropped", ""))
-    if not dropped.isascii() or not dropped.isdigit():
-        raise ImageError(f"{file} doesn't say how many samples were dropped; delete it to make it again")
-    return Shading(layers["RGB"], layers["variance"], int(dropped))
+    return Shading(layers["RGB"], layers["variance"], _dropped(file))
 
 
 def write_light(file: Path, direct: Shading, indirect: Shading, is_known: Mask) -> None:
@@ -97,6 +96,66 @@ def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
     direct = read_shading(file)
     indirect = Shading(layers["indirect"], layers["indirect variance"], direct.dropped)
     return direct, indirect, layers["known"] > 0
+
+
+def write_parts(file: Path, seen: F32, scattered: Shading, where: Mask) -> tuple[F32, Shading]:
+    """Write the two parts of a frame's light, as half floats.
+
+    Parameters
+    ----------
+    file
+    seen : (H, W, 3) float32
+        What surfaces emit and scatter diffusely.
+    scattered : Shading
+        What they scatter by other lobes.
+    where : (H, W) bool
+        Pixels that have such lobes.
+
+    Returns
+    -------
+    seen, scattered
+        As :func:`read_parts` will find them.
+
+    Raises
+    ------
+    RunFolderError
+        The file can't be written.
+    """
+    halves = _half(seen), _half(scattered.color), _half(scattered.variance)
+    layers = {
+        "RGB": halves[0],
+        "scattered": halves[1],
+        "variance": halves[2],
+        "where": where.astype(np.uint32),
+    }
+    write_exr(file, layers, attributes={"dropped": str(int(scattered.dropped))})
+    return _parts(*halves, dropped=scattered.dropped)
+
+
+def read_parts(file: Path) -> tuple[F32, Shading, Mask]:
+    """Read what :func:`write_parts` wrote.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, damaged, or holds no such parts.
+    """
+    kinds = {"RGB": np.float16, "scattered": np.float16, "variance": np.float16, "where": np.uint32}
+    layers = _required(file, kinds)
+    halves = layers["RGB"], layers["scattered"], layers["variance"]
+    return *_parts(*halves, dropped=_dropped(file)), layers["where"] > 0
+
+
+def _parts(seen: Array, color: Array, variance: Array, *, dropped: int) -> tuple[F32, Shading]:
+    wide = [values.astype(np.float32) for values in (seen, color, variance)]
+    return wide[0], Shading(wide[1], wide[2], dropped)
+
+
+def _dropped(file: Path) -> int:
+    dropped = str(read_attributes(file).get("dropped", ""))
+    if not dropped.isascii() or not dropped.isdigit():
+        raise ImageError(f"{file} doesn't say how many samples were dropped; delete it to make it again")
+    return int(dropped)
 
 
 def write_frame(file: Path, frame: Frame) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -11,11 +11,13 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
 from enfilade.irradiance.cells import Cells
+from enfilade.pixels.estimate import LUMINANCE
 from enfilade.pixels.lookup import Page, footprint, lookup
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.pixels.wavelet import Guide, smooth, without_speckles
 from enfilade.records import F32, U32, Geometry, LightPage, Mask, Shading
 
+BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror or through glass
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
 
@@ -112,9 +114,60 @@ def light_of(page: Page) -> F32:
 
 def smoothed(geometry: Geometry, shading: Shading) -> Shading:
     """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left."""
+    # Virtual images: their normals are not those of the planes in which they seem to lie.
+    geometry = replace(geometry, depth=np.where(geometry.item < BEHIND, geometry.depth, np.float32(0)))
     light, variance = _smooth(geometry, geometry.item, _even(shading), lanes(shading.variance))
     size = shading.variance.shape
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
+
+
+def over_time(
+    here: tuple[Geometry, Shading, Mask],
+    others: Sequence[tuple[Geometry, Shading, Mask]],
+    shares: Sequence[float],
+) -> F32:
+    """Average what surfaces scatter with what frames around saw of it, each along its own motion.
+
+    A virtual image is looked up where it seemed to be. What differs from the frame's own value by more than
+    its noise counts less: highlights and reflections in rough surfaces stay where they are.
+
+    Parameters
+    ----------
+    here, others
+        Geometry with virtual images (:meth:`~enfilade.irradiance.shade.Shader.shown`), smoothed colours with
+        the noise that is left, and the pixels that have them: of the frame, and of frames around it.
+    shares
+        How much each of the others counts; the frame itself counts one.
+
+    Returns
+    -------
+    (H, W, 3) float32
+    """
+    geometry, own, where = here
+    color, variance = lanes(own.color), lanes(own.variance)
+    position, normal, item = _points(geometry), _fronts(geometry), lanes(geometry.item)
+    total, weight = Array3f(color), Float(1)
+    luminance = dr.dot(color, Array3f(*LUMINANCE))
+    for (around, shading, known), share in zip(others, shares, strict=True):
+        page = _page(around, lanes(known), [(lanes(shading.color), lanes(shading.variance))])
+        found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+        scale = dr.rcp(dr.maximum(found.weight, 1e-6))
+        value, noise = found.totals[0] * scale, found.variances[0] * scale
+        apart = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)
+        counts = dr.exp(-apart * dr.rcp(DEVIATIONS * dr.sqrt(noise + variance) + 1e-8))
+        counts = dr.select(found.weight > KNOWN, opaque(share) * counts, 0.0)
+        total += counts * value
+        weight += counts
+    mean = image(total / weight, *where.shape)
+    averaged: F32 = np.where(where[..., None], mean, np.float32(0))
+    return averaged
+
+
+def _fronts(geometry: Geometry) -> Any:
+    """Normals; of virtual images, those of planes that face the eye."""
+    is_real = lanes(geometry.item) < BEHIND
+    toward = vector3(geometry.camera.eye) - _points(geometry)
+    return dr.select(is_real, lanes(geometry.normal), toward)
 
 
 def _even(shading: Shading) -> Any:

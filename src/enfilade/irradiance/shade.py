@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import PCG32, Array3f, Array4f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera import Camera
-from enfilade.irradiance.cache import LightCache
+from enfilade.irradiance.cache import BEHIND, LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
@@ -39,7 +39,7 @@ MOST_CHANCE = (
 BLACK = 1e-4  # albedo below which no light is looked up
 LEAST_LANES = 1021  # of a kernel; fewer might be as many as some array of the scene: another recording
 SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
-BEHIND = np.uint32(1 << 30)  # added to the number of an item that is not seen where it is
+ENDLESS = 1e4  # times as far as a mirror seems what it shows of the sky
 THROUGH = 0.999999  # chooses the lobe that lets light through
 LAYERS = 8  # of mirrors and glass, one behind the other
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
@@ -234,30 +234,33 @@ class Shader:
             bounce += 1
 
     def shown(self, geometry: Geometry) -> Geometry:
-        """What mirrors show and glass lets through, in their place.
+        """What mirrors show and glass lets through, where it seems to be.
 
         Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
-        :data:`BEHIND` added to the item's number and a depth of 0: it is not where it is seen. Everything
-        else stays.
+        :data:`~enfilade.irradiance.cache.BEHIND` added to the item's number, and the depth that of the
+        virtual image: as far away as the way to it is long, which is exact for plane mirrors. Everything else
+        stays.
         """
         pixels = np.flatnonzero(np.isin(geometry.surface, SHARP)).astype(np.uint32)
         if not len(pixels):
             return geometry
         item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
-        depth = geometry.depth.ravel().copy()
-        depth[pixels], item[pixels], normal[pixels] = 0.0, BEHIND, 0.0
         path = self._begun(*_centre_rays(geometry.camera, pixels))
+        way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
+        first = geometry.depth.ravel() * _lengths(geometry.camera)
+        item[pixels], normal[pixels] = BEHIND, 0.0
         for _ in range(LAYERS):
-            path, found, turned, is_sharp = self._look_on(path)
+            path, found, turned, distance, is_sharp = self._look_on(path)
             lane = pixels[np.array(path.lane)]
             item[lane], normal[lane] = np.array(found) + BEHIND, np.array(turned).T
+            way[lane] = np.minimum(way[lane] + np.array(distance) / first[lane], ENDLESS)
             path = _chosen(path, dr.compress(is_sharp))
             if not dr.width(path.lane):
                 break
         size = geometry.item.shape
         return replace(
             geometry,
-            depth=depth.reshape(size),
+            depth=geometry.depth * way.reshape(size),
             item=item.reshape(size),
             normal=np.ascontiguousarray(normal.reshape(*size, 3)),
         )
@@ -318,7 +321,7 @@ class Shader:
         # The paths go on with other random numbers than the estimates were made with.
         dr.scatter(path.rng.state, rng.state, _padded(missing)[0])
 
-    def _look_on_kernel(self, path: _Path) -> tuple[_Path, Any, Any, Any]:
+    def _look_on_kernel(self, path: _Path) -> tuple[_Path, Any, Any, Any, Any]:
         """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
@@ -332,7 +335,8 @@ class Shader:
             is_sharp |= surfaces.surface == int(sharp)
         item = dr.select(surfaces.is_hit, surfaces.item, 0)
         normal = dr.select(surfaces.is_hit, surfaces.normal, 0.0)
-        return ahead, item, Array3f(normal), Bool(is_sharp & surfaces.is_hit & scattered.is_alive)
+        is_sharp &= surfaces.is_hit & scattered.is_alive
+        return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_sharp)
 
     def _meet_kernel(self, cache: LightCache, path: _Path) -> _Step:
         emitted, step = self._met(cache, path)
@@ -456,6 +460,14 @@ def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any,
     values = np.array(light).T[:count]
     for key in keys:
         heard(Estimates.of(np.array(key)[:count], values))
+
+
+def _lengths(camera: Camera) -> npt.NDArray[np.float32]:
+    """Of the directions of unit depth through the centres of all pixels, (N,)."""
+    row, column = np.indices((camera.height, camera.width)).reshape(2, -1) + 0.5
+    directions = np.stack([column, row, np.ones_like(row)], axis=1) @ camera.direction_from_pixel.T
+    lengths: npt.NDArray[np.float32] = np.linalg.norm(directions, axis=1).astype(np.float32)
+    return lengths
 
 
 def _diffuse(lit: Lit) -> tuple[Any, Any]:

@@ -2,43 +2,110 @@
 
 Every frame is shaded by itself: camera rays, textures and lobes are exact, and the light on diffuse
 surfaces is looked up in the keyframes nearest on the path. What they don't know is path traced, for that
-lookup alone.
+lookup alone. What lobes scatter is sampled afresh in each frame, and then averaged over a few frames along its
+own motion: that of the surface, or of the virtual image in a mirror.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import binary_dilation
 
-from enfilade.irradiance import LightCache, smoothed
+from enfilade.codec import read_parts, write_parts
+from enfilade.irradiance import LightCache, over_time, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
+from enfilade.pipeline.kept import Kept
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
-from enfilade.records import Frame, Shading, Source
+from enfilade.records import F32, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
+REACH = 3  # frames to each side over which that is averaged
 NOISE_CONTRAST = 0.01  # the same of what lobes scatter, once it is smoothed
 
 
-def make_frame(workshop: Workshop, table: LightTable, frame: int) -> None:
-    """Shade a frame from the light of the pages around it."""
-    if workshop.run.done(result_unit(workshop, frame)):
-        return
-    view = workshop.views[frame]
-    with workshop.costs.of("gather"):
-        near, cache = table.around(frame)
-        seen = _seen(workshop, table, frame, near, cache)
-    with workshop.costs.of("scatter"):
-        scattered = _scattered(workshop, table, frame, cache, seen)
-    height, width = view.geometry.item.shape
-    color = seen.shading.color.reshape(height, width, 3) + scattered.color
-    kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
-    made = Frame(color, np.full((height, width), kind, np.uint8))
-    dropped = seen.shading.dropped + scattered.dropped
-    write_frame_result(workshop, frame, view.geometry, view.flow, made, dropped)
+def raw_unit(workshop: Workshop, frame: int) -> str:
+    """Name in the ledger of a frame shaded by itself."""
+    return f"raw {workshop.number(frame)}"
+
+
+class DecoupledFrames:
+    """Shades frames, and filters over time what is sampled afresh in each.
+
+    Memory is bounded by the frames that the filter spans, whatever the length of the shot.
+
+    Parameters
+    ----------
+    workshop
+    """
+
+    def __init__(self, workshop: Workshop) -> None:
+        self._workshop = workshop
+        self._kept: Kept[_Parts] = Kept(2 * REACH + 2)
+
+    def shade(self, table: LightTable, frame: int) -> None:
+        """Shade a frame by itself, from the light of the pages around it."""
+        if not self._workshop.run.done(raw_unit(self._workshop, frame)):
+            self._kept.made(frame, lambda: self._shaded(table, frame))
+
+    def make(self, table: LightTable, frame: int) -> None:
+        """Deliver a frame, once those around it are shaded."""
+        workshop = self._workshop
+        if workshop.run.done(result_unit(workshop, frame)):
+            return
+        shot = next(shot for shot in workshop.job.path.shots() if frame in shot)
+        span = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
+        parts = {f: self._kept.made(f, lambda f=f: self._read(table, f)) for f in span}  # type: ignore[misc]
+        here, view = parts[frame], workshop.views[frame]
+        others = [f for f in span if f != frame]
+        shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
+        with workshop.costs.of("over time"):
+            scattered = over_time(here.lobes, [parts[f].lobes for f in others], shares)
+        kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
+        made = Frame(here.seen + scattered, np.full(here.where.shape, kind, np.uint8))
+        write_frame_result(workshop, frame, view.geometry, view.flow, made, here.scattered.dropped)
+
+    def _shaded(self, table: LightTable, frame: int) -> _Parts:
+        workshop = self._workshop
+        geometry = workshop.views[frame].geometry
+        with workshop.costs.of("gather"):
+            near, cache = table.around(frame)
+            estimate = _seen(workshop, table, frame, near, cache)
+        with workshop.costs.of("scatter"):
+            shown = table.shader.shown(geometry)
+            scattered, where = _scattered(workshop, table, shown, frame, cache, estimate)
+        seen = estimate.shading.color.reshape(*where.shape, 3)
+        dropped = scattered.dropped + estimate.shading.dropped
+        file = workshop.run.file("raw", workshop.number(frame))
+        with workshop.costs.of("files"):
+            seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), where)
+        workshop.finish(raw_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
+        return _Parts(seen, scattered, where, shown)
+
+    def _read(self, table: LightTable, frame: int) -> _Parts:
+        file = self._workshop.run.file("raw", self._workshop.number(frame))
+        self._workshop.run.check(file)
+        return _Parts(*read_parts(file), table.shader.shown(self._workshop.views[frame].geometry))
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """A frame shaded by itself; ``shown`` is its geometry with virtual images."""
+
+    seen: F32
+    scattered: Shading
+    where: Mask
+    shown: Geometry
+
+    @property
+    def lobes(self) -> tuple[Geometry, Shading, Mask]:
+        """What :func:`over_time` takes."""
+        return self.shown, self.scattered, self.where
 
 
 def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:
@@ -62,9 +129,9 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
 
 
 def _scattered(
-    workshop: Workshop, table: LightTable, frame: int, cache: LightCache, seen: Estimate
-) -> Shading:
-    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed.
+    workshop: Workshop, table: LightTable, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
+) -> tuple[Shading, Mask]:
+    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and where they have others.
 
     Pixels where noise is left get more rays.
     """
@@ -81,18 +148,14 @@ def _scattered(
     )
     least, most = settings.light.least_lobe_samples, settings.light.lobe_samples
     scattered.add(least)
-
-    shown = table.shader.shown(workshop.views[frame].geometry)
-
-    def image() -> Shading:
-        return smoothed(shown, scattered.shading.spread(where.reshape(path.height, path.width)))
-
+    flags = where.reshape(path.height, path.width)
+    image = smoothed(shown, scattered.shading.spread(flags))
     if most > least:
-        left = image()
-        whole = _luminance(seen.shading) + _luminance(left).ravel()
-        is_noisy = np.sqrt(left.variance).ravel() > NOISE_CONTRAST * settings.light.quality * whole
+        whole = _luminance(seen.shading) + _luminance(image).ravel()
+        is_noisy = np.sqrt(image.variance).ravel() > NOISE_CONTRAST * settings.light.quality * whole
         scattered.add(most - least, _grown(is_noisy, path.width)[where])
-    return image()
+        image = smoothed(shown, scattered.shading.spread(flags))
+    return image, flags
 
 
 def _luminance(shading: Shading) -> npt.NDArray[np.float32]:

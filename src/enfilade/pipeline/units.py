@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from enfilade.executors import Unit
+from enfilade.pipeline.decoupled import REACH
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import Survey, initial_segments
 from enfilade.records import Segment
@@ -202,8 +203,13 @@ class Blueprint:
                 gate = f"round {index}.{number}"
                 yield Unit(gate, "gate", needs=tuple(unit.name for unit in units), is_gate=True)
         for frame in shot:
-            facts = {"shot": index}
-            yield self._frame(frame, "decoupled", stage="frames", needs=(gate,), facts=facts)
+            facts = {"frame": frame, "shot": index}
+            raw = f"raw {self._numbers[frame]}"
+            yield Unit(raw, "shade", facts, (gate,), (FRAMES, frame, 0), f"frame {frame // BLOCK}", "shading")
+            window = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
+            needs = tuple(f"raw {self._numbers[f]}" for f in window)
+            unit = self._frame(frame, "decoupled", stage="frames", needs=needs, facts={"shot": index})
+            yield replace(unit, order=(FRAMES, window[-1], 1))
 
     def _light_at(self, frame: int, shot: int, kind: str, stage: int) -> Unit:
         facts, group = {"frame": frame, "shot": shot}, f"{kind} {frame // BLOCK}"

@@ -9,7 +9,7 @@ from typing import Any
 
 from enfilade.arrays import release_memory
 from enfilade.monitor import Monitor
-from enfilade.pipeline.decoupled import make_frame
+from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.finish import Antialiasing, trace_reference, write_video
 from enfilade.pipeline.inbetween import make_copy, make_inbetween, make_keyframe
 from enfilade.pipeline.job import Job, open_renderer
@@ -85,6 +85,10 @@ class Worker:
     def _antialiasing(self) -> Antialiasing:
         return Antialiasing(self._workshop)
 
+    @cached_property
+    def _frames(self) -> DecoupledFrames:
+        return DecoupledFrames(self._workshop)
+
     def _survey(self) -> None:
         workshop, job = self._workshop, self._job
         survey = survey_path(workshop.views, job.path, job.settings, self._monitor)
@@ -122,12 +126,13 @@ class Worker:
                 table.trace(facts["frame"])
             case "light":
                 table.prepare(Segment(*facts["segment"]))
-            case "decoupled":
+            case "shade" | "decoupled":
                 if facts["shot"] not in self._complete:
                     for segment in table.segments:
                         table.prepare(segment)
                     self._complete.add(facts["shot"])
-                make_frame(self._workshop, table, facts["frame"])
+                do = self._frames.shade if kind == "shade" else self._frames.make
+                do(table, facts["frame"])
             case _:
                 raise ValueError(f"there is no unit of kind {kind!r}")
 

@@ -56,8 +56,7 @@ def stratified(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) ->
 
 
 def stratified4(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
-    """The same in the unit cube of four dimensions; Array4f.
-    """
+    """The same in the unit cube of four dimensions; Array4f."""
     starts = _drawn(pixel, UInt(WHOLE_PIXEL_4), seed=seed, frame=frame, purpose=purpose)
     return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
 
