@@ -122,7 +122,7 @@ def write_parts(file: Path, seen: F32, scattered: Shading, where: Mask) -> tuple
         The file can't be written.
     """
     halves = _half(seen), _half(scattered.color), _half(scattered.variance)
-    layers = {
+    layers: dict[str, Array] = {
         "RGB": halves[0],
         "scattered": halves[1],
         "variance": halves[2],

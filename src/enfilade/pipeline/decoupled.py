@@ -26,7 +26,7 @@ from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
 REACH = 3  # frames to each side over which that is averaged
-NOISE_CONTRAST = 0.01  # the same of what lobes scatter, once it is smoothed
+NOISE_CONTRAST = 0.025  # the same of what lobes scatter, once it is smoothed
 
 
 def raw_unit(workshop: Workshop, frame: int) -> str:
