@@ -2,8 +2,8 @@
 
 Every frame is shaded by itself: camera rays, textures and lobes are exact, and the light on diffuse
 surfaces is looked up in the keyframes nearest on the path. What they don't know is path traced, for that
-lookup alone. What lobes scatter is sampled afresh in each frame, and then averaged over a few frames along its
-own motion: that of the surface, or of the virtual image in a mirror.
+lookup alone. What lobes scatter is sampled afresh in each frame, and then averaged over a few frames along
+its own motion: that of the surface, or of the virtual image in a mirror.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
 REACH = 3  # frames to each side over which that is averaged
-NOISE_CONTRAST = 0.025  # the same of what lobes scatter, once it is smoothed
+NOISE_CONTRAST = 0.025  # the same of what lobes scatter, once it is smoothed; time will average it
+LEAST_NOISY = 0.01  # of a frame's pixels: fewer are left as they are
 
 
 def raw_unit(workshop: Workshop, frame: int) -> str:
@@ -153,8 +154,9 @@ def _scattered(
     if most > least:
         whole = _luminance(seen.shading) + _luminance(image).ravel()
         is_noisy = np.sqrt(image.variance).ravel() > NOISE_CONTRAST * settings.light.quality * whole
-        scattered.add(most - least, _grown(is_noisy, path.width)[where])
-        image = smoothed(shown, scattered.shading.spread(flags))
+        if is_noisy.mean() > LEAST_NOISY:
+            scattered.add(most - least, _grown(is_noisy, path.width)[where])
+            image = smoothed(shown, scattered.shading.spread(flags))
     return image, flags
 
 

@@ -30,9 +30,10 @@ from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
 LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
 POOL = 4  # keyframes to each side with which a page is pooled
-LEAST_HOLES = 2e-3  # of a frame's pixels: fewer are left to the frames themselves
+LEAST_HOLES = 5e-3  # of a frame's pixels: fewer are left to the frames themselves
 PILOT_PATHS = 4  # of each of the two estimates that tell how many paths are needed
 PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
+FILLS = 2  # pages that fill holes in which a frame looks: the one before and the one after it
 TRACED = 4  # pages kept as they were traced
 
 
@@ -61,12 +62,12 @@ class LightTable:
         self._workshop = workshop
         self.segments = segments
         self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
-        self._fills: list[int] = []
+        self._fills: dict[Segment, list[int]] = {}
         self.drafts = Drafts(workshop, self.renderer, self.shader, self.keyframes)
         settings = workshop.job.settings.light
         self._traced: Kept[LightPage] = Kept(TRACED)
         self._opened: Kept[Page] = Kept(2 * (2 * POOL + 1))
-        self._pooled: Kept[Page] = Kept(settings.keyframes + settings.fills + 1)
+        self._pooled: Kept[Page] = Kept(settings.keyframes + FILLS + 1)
 
     def prepare(self, segment: Segment) -> None:
         """Trace the light of a segment's keyframes, and of what they leave open between them."""
@@ -80,7 +81,7 @@ class LightTable:
             fills = self._filled(segment.first, segment.last, [])
             numbers = [workshop.number(frame) for frame in fills]
             workshop.finish(unit, [], fills=numbers)
-        self._fills = sorted({*self._fills, *fills})
+        self._fills[segment] = fills
 
     def trace(self, keyframe: int) -> LightPage:
         """The light of a keyframe: from memory, from the run folder, or traced now."""
@@ -93,14 +94,19 @@ class LightTable:
         """
         settings = self._workshop.job.settings.light
         frames = [*nearest(self.keyframes, frame, settings.keyframes)]
-        frames += nearest(self._fills, frame, settings.fills)
+        frames += _around(self._fills_at(frame), frame)
         pages = [self._page(f) for f in frames]
         shares = [max(1.0 - abs(f - frame) / (REACH * self._spacing), LEAST_SHARE) for f in frames]
         view = seen_from(self._workshop.views[frame].geometry, pages, shares)
         # Always as many pages, so that the kernels which look them up are recorded once.
-        missing = settings.keyframes + settings.fills - len(pages)
+        missing = settings.keyframes + FILLS - len(pages)
         pages, shares = [*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing]
         return open_cache([view], [1.0]), open_cache(pages, shares, self.drafts.cells(frame))
+
+    def _fills_at(self, frame: int) -> list[int]:
+        """Pages that fill the holes of a frame's own segment: others see other holes."""
+        segment = next(s for s in self.segments if s.first <= frame <= s.last)
+        return self._fills.get(segment, [])
 
     @property
     def _spacing(self) -> float:
@@ -110,22 +116,22 @@ class LightTable:
         return self._workshop.job.path.numbers.index(number)
 
     def _filled(self, first: int, last: int, fills: list[int]) -> list[int]:
-        """Halve a stretch of frames until nothing new comes into view; returns the frames that fill holes."""
+        """Halve a stretch of frames until nothing new comes into view; returns the frames that fill holes.
+
+        A page that fills holes knows all that the keyframes don't, so that the two around a frame do.
+        """
         middle = (first + last) // 2
-        if middle == first:
+        if middle == first or self._holes(middle, _around(fills, middle)).mean() < LEAST_HOLES:
             return fills
-        holes = self._holes(middle, fills)
-        if holes.mean() < LEAST_HOLES:
-            return fills
-        self._trace(middle, holes)
-        fills = [*fills, middle]
+        self._trace(middle, self._holes(middle, []))
+        fills = sorted([*fills, middle])
         return self._filled(middle, last, self._filled(first, middle, fills))
 
     def _holes(self, frame: int, fills: list[int]) -> Mask:
+        """Pixels whose light is known neither to the keyframes nor to pages that fill holes."""
         geometry = self._workshop.views[frame].geometry
         frames = nearest(self.keyframes, frame, self._workshop.job.settings.light.keyframes)
-        pages = [self._open(f) for f in (*frames, *fills)]
-        return geometry.has_light & ~known(geometry, pages)
+        return geometry.has_light & ~known(geometry, [self._open(f) for f in (*frames, *fills)])
 
     def _page(self, frame: int) -> Page:
         """A page with what all around it know of its surfaces."""
@@ -133,7 +139,7 @@ class LightTable:
 
     def _pool(self, frame: int) -> Page:
         around = nearest(self.keyframes, frame, 2 * POOL + 1)
-        around += nearest(self._fills, frame, 2 * POOL + 1)
+        around += nearest(sorted(set().union(*self._fills.values())), frame, 2 * POOL + 1)
         with self._workshop.costs.of("pool"):
             pages = [self._open(f) for f in sorted({*around, frame})]
             return pooled(self._trace(frame), pages)
@@ -215,3 +221,9 @@ class LightTable:
                 page = LightPage(frame, geometry, direct, indirect, where)
                 shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
             return workshop.judge.compare(*shown, valid=where).score
+
+
+def _around(fills: list[int], frame: int) -> list[int]:
+    """The last of some frames that is not after one, and the first that is not before."""
+    before, after = [f for f in fills if f <= frame], [f for f in fills if f >= frame]
+    return sorted({*before[-1:], *after[:1]})
