@@ -135,7 +135,7 @@ class _Sums:
             if self._pixels[k] < LEAST_PIXELS:
                 continue
             scores = {mode: _rooted(self._sums[mode][k] / self._pixels[k]) for mode in self.MODES}
-            middle = np.array([a + 0.0 if b is None else 0.5 * (a + b)], np.float32)
+            middle = np.array([a + 1.0 if b is None else 0.5 * (a + b)], np.float32)
             found.append(
                 {
                     "from_deg_s": a,
