@@ -139,8 +139,7 @@ class Worker:
     def _table(self, shot: int) -> LightTable:
         if shot not in self._tables:
             segments = segments_of(self._job, Survey.from_dict(self._line("survey")["survey"]))
-            self._tables = {shot: LightTable(self._workshop, segments[shot])}
-            self._complete &= {shot}
+            self._tables[shot] = LightTable(self._workshop, segments[shot])
         return self._tables[shot]
 
     def _line(self, unit: str) -> dict[str, Any]:
