@@ -7,10 +7,12 @@ from enfilade.codec import read_exr
 from enfilade.errors import SettingsError
 from enfilade.monitor import Silence
 from enfilade.path import load_path
+from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.walkthrough import render
 from enfilade.scenes import write_scene
 from enfilade.settings import Settings
+from enfilade.store import Run
 from scenes_analytic import slide, wall
 from small_runs import frame_bytes, job_of, rendered
 
@@ -61,6 +63,19 @@ def test_a_run_that_lost_files_is_mended_to_the_same_bytes(decoupled):
     (folder / "keyframes" / "0001.exr").unlink()
     render(job, folder, Silence())
     assert frame_bytes(folder) == before
+
+
+def test_lost_fills_are_traced_by_workers_as_they_were(decoupled):
+    job, folder, _ = decoupled
+    run = Run.existing(folder)
+    before, digest = frame_bytes(folder), run.digest()
+    fills = [number for line in run.lines() for number in line.get("fills", ())]
+    assert fills  # pages of a few pixels: traced whole they would be others
+    for name in (f"keyframes/{fills[0]:04d}.exr", "cells/0001.npz", "frames/0024.exr"):
+        (folder / name).unlink()
+    render(job, folder, Silence(), Crew("processes", 2))
+    assert frame_bytes(folder) == before
+    assert Run.existing(folder).digest() == digest
 
 
 def test_a_renderer_without_light_is_refused(tmp_path):
