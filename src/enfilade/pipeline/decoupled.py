@@ -19,6 +19,7 @@ from enfilade.irradiance import LightCache, over_time, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept
 from enfilade.pipeline.light import LightTable
+from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
 from enfilade.records import F32, Frame, Geometry, Mask, Shading, Source
@@ -62,23 +63,24 @@ class DecoupledFrames:
         shot = next(shot for shot in workshop.job.path.shots() if frame in shot)
         span = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
         parts = {f: self._kept.made(f, lambda f=f: self._read(table, f)) for f in span}  # type: ignore[misc]
-        here, view = parts[frame], workshop.views[frame]
+        here = parts[frame]
         others = [f for f in span if f != frame]
         shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
         with workshop.costs.of("over time"):
             scattered = over_time(here.lobes, [parts[f].lobes for f in others], shares)
         kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
         made = Frame(here.seen + scattered, np.full(here.where.shape, kind, np.uint8))
-        write_frame_result(workshop, frame, view.geometry, view.flow, made, here.scattered.dropped)
+        dropped = here.scattered.dropped
+        write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, dropped)
 
     def _shaded(self, table: LightTable, frame: int) -> _Parts:
         workshop = self._workshop
-        geometry = workshop.views[frame].geometry
+        view = workshop.views[frame]
         with workshop.costs.of("gather"):
             near, cache = table.around(frame)
             estimate = _seen(workshop, table, frame, near, cache)
         with workshop.costs.of("scatter"):
-            shown = table.shader.shown(geometry)
+            shown = table.shader.shown(view.geometry)
             scattered, where = _scattered(workshop, table, shown, frame, cache, estimate)
         seen = estimate.shading.color.reshape(*where.shape, 3)
         dropped = scattered.dropped + estimate.shading.dropped
@@ -86,18 +88,20 @@ class DecoupledFrames:
         with workshop.costs.of("files"):
             seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), where)
         workshop.finish(raw_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
-        return _Parts(seen, scattered, where, shown)
+        return _Parts(view, seen, scattered, where, shown)
 
     def _read(self, table: LightTable, frame: int) -> _Parts:
         file = self._workshop.run.file("raw", self._workshop.number(frame))
         self._workshop.run.check(file)
-        return _Parts(*read_parts(file), table.shader.shown(self._workshop.views[frame].geometry))
+        view = self._workshop.views[frame]
+        return _Parts(view, *read_parts(file), table.shader.shown(view.geometry))
 
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
     """A frame shaded by itself; ``shown`` is its geometry with virtual images."""
 
+    view: View
     seen: F32
     scattered: Shading
     where: Mask

@@ -178,7 +178,8 @@ class _Race:
         """Render and judge a contestant: its row of the result."""
         folder = self._run.folder / "contestants" / one.name
         unit = f"contestant {one.name}"
-        if changed := _changed((self._run.done(unit) or {}).get("setting", {}), one.setting()):
+        line = self._finished(unit, folder) or {}
+        if changed := _changed(line.get("setting", {}), one.setting()):
             raise RunFolderError(
                 f"{folder} was made with other settings ({', '.join(changed)}): begin it anew with "
                 f"--redo {one.name}, or give the preset another name"
@@ -233,8 +234,7 @@ class _Race:
     def _rendered(
         self, unit: str, task: Any, folder: Path, setting: dict[str, Any], device: Choice
     ) -> dict[str, Any]:
-        line = self._run.done(unit)
-        if line is not None and (folder / "ledger.jsonl").is_file():
+        if line := self._finished(unit, folder):
             cost: dict[str, Any] = line["cost"]
             return cost
         notes = self._run.folder / "spent" / folder.name
@@ -245,6 +245,10 @@ class _Race:
             raise RunFolderError(f"{error}{remedy}") from error
         self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting})
         return spent.to_dict()
+
+    def _finished(self, unit: str, folder: Path) -> dict[str, Any] | None:
+        """The line of a contestant that was rendered, and not forgotten since."""
+        return self._run.done(unit) if (folder / "ledger.jsonl").is_file() else None
 
     def _judged(self, one: Contestant, folder: Path, judges: Sequence[str]) -> dict[str, Any]:
         made = _ledger_digest(folder)
