@@ -98,7 +98,7 @@ def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
     return direct, indirect, layers["known"] > 0
 
 
-def write_parts(file: Path, seen: F32, scattered: Shading, where: Mask) -> tuple[F32, Shading]:
+def write_parts(file: Path, seen: F32, scattered: Shading, source: U8) -> tuple[F32, Shading]:
     """Write the two parts of a frame's light, as half floats.
 
     Parameters
@@ -108,8 +108,8 @@ def write_parts(file: Path, seen: F32, scattered: Shading, where: Mask) -> tuple
         What surfaces emit and scatter diffusely.
     scattered : Shading
         What they scatter by other lobes.
-    where : (H, W) bool
-        Pixels that have such lobes.
+    source : (H, W) uint8
+        ``records.Source``.
 
     Returns
     -------
@@ -126,13 +126,13 @@ def write_parts(file: Path, seen: F32, scattered: Shading, where: Mask) -> tuple
         "RGB": halves[0],
         "scattered": halves[1],
         "variance": halves[2],
-        "where": where.astype(np.uint32),
+        "source": source.astype(np.uint32),
     }
     write_exr(file, layers, attributes={"dropped": str(int(scattered.dropped))})
     return _parts(*halves, dropped=scattered.dropped)
 
 
-def read_parts(file: Path) -> tuple[F32, Shading, Mask]:
+def read_parts(file: Path) -> tuple[F32, Shading, U8]:
     """Read what :func:`write_parts` wrote.
 
     Raises
@@ -140,10 +140,10 @@ def read_parts(file: Path) -> tuple[F32, Shading, Mask]:
     ImageError
         The file is missing, damaged, or holds no such parts.
     """
-    kinds = {"RGB": np.float16, "scattered": np.float16, "variance": np.float16, "where": np.uint32}
+    kinds = {"RGB": np.float16, "scattered": np.float16, "variance": np.float16, "source": np.uint32}
     layers = _required(file, kinds)
     halves = layers["RGB"], layers["scattered"], layers["variance"]
-    return *_parts(*halves, dropped=_dropped(file)), layers["where"] > 0
+    return *_parts(*halves, dropped=_dropped(file)), layers["source"].astype(np.uint8)
 
 
 def _parts(seen: Array, color: Array, variance: Array, *, dropped: int) -> tuple[F32, Shading]:

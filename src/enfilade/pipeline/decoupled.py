@@ -22,7 +22,7 @@ from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
-from enfilade.records import F32, Frame, Geometry, Mask, Shading, Source
+from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
@@ -68,8 +68,7 @@ class DecoupledFrames:
         shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
         with workshop.costs.of("over time"):
             scattered = over_time(here.lobes, [parts[f].lobes for f in others], shares)
-        kind = Source.KEYFRAME if frame in table.keyframes else Source.REUSED
-        made = Frame(here.seen + scattered, np.full(here.where.shape, kind, np.uint8))
+        made = Frame(here.seen + scattered, here.source)
         dropped = here.scattered.dropped
         write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, dropped)
 
@@ -81,14 +80,15 @@ class DecoupledFrames:
             estimate = _seen(workshop, table, frame, near, cache)
         with workshop.costs.of("scatter"):
             shown = table.shader.shown(view.geometry)
-            scattered, where = _scattered(workshop, table, shown, frame, cache, estimate)
-        seen = estimate.shading.color.reshape(*where.shape, 3)
+            scattered = _scattered(workshop, table, shown, frame, cache, estimate)
+        source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
+        seen = estimate.shading.color.reshape(*source.shape, 3)
         dropped = scattered.dropped + estimate.shading.dropped
         file = workshop.run.file("raw", workshop.number(frame))
         with workshop.costs.of("files"):
-            seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), where)
+            seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), source)
         workshop.finish(raw_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
-        return _Parts(view, seen, scattered, where, shown)
+        return _Parts(view, seen, scattered, source, shown)
 
     def _read(self, table: LightTable, frame: int) -> _Parts:
         file = self._workshop.run.file("raw", self._workshop.number(frame))
@@ -104,13 +104,15 @@ class _Parts:
     view: View
     seen: F32
     scattered: Shading
-    where: Mask
+    source: U8
     shown: Geometry
 
     @property
     def lobes(self) -> tuple[Geometry, Shading, Mask]:
         """What :func:`over_time` takes."""
-        return self.shown, self.scattered, self.where
+        width = self.source.shape[1]
+        where = _grown((self.source == Source.SPECULAR).ravel(), width).reshape(-1, width)
+        return self.shown, self.scattered, where
 
 
 def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:
@@ -133,10 +135,21 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
     return seen
 
 
+def _source(
+    geometry: Geometry, view: LightCache, has_lobe: npt.NDArray[np.bool_], *, is_keyframe: bool
+) -> U8:
+    """Why pixels have their values: lobes are sampled, and so is light that no page knows, (H, W)."""
+    is_known = np.array(view.pages[0].items) > 0
+    source = np.full(has_lobe.shape, Source.KEYFRAME if is_keyframe else Source.REUSED, np.uint8)
+    source[geometry.has_light.ravel() & ~is_known] = Source.HOLE
+    source[has_lobe] = Source.SPECULAR
+    return source.reshape(geometry.item.shape)
+
+
 def _scattered(
     workshop: Workshop, table: LightTable, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
-) -> tuple[Shading, Mask]:
-    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and where they have others.
+) -> Shading:
+    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed.
 
     Pixels where noise is left get more rays.
     """
@@ -161,7 +174,7 @@ def _scattered(
         if is_noisy.mean() > LEAST_NOISY:
             scattered.add(most - least, _grown(is_noisy, path.width)[where])
             image = smoothed(shown, scattered.shading.spread(flags))
-    return image, flags
+    return image
 
 
 def _luminance(shading: Shading) -> npt.NDArray[np.float32]:
