@@ -13,9 +13,13 @@ from enfilade.camera import Camera
 from enfilade.codec import (
     read_exr,
     read_frame,
+    read_light,
+    read_parts,
     read_shading,
     write_exr,
     write_frame,
+    write_light,
+    write_parts,
     write_result,
     write_shading,
 )
@@ -39,6 +43,37 @@ def test_shading_comes_back_exactly(tmp_path, data, size, dropped):
     assert back.color.tobytes() == color.tobytes()
     assert back.variance.tobytes() == variance.tobytes()
     assert back.dropped == dropped
+
+
+def test_light_comes_back_exactly(tmp_path):
+    rng = np.random.default_rng(1)
+    direct, indirect = (
+        Shading(*(rng.random(shape).astype(np.float32) for shape in ((5, 7, 3), (5, 7))), 3) for _ in "ab"
+    )
+    is_known = rng.random((5, 7)) < 0.5
+    write_light(tmp_path / "a.exr", direct, indirect, is_known)
+    back = read_light(tmp_path / "a.exr")
+    np.testing.assert_array_equal(back[2], is_known)
+    for got, put in zip(back[:2], (direct, indirect), strict=True):
+        assert (got.color.tobytes(), got.variance.tobytes()) == (put.color.tobytes(), put.variance.tobytes())
+        assert got.dropped == 3
+
+
+def test_parts_are_what_was_said_when_they_were_written(tmp_path):
+    rng = np.random.default_rng(2)
+    seen, color = (rng.random((5, 7, 3)).astype(np.float32) for _ in "ab")
+    seen[0, 0] = 1e9  # beyond half floats
+    scattered = Shading(color, rng.random((5, 7)).astype(np.float32), 4)
+    source = rng.integers(0, 5, (5, 7)).astype(np.uint8)
+    said = write_parts(tmp_path / "a.exr", seen, scattered, source)
+    back = read_parts(tmp_path / "a.exr")
+    np.testing.assert_array_equal(back[0], said[0])
+    np.testing.assert_array_equal(back[1].color, said[1].color)
+    np.testing.assert_array_equal(back[1].variance, said[1].variance)
+    np.testing.assert_array_equal(back[2], source)
+    assert back[1].dropped == 4
+    assert np.isfinite(back[0]).all()
+    np.testing.assert_allclose(back[0][1:], seen[1:], rtol=1e-3)
 
 
 @RELAXED

@@ -5,8 +5,9 @@ import pytest
 
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
-from enfilade.geometry import find_geometry
-from enfilade.irradiance import LightCache, Shader, open_cache, open_page
+from enfilade.geometry import find_geometry, positions
+from enfilade.irradiance import LightCache, Shader, open_cache, open_page, over_time
+from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose
@@ -178,6 +179,72 @@ def test_what_no_page_saw_is_traced(diffuse):
     difference = ((cached.color - reference.color) @ LUMINANCE).mean()
     deviation = np.sqrt((cached.variance + reference.variance).sum()) / cached.variance.size
     assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
+
+
+def _gathered(renderer, cache: LightCache, camera: Camera, spp: int) -> list[Shading]:
+    shader = Shader(renderer, pixel_angle=0.02)
+    light = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng, square: shader.gathered(cache, rays, rng, square),
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random={"seed": 8, "frame": 0, "purpose": int(Purpose.LIGHT)},
+        layers=2,
+        is_stratified=True,
+    )
+    light.add(spp)
+    return light.shadings
+
+
+def test_light_is_gathered_as_it_is_path_traced(tmp_path):
+    renderer, camera = _opened(tmp_path, MATERIALS), _camera()
+    page = _page(renderer, camera)
+    for cache, bias in ((LightCache(), 0.0), (_opened_cache([page]), 0.02)):
+        gathered = _gathered(renderer, cache, camera, 64)
+        for ours, reference in zip(gathered, (page.direct, page.indirect), strict=True):
+            difference = (ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE
+            deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+            assert abs(difference.sum()) < 4.0 * deviation + bias * (reference.color @ LUMINANCE).sum()
+
+
+def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
+    mirror = (
+        '</shape><shape type="rectangle" id="mirror"><transform name="to_world"><scale value="3"/>'
+        '<translate z="-1.4"/></transform><bsdf type="conductor"/>'
+    )
+    renderer, camera = _opened(tmp_path, {"ball": mirror}), _camera()
+    seen = find_geometry(renderer, camera)
+    shown = Shader(renderer, pixel_angle=0.02).shown(seen)
+    names = renderer.describe().items
+    is_floor = shown.item == BEHIND + names.index("floor") + 1
+    assert is_floor.sum() > 20
+    points = positions(shown)[is_floor]
+    # The floor, y = 0, goes on behind an upright mirror.
+    np.testing.assert_allclose(points[:, 1], 0.0, atol=2e-3)
+    assert points[:, 2].max() < -1.4
+    is_same = shown.item == seen.item
+    np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
+
+
+def test_what_moves_along_is_averaged(diffuse):
+    renderer, _ = diffuse
+    rng = np.random.default_rng(4)
+    frames = []
+    for x in (0.0, 0.05, -0.05):
+        geometry = find_geometry(renderer, _camera(x=x))
+        size = geometry.item.shape
+        color = rng.normal(1.0, 0.1, (*size, 3)).astype(np.float32)
+        frames.append((geometry, Shading(color, np.full(size, 0.01, np.float32)), geometry.is_hit))
+    averaged = over_time(frames[0], frames[1:], [1.0, 1.0])
+    where = frames[0][2]
+    assert averaged[where].std() < 0.75 * frames[0][1].color[where].std()
+    assert abs(averaged[where].mean() - 1.0) < 0.01
+    assert not averaged[~where].any()
+    # What is far from the frame's own value is no noise.
+    brighter = [(g, Shading(s.color + 5.0, s.variance), w) for g, s, w in frames[1:]]
+    kept = over_time(frames[0], brighter, [1.0, 1.0])
+    np.testing.assert_allclose(kept[where], frames[0][1].color[where], atol=1e-2)
 
 
 def test_what_mitsuba_prepares_late_is_no_hindrance(tmp_path):

@@ -6,8 +6,8 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import UInt, lanes
-from enfilade.pixels.random import stratified, streams
+from enfilade.arrays import Float, UInt, lanes
+from enfilade.pixels.random import Leading, stratified, stratified4, streams
 
 COUNT = 1 << 16
 LIMIT = 5 / math.sqrt(COUNT)  # five standard errors of a correlation of nothing
@@ -115,3 +115,26 @@ def test_each_path_alone_is_uniform_over_the_pixel():
     limit = 5 / math.sqrt(len(points))
     assert np.abs(points.mean(axis=0) - 0.5).max() < limit * math.sqrt(1 / 12)
     assert abs(np.corrcoef(points.T)[0, 1]) < limit
+
+
+def test_paths_share_out_the_cube_of_four_dimensions():
+    use = {"seed": 3, "frame": 1, "purpose": 2}
+    pixel, path = np.repeat(np.arange(64, dtype=np.uint32), 64), np.tile(np.arange(64, dtype=np.uint32), 64)
+    points = np.stack([np.array(x) for x in stratified4(lanes(pixel), lanes(path), **use)])
+    assert points.min() >= 0.0
+    assert points.max() < 1.0
+    # Integrals of smooth functions: the mean over a pixel's paths errs far less than that of random points.
+    means = np.cos(2 * np.pi * points).reshape(4, 64, 64).mean(axis=2)
+    assert (means.std(axis=1) < 0.25 * math.sqrt(0.5 / 64)).all()
+    # Each path by itself is uniform.
+    first = points.reshape(4, 64, 64)[:, :, 0]
+    assert (np.abs(first.mean(axis=1) - 0.5) < 5 * math.sqrt(1 / 12 / 64)).all()
+
+
+def test_given_numbers_lead():
+    pixel = lanes(np.arange(8, dtype=np.uint32))
+    rng, alone = (streams(pixel, UInt(0), seed=1, frame=2, purpose=3) for _ in "ab")
+    leading = Leading([Float(0.25), Float(0.5)], rng)
+    assert np.array(leading.next_float32()).tolist() == [0.25]
+    assert np.array(leading.next_float32()).tolist() == [0.5]
+    np.testing.assert_array_equal(np.array(leading.next_float32()), np.array(alone.next_float32()))
