@@ -7,7 +7,7 @@ import pytest
 
 from enfilade.arrays import image, lanes, matrix3
 from enfilade.camera import Camera, look_at
-from enfilade.pixels.wavelet import Guide, smooth, without_speckles
+from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, without_speckles
 from twins import wavelet as twin
 
 HEIGHT, WIDTH = 18, 24
@@ -102,3 +102,18 @@ def test_a_speckle_is_cut_to_its_brightest_neighbour():
     np.testing.assert_allclose(cut[2, 3], 3.0, rtol=1e-5)
     color[2, 3] = cut[2, 3]
     np.testing.assert_array_equal(cut, color)
+
+
+def test_edges_between_items_are_as_soft_as_the_filter():
+    rng = np.random.default_rng(5)
+    color = rng.random((6, 9, 3)).astype(np.float32)
+    items = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
+    got = image(with_soft_edges(lanes(color), lanes(items), width=9, height=6, sigma=0.5), 6, 9)
+    padded = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    weights = np.exp(-np.add.outer(np.array([1, 0, 1]), np.array([1, 0, 1])) / 0.5)
+    expected = color.copy()
+    for y in range(6):
+        for x in (3, 4):
+            window = padded[y : y + 3, x : x + 3]
+            expected[y, x] = (weights[..., None] * window).sum(axis=(0, 1)) / weights.sum()
+    np.testing.assert_allclose(got, expected, rtol=1e-5)

@@ -11,10 +11,10 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
 from enfilade.irradiance.cells import Cells
-from enfilade.pixels.estimate import LUMINANCE
+from enfilade.pixels.estimate import GAUSSIAN_SIGMA_PX, LUMINANCE
 from enfilade.pixels.lookup import Page, footprint, lookup
 from enfilade.pixels.rays import pinhole_directions
-from enfilade.pixels.wavelet import Guide, smooth, without_speckles
+from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, without_speckles
 from enfilade.records import F32, U32, Geometry, LightPage, Mask, Shading
 
 BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror or through glass
@@ -118,6 +118,9 @@ def smoothed(geometry: Geometry, shading: Shading) -> Shading:
     geometry = replace(geometry, depth=np.where(geometry.item < BEHIND, geometry.depth, np.float32(0)))
     light, variance = _smooth(geometry, geometry.item, _even(shading), lanes(shading.variance))
     size = shading.variance.shape
+    light = with_soft_edges(
+        light, lanes(geometry.item), width=size[1], height=size[0], sigma=GAUSSIAN_SIGMA_PX
+    )
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Float, Int, UInt, opaque, pixel_grid
+from enfilade.arrays import Array3f, Bool, Float, Int, UInt, opaque, pixel_grid
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
@@ -150,6 +151,36 @@ def without_speckles(color: Any, *, width: int, height: int, times: float) -> An
                 brightest = dr.maximum(brightest, around)
     limit = times * brightest
     return color * dr.select(dr.abs(luminance) > limit, limit / dr.maximum(dr.abs(luminance), TINY), 1.0)
+
+
+def with_soft_edges(color: Any, items: Any, *, width: int, height: int, sigma: float) -> Any:
+    """An image whose edges between items are as soft as a Gaussian pixel filter makes them; Array3f.
+
+    Smoothing takes each pixel for the item at its centre: edges become stairs.
+
+    Parameters
+    ----------
+    color : Array3f
+        Image, width * height lanes.
+    items : UInt
+        The same.
+    width, height
+    sigma
+        Standard deviation of the filter, pixels, of which 3x3 pixels are taken.
+    """
+    _, column, row = pixel_grid(height, width)
+    columns, rows = opaque(width, Int), opaque(height, Int)
+    total, weight, is_edge = Array3f(0), 0.0, Bool(False)
+    for down in (-1, 0, 1):
+        for across in (-1, 0, 1):
+            i = dr.clip(Int(column) + across, 0, columns - 1)
+            j = dr.clip(Int(row) + down, 0, rows - 1)
+            tap = UInt(j * columns + i)
+            share = math.exp(-(across**2 + down**2) / (2.0 * sigma**2))
+            total += share * dr.gather(Array3f, color, tap)
+            weight += share
+            is_edge |= dr.gather(UInt, items, tap) != items
+    return dr.select(is_edge, total / weight, color)
 
 
 def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
