@@ -57,10 +57,18 @@ class Preset:
 PRESETS = (
     Preset("paper-16", "paper", {"trace": {"spp": 16}}),
     Preset("paper-64", "paper", {"trace": {"spp": 64}}),
-    Preset("decoupled-30", "decoupled", {"light": {"quality": 30.0, "samples": 8, "lobe_samples": 8}}),
+    Preset(
+        "decoupled-30",
+        "decoupled",
+        {"light": {"quality": 30.0, "samples": 8, "least_lobe_samples": 4, "lobe_samples": 8}},
+    ),
     Preset("decoupled-15", "decoupled", {"light": {"quality": 15.0, "samples": 16}}),
     Preset("decoupled-8", "decoupled", {"light": {"quality": 8.0}}),
-    Preset("decoupled-4", "decoupled", {"light": {"quality": 4.0, "samples": 32, "lobe_samples": 48}}),
+    Preset(
+        "decoupled-4",
+        "decoupled",
+        {"light": {"quality": 4.0, "samples": 32, "least_lobe_samples": 16, "lobe_samples": 48}},
+    ),
 )
 
 
