@@ -235,7 +235,7 @@ class LimitSettings(Section):
         "Memory in which a process of its own must be able to load the scene before it is rendered, MB.",
         least=512, most=10_000_000,
     )  # fmt: skip
-    trial_s: float = option(600.0, "... and in so many seconds.", least=1.0, most=86_400.0)
+    trial_s: float = option(600.0, "... and in so many seconds.", least=0.1, most=86_400.0)
 
 
 @dataclass(frozen=True)
