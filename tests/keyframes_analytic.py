@@ -9,7 +9,7 @@ from enfilade.backends.analytic_scene import AnalyticScene, Plane, Quad, Sphere
 from enfilade.camera import Camera
 from enfilade.geometry import find_geometry
 from enfilade.records import Geometry, Keyframe, Shading
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
 
 
 def geometry_of(scene: AnalyticScene, camera: Camera) -> Geometry:
@@ -21,7 +21,7 @@ def traced_image(scene: AnalyticScene, camera: Camera, *, spp: int = 1, box: boo
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     at = PixelFilter.BOX if box else PixelFilter.CENTRE
     got = AnalyticRenderer(scene).trace(
-        camera, pixels, spp=spp, seed=1, frame=0, purpose=Purpose.KEYFRAME, pixel_filter=at
+        camera, pixels, RandomKey(1, 0, Purpose.KEYFRAME), spp=spp, pixel_filter=at
     )
     size = (camera.height, camera.width)
     return Shading(got.color.reshape(*size, 3), got.variance.reshape(size), got.dropped)

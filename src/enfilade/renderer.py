@@ -33,6 +33,24 @@ class Purpose(IntEnum):
     DRAFT_SCOUT = 10
 
 
+@dataclass(frozen=True)
+class RandomKey:
+    """What random numbers depend on, beside the pixel and the number of the path.
+
+    Attributes
+    ----------
+    seed
+        Of the run, 32 bits.
+    frame
+        Number of the frame; its lowest 24 bits count.
+    purpose
+    """
+
+    seed: int
+    frame: int
+    purpose: Purpose
+
+
 class PixelFilter(IntEnum):
     """Where in the image the paths of a pixel begin."""
 
@@ -185,11 +203,9 @@ class Renderer(Protocol):
         self,
         camera: Camera,
         pixels: npt.NDArray[np.uint32],
+        random: RandomKey,
         *,
         spp: int,
-        seed: int,
-        frame: int,
-        purpose: Purpose,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels, at a cost in proportion to the list.
@@ -199,11 +215,11 @@ class Renderer(Protocol):
         camera
         pixels : (N,) uint32
             Flat indices ``y * width + x``.
+        random
+            The random numbers of a pixel depend on this, on the pixel and on the path's number, and
+            on nothing else: not on the list, the chunking or the worker.
         spp
             Paths a pixel.
-        seed, frame, purpose
-            The random numbers of a pixel depend on these, on the pixel and on the path's number, and
-            on nothing else: not on the list, the chunking or the worker.
         pixel_filter
             Where in the image the paths of a pixel begin.
 

@@ -22,7 +22,7 @@ from enfilade.camera import Camera, look_at
 from enfilade.errors import SceneError
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.records import SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, Rays
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from scenes_analytic import ball, room, room_walk, slide, wall
 
 # A ray's direction, its products and quotients are each rounded to 24 bits: a handful of 6e-8.
@@ -64,7 +64,7 @@ def traced(
     if pixels is None:
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     return AnalyticRenderer(scene, chunk=chunk).trace(
-        camera, pixels, spp=spp, seed=seed, frame=frame, purpose=purpose, pixel_filter=at
+        camera, pixels, RandomKey(seed, frame, purpose), spp=spp, pixel_filter=at
     )
 
 
@@ -290,10 +290,8 @@ def test_no_kernel_is_compiled_after_the_first_frame():
         renderer.trace(
             camera,
             pixels[index:],
+            RandomKey(index, index, Purpose.FILL),
             spp=4,
-            seed=index,
-            frame=index,
-            purpose=Purpose.FILL,
             pixel_filter=PixelFilter.GAUSSIAN,
         )
 

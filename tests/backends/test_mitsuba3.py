@@ -17,7 +17,7 @@ from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.geometry import find_geometry
 from enfilade.records import SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, Rays
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.settings import TraceSettings
 from keyframes_analytic import projected
 
@@ -247,9 +247,7 @@ def everything(camera):
 def traced(renderer, camera, pixels=None, *, spp=4, seed=7, frame=3, at=PixelFilter.BOX, **more):
     pixels = everything(camera) if pixels is None else np.asarray(pixels, np.uint32)
     purpose = more.pop("purpose", Purpose.FILL)
-    return renderer.trace(
-        camera, pixels, spp=spp, seed=seed, frame=frame, purpose=purpose, pixel_filter=at, **more
-    )
+    return renderer.trace(camera, pixels, RandomKey(seed, frame, purpose), spp=spp, pixel_filter=at, **more)
 
 
 def rendered_by_mitsuba(renderer, camera, spp):

@@ -10,7 +10,7 @@ from enfilade.irradiance import LightCache, Shader, open_cache, open_page, over_
 from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.records import LightPage, Shading
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scenes import write_scene
 from enfilade.settings import TraceSettings
 
@@ -80,7 +80,7 @@ def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2
         _shade(renderer, cache),
         chunk=more.get("chunk", 1 << 20),
         pixel_filter=more.get("pixel_filter", PixelFilter.CENTRE),
-        random={"seed": seed, "frame": 0, "purpose": int(Purpose.GATHER)},
+        random=RandomKey(seed, 0, Purpose.GATHER),
         is_stratified=True,
     )
     whole.add(spp)
@@ -98,7 +98,7 @@ def _shade(renderer, cache: LightCache):
 
 def _traced(renderer, camera: Camera, spp: int) -> Shading:
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-    return renderer.trace(camera, pixels, spp=spp, seed=1, frame=0, purpose=Purpose.REFERENCE)
+    return renderer.trace(camera, pixels, RandomKey(1, 0, Purpose.REFERENCE), spp=spp)
 
 
 def test_without_a_cache_every_material_keeps_its_energy(tmp_path):
@@ -138,7 +138,7 @@ def _page(renderer, camera: Camera) -> LightPage:
         lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
-        random={"seed": 3, "frame": 0, "purpose": int(Purpose.LIGHT)},
+        random=RandomKey(3, 0, Purpose.LIGHT),
         layers=2,
     )
     light.add(256)
@@ -189,7 +189,7 @@ def _gathered(renderer, cache: LightCache, camera: Camera, spp: int) -> list[Sha
         lambda rays, rng, square: shader.gathered(cache, rays, rng, square),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
-        random={"seed": 8, "frame": 0, "purpose": int(Purpose.LIGHT)},
+        random=RandomKey(8, 0, Purpose.LIGHT),
         layers=2,
         is_stratified=True,
     )

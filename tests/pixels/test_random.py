@@ -8,6 +8,7 @@ import pytest
 
 from enfilade.arrays import Float, UInt, lanes
 from enfilade.pixels.random import Leading, stratified, stratified4, streams
+from enfilade.renderer import RandomKey
 
 COUNT = 1 << 16
 LIMIT = 5 / math.sqrt(COUNT)  # five standard errors of a correlation of nothing
@@ -15,7 +16,7 @@ LIMIT = 5 / math.sqrt(COUNT)  # five standard errors of a correlation of nothing
 
 def draw(pixel, path=0, *, seed=0, frame=0, purpose=0, draws=2):
     pixel, path = np.broadcast_arrays(np.asarray(pixel, np.uint32), np.asarray(path, np.uint32))
-    rng = streams(lanes(pixel.ravel()), lanes(path.ravel()), seed=seed, frame=frame, purpose=purpose)
+    rng = streams(lanes(pixel.ravel()), lanes(path.ravel()), RandomKey(seed, frame, purpose))
     return np.stack([np.array(rng.next_float32()) for _ in range(draws)])
 
 
@@ -94,8 +95,8 @@ def test_seeds_are_not_compiled_into_the_kernel():
 
 
 def square(pixel, paths, **use):
-    use = {"seed": 0, "frame": 0, "purpose": 0, **use}
-    return np.array(stratified(UInt(pixel), dr.arange(UInt, paths), **use)).astype(float)
+    key = RandomKey(**{"seed": 0, "frame": 0, "purpose": 0, **use})
+    return np.array(stratified(UInt(pixel), dr.arange(UInt, paths), key)).astype(float)
 
 
 @pytest.mark.parametrize("paths", [16, 64, 256])
@@ -118,9 +119,9 @@ def test_each_path_alone_is_uniform_over_the_pixel():
 
 
 def test_paths_share_out_the_cube_of_four_dimensions():
-    use = {"seed": 3, "frame": 1, "purpose": 2}
+    use = RandomKey(3, 1, 2)
     pixel, path = np.repeat(np.arange(64, dtype=np.uint32), 64), np.tile(np.arange(64, dtype=np.uint32), 64)
-    points = np.stack([np.array(x) for x in stratified4(lanes(pixel), lanes(path), **use)])
+    points = np.stack([np.array(x) for x in stratified4(lanes(pixel), lanes(path), use)])
     assert points.min() >= 0.0
     assert points.max() < 1.0
     # Integrals of smooth functions: the mean over a pixel's paths errs far less than that of random points.
@@ -133,7 +134,7 @@ def test_paths_share_out_the_cube_of_four_dimensions():
 
 def test_given_numbers_lead():
     pixel = lanes(np.arange(8, dtype=np.uint32))
-    rng, alone = (streams(pixel, UInt(0), seed=1, frame=2, purpose=3) for _ in "ab")
+    rng, alone = (streams(pixel, UInt(0), RandomKey(1, 2, 3)) for _ in "ab")
     leading = Leading([Float(0.25), Float(0.5)], rng)
     assert np.array(leading.next_float32()).tolist() == [0.25]
     assert np.array(leading.next_float32()).tolist() == [0.5]

@@ -10,12 +10,13 @@ from enfilade.arrays import Array2f, Float, UInt, matrix3
 from enfilade.camera import Camera, look_at
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
+from enfilade.renderer import RandomKey
 
 COUNT = 1 << 18
 
 
 def squares(count=COUNT):
-    rng = streams(dr.arange(UInt, count), UInt(0), seed=1, frame=2, purpose=3)
+    rng = streams(dr.arange(UInt, count), UInt(0), RandomKey(1, 2, 3))
     return Array2f(rng.next_float32(), rng.next_float32())
 
 

@@ -15,7 +15,7 @@ from enfilade.pipeline.plan import hole_percent
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import Segment, SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement
 from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
 from enfilade.studies.cases import times as table2
@@ -59,7 +59,7 @@ def test_plain_light_has_no_noise_and_paths_through_a_pixel_antialias(plain):
 
     def trace(seed, pixel_filter, spp=4):
         return plain.renderer.trace(
-            camera, pixels, spp=spp, seed=seed, frame=1, purpose=Purpose.FILL, pixel_filter=pixel_filter
+            camera, pixels, RandomKey(seed, 1, Purpose.FILL), spp=spp, pixel_filter=pixel_filter
         )
 
     centre = trace(0, PixelFilter.CENTRE)

@@ -33,7 +33,7 @@ from enfilade.backends.analytic_scene import (
 from enfilade.camera import Camera
 from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, Rays, SceneFacts, Surfaces
+from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
 
 CHECKER_SHIFT = 0.381966  # of a period: planes at round coordinates do not lie on a cube's face
 OFFSET = 1e-4  # of a position's size: where bounced rays begin, clear of float32 rounding
@@ -81,11 +81,9 @@ class AnalyticRenderer:
         self,
         camera: Camera,
         pixels: npt.NDArray[np.uint32],
+        random: RandomKey,
         *,
         spp: int,
-        seed: int,
-        frame: int,
-        purpose: Purpose,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
@@ -96,7 +94,7 @@ class AnalyticRenderer:
             spp=spp,
             chunk=self._chunk,
             pixel_filter=pixel_filter,
-            random={"seed": seed, "frame": frame, "purpose": int(purpose)},
+            random=random,
         )
 
     def _noisy(self, rays: Rays, rng: Any) -> Any:

@@ -14,7 +14,7 @@ from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import Survey, initial_segments, survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import Keyframe, Segment, Shading
-from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.warp import composite, warp_keyframe
 
 HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
@@ -143,10 +143,8 @@ def _path_seconds(job: Job, renderer: Renderer) -> float:
         renderer.trace(
             job.path.cameras[frame],
             pixels,
+            RandomKey(job.settings.trace.seed, job.path.numbers[frame], Purpose.FILL),
             spp=PROBE_SPP,
-            seed=job.settings.trace.seed,
-            frame=job.path.numbers[frame],
-            purpose=Purpose.FILL,
             pixel_filter=PixelFilter.CENTRE,
         )
         seconds = time.perf_counter() - begin

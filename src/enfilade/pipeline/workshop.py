@@ -18,7 +18,7 @@ from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
 from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Keyframe, Mask, Shading
-from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.store import Run
 
 KEPT = 3  # keyframes kept in memory
@@ -78,10 +78,8 @@ class Workshop:
             return self.renderer.trace(
                 self.job.path.cameras[frame],
                 np.flatnonzero(where).astype(np.uint32),
+                self.random(frame, purpose),
                 spp=settings.spp,
-                seed=settings.seed,
-                frame=self.number(frame),
-                purpose=purpose,
                 pixel_filter=pixel_filter,
             )
 
@@ -96,10 +94,9 @@ class Workshop:
             self._keyframes.popitem(last=False)
         return keyframe
 
-    def random(self, frame: int, purpose: Purpose) -> dict[str, int]:
+    def random(self, frame: int, purpose: Purpose) -> RandomKey:
         """What the random numbers of a frame depend on, beside the pixel and the number of the path."""
-        seed = self.job.settings.trace.seed
-        return {"seed": seed, "frame": self.number(frame), "purpose": int(purpose)}
+        return RandomKey(self.job.settings.trace.seed, self.number(frame), purpose)
 
     def finish(self, unit: str, files: list[Any], **facts: Any) -> None:
         """Record a unit of work as done, with its costs."""

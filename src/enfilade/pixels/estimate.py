@@ -15,7 +15,7 @@ from enfilade.camera import Camera
 from enfilade.pixels.random import stratified, stratified4, streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
 from enfilade.records import Shading
-from enfilade.renderer import PixelFilter, Rays
+from enfilade.renderer import PixelFilter, RandomKey, Rays
 
 PASS = 64  # paths of a pixel summed in one go; fixed, so that no chunking changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
@@ -55,7 +55,7 @@ class Estimate:
     pixel_filter
         Where in the image the paths begin.
     random
-        Seed, frame and purpose of :func:`enfilade.pixels.random.streams`.
+        Of :func:`enfilade.pixels.random.streams`.
     layers
         How many ``radiance`` answers with.
     is_stratified
@@ -71,7 +71,7 @@ class Estimate:
         *,
         chunk: int,
         pixel_filter: PixelFilter,
-        random: dict[str, int],
+        random: RandomKey,
         layers: int = 1,
         is_stratified: bool = False,
     ) -> None:
@@ -103,8 +103,8 @@ class Estimate:
             for start in range(0, len(chosen), step):
                 part = chosen[start : start + step]
                 pixel, path = _numbered(self._pixels[part], first, width)
-                rng = streams(pixel, path, **self._random)
-                more = (stratified4(pixel, path, **self._random),) if self._is_stratified else ()
+                rng = streams(pixel, path, self._random)
+                more = (stratified4(pixel, path, self._random),) if self._is_stratified else ()
                 found = self._radiance(self._rays(pixel, path), rng, *more)
                 self._sums[:, part] += _summed(found, width)
         self._paths += spp
@@ -141,9 +141,9 @@ class Estimate:
         at = Array2f(pixel - row * opaque(camera.width), row) + 0.5
         match self._filter:
             case PixelFilter.BOX:
-                at += box_offsets(stratified(pixel, path, **self._random))
+                at += box_offsets(stratified(pixel, path, self._random))
             case PixelFilter.GAUSSIAN:
-                square = stratified(pixel, path, **self._random)
+                square = stratified(pixel, path, self._random)
                 at += gaussian_offsets(square, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
         matrix = matrix3(camera.direction_from_pixel)
         return Rays(vector3(camera.eye), pinhole_directions(at.x, at.y, direction_from_pixel=matrix))
@@ -157,7 +157,7 @@ def estimate(
     spp: int,
     chunk: int,
     pixel_filter: PixelFilter,
-    random: dict[str, int],
+    random: RandomKey,
 ) -> Shading:
     """Average the paths of each pixel: an :class:`Estimate` with as many paths for all.
 

@@ -12,6 +12,7 @@ from typing import Any
 from drjit.auto.ad import Philox4x32
 
 from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, opaque
+from enfilade.renderer import RandomKey
 
 WHOLE_PIXEL = 0xFFFFFFFF  # the path's number in draws that all paths of a pixel share
 WHOLE_PIXEL_4 = 0xFFFFFFFE  # ... in four dimensions
@@ -19,26 +20,25 @@ R4 = (3679390609, 3152041523, 2700274806, 2313257605)  # 2**32 over powers of th
 R2 = (3242174889, 2447445414)  # 2**32 over the plastic number, and over its square: Roberts 2018
 
 
-def streams(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
+def streams(pixel: Any, path: Any, random: RandomKey) -> Any:
     """One random number generator a lane.
 
     Parameters
     ----------
     pixel, path : UInt
         Flat index of the pixel, and number of the path in that pixel.
-    seed, frame, purpose
-        The run's seed (32 bits), the frame's index (24 bits), what the numbers are for (8 bits).
+    random
 
     Returns
     -------
     PCG32
     """
-    a, b, c, d = _drawn(pixel, path, seed=seed, frame=frame, purpose=purpose)
+    a, b, c, d = _drawn(pixel, path, random)
     high = UInt64(1 << 32)
     return PCG32(size=1, initstate=UInt64(a) * high + UInt64(b), initseq=UInt64(c) * high + UInt64(d))
 
 
-def stratified(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
+def stratified(pixel: Any, path: Any, random: RandomKey) -> Any:
     """Points of the unit square that the paths of a pixel share out evenly among them.
 
     The R2 sequence (Roberts 2018), moved by a random offset of each pixel (Cranley and Patterson 1976): each
@@ -51,13 +51,13 @@ def stratified(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) ->
     Array2f
         In [0, 1).
     """
-    a, b, _, _ = _drawn(pixel, UInt(WHOLE_PIXEL), seed=seed, frame=frame, purpose=purpose)
+    a, b, _, _ = _drawn(pixel, UInt(WHOLE_PIXEL), random)
     return Array2f(_unit(a + path * UInt(R2[0])), _unit(b + path * UInt(R2[1])))
 
 
-def stratified4(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
+def stratified4(pixel: Any, path: Any, random: RandomKey) -> Any:
     """The same in the unit cube of four dimensions; Array4f."""
-    starts = _drawn(pixel, UInt(WHOLE_PIXEL_4), seed=seed, frame=frame, purpose=purpose)
+    starts = _drawn(pixel, UInt(WHOLE_PIXEL_4), random)
     return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
 
 
@@ -87,10 +87,10 @@ def _unit(number: Any) -> Any:
     return Float(number >> 8) * 2.0**-24
 
 
-def _drawn(pixel: Any, path: Any, *, seed: int, frame: int, purpose: int) -> Any:
+def _drawn(pixel: Any, path: Any, random: RandomKey) -> Any:
     return Philox4x32(
-        seed=UInt64(opaque(seed)),
+        seed=UInt64(opaque(random.seed)),
         counter_0=pixel,
         counter_1=path,
-        counter_2=opaque(((frame & 0xFFFFFF) << 8) | purpose),
+        counter_2=opaque(((random.frame & 0xFFFFFF) << 8) | int(random.purpose)),
     ).next_uint32x4()

@@ -25,7 +25,16 @@ from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import Bounce, Lit, PixelFilter, Purpose, Rays, Scattered, SceneFacts, Surfaces
+from enfilade.renderer import (
+    Bounce,
+    Lit,
+    PixelFilter,
+    RandomKey,
+    Rays,
+    Scattered,
+    SceneFacts,
+    Surfaces,
+)
 from enfilade.settings import TraceSettings
 
 UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
@@ -156,11 +165,9 @@ class MitsubaRenderer:
         self,
         camera: Camera,
         pixels: npt.NDArray[np.uint32],
+        random: RandomKey,
         *,
         spp: int,
-        seed: int,
-        frame: int,
-        purpose: Purpose,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
@@ -171,7 +178,7 @@ class MitsubaRenderer:
             spp=spp,
             chunk=self._chunk,
             pixel_filter=pixel_filter,
-            random={"seed": seed, "frame": frame, "purpose": int(purpose)},
+            random=random,
         )
 
     def _radiance_onward(self, rays: Rays, rng: Any, edges: int) -> Any:

@@ -13,7 +13,7 @@ from enfilade.camera import Camera
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.records import F32, SPECULAR, SurfaceClass
-from enfilade.renderer import LightRenderer, Purpose, Rays, Renderer, Surfaces
+from enfilade.renderer import LightRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
 SIDE = 4  # strata along each side of a pixel: 16 rays
 BOUNCES = 6  # off mirrors and through glass, before the chain counts as it is
@@ -43,7 +43,7 @@ def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: 
     """
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     step = max(chunk // SIDE**2, 1)
-    random = {"seed": seed, "frame": frame, "purpose": int(Purpose.GUIDE)}
+    random = RandomKey(seed, frame, Purpose.GUIDE)
     parts = [_of_pixels(renderer, camera, pixels[i : i + step], random) for i in range(0, len(pixels), step)]
     found = np.concatenate(parts, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
     albedo = np.clip(found[..., :3], 0.0, 1.0)
@@ -51,7 +51,7 @@ def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: 
 
 
 def _of_pixels(
-    renderer: Renderer, camera: Camera, pixels: npt.NDArray[np.uint32], random: dict[str, int]
+    renderer: Renderer, camera: Camera, pixels: npt.NDArray[np.uint32], random: RandomKey
 ) -> npt.NDArray[np.float32]:
     # One ray in each of the strata of each pixel, neighbouring lanes.
     count = SIDE * SIDE
@@ -59,7 +59,7 @@ def _of_pixels(
     slot = lane // count
     stratum = lane - slot * count
     pixel = dr.gather(UInt, lanes(pixels), slot)
-    rng = streams(pixel, stratum, **random)
+    rng = streams(pixel, stratum, random)
     row = pixel // opaque(camera.width)
     inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
     at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE

@@ -25,7 +25,7 @@ from enfilade.pipeline.survey import initial_segments, survey_path
 from enfilade.pipeline.views import Views
 from enfilade.pixels.estimate import PASS
 from enfilade.records import F32, CameraPath, Source
-from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.store import Run
 from enfilade.studies.bench.guides import guides
 from enfilade.video import exact_fps
@@ -103,10 +103,8 @@ class EveryFrame:
             traced = renderer.trace(
                 camera,
                 np.arange(path.width * path.height, dtype=np.uint32),
+                RandomKey(settings.seed, number, Purpose.REFERENCE),
                 spp=settings.spp,
-                seed=settings.seed,
-                frame=number,
-                purpose=Purpose.REFERENCE,
                 pixel_filter=self.pixel_filter,
             )
         color = traced.color.reshape(path.height, path.width, 3)

@@ -16,7 +16,7 @@ from enfilade.arrays import Array3f, Float, UInt, opaque
 from enfilade.camera import Camera
 from enfilade.pixels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, Purpose, Rays, Renderer, SceneFacts, Surfaces
+from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneFacts, Surfaces
 
 __all__ = ["PlainlyLit"]
 
@@ -54,11 +54,9 @@ class PlainlyLit:
         self,
         camera: Camera,
         pixels: npt.NDArray[np.uint32],
+        random: RandomKey,
         *,
         spp: int,
-        seed: int,
-        frame: int,
-        purpose: Purpose,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Shade a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`.
@@ -72,7 +70,7 @@ class PlainlyLit:
             spp=1 if pixel_filter is PixelFilter.CENTRE else spp,
             chunk=CHUNK,
             pixel_filter=pixel_filter,
-            random={"seed": seed, "frame": frame, "purpose": int(purpose)},
+            random=random,
         )
 
     def _radiance(self, rays: Rays, _rng: Any) -> Any:

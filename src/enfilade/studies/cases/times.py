@@ -19,7 +19,7 @@ import numpy.typing as npt
 from enfilade.codec import read_exr, read_shading, write_shading
 from enfilade.pipeline.job import Job
 from enfilade.records import F32, Shading
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.studies.cases.case import Case
 from enfilade.studies.cases.seen import Viewer, visible_percent
 
@@ -200,10 +200,8 @@ class _Judge:
         made = self._case.renderer.trace(
             path.cameras[frame],
             self.crop.pixels(self._job),
+            RandomKey((seed + salt) % 2**32, path.numbers[frame], Purpose.REFERENCE),
             spp=spp,
-            seed=(seed + salt) % 2**32,
-            frame=path.numbers[frame],
-            purpose=Purpose.REFERENCE,
             pixel_filter=PixelFilter.GAUSSIAN,
         )
         size = self.crop.size
@@ -220,10 +218,8 @@ def _path_cost(case: Case, pixel_filter: PixelFilter, frames: list[int]) -> dict
             case.renderer.trace(
                 path.cameras[frame],
                 pixels,
+                RandomKey(case.whole.settings.trace.seed, path.numbers[frame], Purpose.REFERENCE),
                 spp=spp,
-                seed=case.whole.settings.trace.seed,
-                frame=path.numbers[frame],
-                purpose=Purpose.REFERENCE,
                 pixel_filter=pixel_filter,
             )
             if spp == TIMED_SPP:

@@ -19,7 +19,7 @@ from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import Survey, initial_segments
 from enfilade.pipeline.views import View, Views
 from enfilade.records import F32, Flow, Geometry, Keyframe, Segment, Shading, Warped
-from enfilade.renderer import PixelFilter, Purpose, Renderer
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.studies.cases.mirrored import mirrored
 from enfilade.warp import composite, warp_keyframe
 
@@ -138,10 +138,8 @@ class Windows:
         made = self.renderer.trace(
             path.cameras[frame],
             np.arange(path.width * path.height, dtype=np.uint32),
+            RandomKey((trace.seed + salt) % 2**32, path.numbers[frame], purpose),
             spp=spp,
-            seed=(trace.seed + salt) % 2**32,
-            frame=path.numbers[frame],
-            purpose=purpose,
             pixel_filter=pixel_filter,
         )
         size = path.height, path.width
