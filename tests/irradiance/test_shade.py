@@ -6,7 +6,7 @@ import pytest
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.geometry import find_geometry, positions
-from enfilade.irradiance import LightCache, Shader, open_cache, open_page, over_time
+from enfilade.irradiance import LightCache, Shader, VirtualImages, open_cache, open_page, over_time
 from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.records import LightPage, Shading
@@ -215,7 +215,7 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     )
     renderer, camera = _opened(tmp_path, {"ball": mirror}), _camera()
     seen = find_geometry(renderer, camera)
-    shown = Shader(renderer, pixel_angle=0.02).shown(seen)
+    shown = VirtualImages(renderer).of(seen)
     names = renderer.describe().items
     is_floor = shown.item == BEHIND + names.index("floor") + 1
     assert is_floor.sum() > 20

@@ -13,11 +13,13 @@ from enfilade.irradiance.cache import (
 )
 from enfilade.irradiance.cells import Estimates
 from enfilade.irradiance.shade import Shader
+from enfilade.irradiance.virtual import VirtualImages
 
 __all__ = [
     "Estimates",
     "LightCache",
     "Shader",
+    "VirtualImages",
     "known",
     "light_of",
     "open_cache",

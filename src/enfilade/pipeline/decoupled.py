@@ -79,7 +79,7 @@ class DecoupledFrames:
             near, cache = table.around(frame)
             estimate = _seen(workshop, table, frame, near, cache)
         with workshop.costs.of("scatter"):
-            shown = table.shader.shown(view.geometry)
+            shown = table.virtual_images.of(view.geometry)
             scattered = _scattered(workshop, table, shown, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
@@ -94,7 +94,7 @@ class DecoupledFrames:
         file = self._workshop.run.file("raw", self._workshop.number(frame))
         self._workshop.run.check(file)
         view = self._workshop.views[frame]
-        return _Parts(view, *read_parts(file), table.shader.shown(view.geometry))
+        return _Parts(view, *read_parts(file), table.virtual_images.of(view.geometry))
 
 
 @dataclass(frozen=True, eq=False)

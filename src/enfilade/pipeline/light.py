@@ -12,6 +12,7 @@ from enfilade.errors import SettingsError
 from enfilade.irradiance import (
     LightCache,
     Shader,
+    VirtualImages,
     known,
     light_of,
     open_cache,
@@ -59,6 +60,7 @@ class LightTable:
         self.renderer: LightRenderer = workshop.renderer
         first = workshop.job.path.cameras[segments[0].first]
         self.shader = Shader(self.renderer, pixel_angle=1.0 / first.focal_px)
+        self.virtual_images = VirtualImages(self.renderer)
         self._workshop = workshop
         self.segments = segments
         self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})

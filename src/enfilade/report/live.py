@@ -12,6 +12,8 @@ import secrets
 import tempfile
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -80,7 +82,7 @@ class Live:
     def __init__(self, folder: Path, wishes: Wishes, port: int = 0) -> None:
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
         self._pages = _Pages(folder, wishes)
-        self._server = ThreadingHTTPServer((LOOPBACK, port), self._handler())
+        self._server = ThreadingHTTPServer((LOOPBACK, port), partial(_Handler, self._find))
         self._server.daemon_threads = True
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self.address = f"http://{LOOPBACK}:{self._server.server_port}/{self._token}/"
@@ -101,17 +103,11 @@ class Live:
         while self._thread.is_alive():
             self._thread.join(1.0)
 
-    def _handler(self) -> type[BaseHTTPRequestHandler]:
-        pages, token = self._pages, self._token
-
-        class Handler(_Handler):
-            def answer(self, name: str) -> tuple[str, bytes] | None:
-                given, _, rest = name.lstrip("/").partition("/")
-                if not hmac.compare_digest(given.encode(), token.encode()):
-                    return None
-                return pages.find(rest.partition("?")[0])
-
-        return Handler
+    def _find(self, address: str) -> tuple[str, bytes] | None:
+        given, _, rest = address.lstrip("/").partition("/")
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
+            return None
+        return self._pages.find(rest.partition("?")[0])
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -120,13 +116,14 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     timeout = 30.0
 
-    def answer(self, name: str) -> tuple[str, bytes] | None:
-        raise NotImplementedError
+    def __init__(self, find: Callable[[str], tuple[str, bytes] | None], *connection: Any) -> None:
+        self._find = find
+        super().__init__(*connection)
 
     def do_GET(self) -> None:
         _, port = self.request.getsockname()
         hosts = (f"{LOOPBACK}:{port}", f"localhost:{port}")
-        found = self.answer(self.path) if self.headers.get("Host") in hosts else None
+        found = self._find(self.path) if self.headers.get("Host") in hosts else None
         kind, body = found or ("text/plain", b"nothing here\n")
         self.send_response(HTTPStatus.OK if found else HTTPStatus.NOT_FOUND)
         for name, value in (

@@ -9,20 +9,18 @@ from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self
 
-from enfilade.codec import read_json, sweep, write_json
-from enfilade.codec.whole import MARK, json_bytes
+from enfilade.codec import sweep, write_json
 from enfilade.errors import DamagedFileError, RunFolderError
-from enfilade.store.ledger import Ledger, covered, head_of
+from enfilade.store.checksum import checksum, size_of
+from enfilade.store.identity import LEDGER_FILE, RUN_FILE, claim, identity_of, prepare
+from enfilade.store.ledger import Ledger, covered
 from enfilade.store.lock import LOCK_NAME, Lock, writer_of
 
 __all__ = ["KINDS", "Run"]
 
 KINDS = ("drafts", "keyframes", "cells", "raw", "frames")
-FORMAT = 1  # of the folder; another number is refused
-RUN_FILE, LEDGER_FILE, PARTS = "run.json", "ledger.jsonl", "parts"
+PARTS = "parts"  # folder of the ledgers of those who share a run
 RESERVED = frozenset({"unit", "files"})  # keys of a ledger line that are ours
-SHOWN_DIFFERENCES = 12
-SHOWN_LETTERS = 80  # of one value: a list of frames has many
 
 Report = Callable[[dict[str, Any]], None]
 
@@ -80,14 +78,14 @@ class Run:
         NoSpaceError
         """
         wanted = json.loads(json.dumps(identity, allow_nan=False))
-        _prepare(folder)
+        prepare(folder)
         lock = Lock(folder)
         try:
-            notes = _claim(folder, wanted, kept)
+            notes = claim(folder, wanted, kept)
             if left := sweep(folder):
                 notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
             ledger = Ledger(folder / LEDGER_FILE, writable=True)
-            ledger.begin(_record(folder / RUN_FILE))
+            ledger.begin(checksum(folder / RUN_FILE))
             _join_parts(folder, ledger)
             run = cls(folder, wanted, ledger, lock=lock)
         except BaseException:
@@ -111,7 +109,7 @@ class Run:
         RunFolderError
             It holds no run, or is damaged.
         """
-        identity = _found(folder)
+        identity = identity_of(folder)
         ledger = Ledger(folder / LEDGER_FILE, writable=False, is_lenient=is_lenient)
         ledger.read_on(*_parts(folder))
         return cls(folder, identity, ledger)
@@ -131,7 +129,7 @@ class Run:
         RunFolderError
             It holds no run, or is damaged.
         """
-        return cls(folder, _found(folder), Ledger(folder / LEDGER_FILE, writable=False), report=report)
+        return cls(folder, identity_of(folder), Ledger(folder / LEDGER_FILE, writable=False), report=report)
 
     @classmethod
     def sharing(cls, folder: Path, part: str) -> Self:
@@ -151,7 +149,7 @@ class Run:
         RunFolderError
             It holds no run, or is damaged; one command has it to itself, or another the same share.
         """
-        identity = _found(folder)
+        identity = identity_of(folder)
         file = folder / PARTS / f"{part}.jsonl"
         file.parent.mkdir(exist_ok=True)
         lock = Lock(folder, part=part)
@@ -208,7 +206,7 @@ class Run:
         """
         line = self._ledger.get(unit)
         if line is None or any(
-            _size(self.folder / name) != record["bytes"] for name, record in line["files"].items()
+            size_of(self.folder / name) != record["bytes"] for name, record in line["files"].items()
         ):
             return None
         return line
@@ -239,7 +237,7 @@ class Run:
             raise ValueError(f"the ledger keeps these keys for itself: {', '.join(sorted(taken))}")
         if self._lock is None and self._report is None:
             raise ValueError(f"{self.folder} is open for reading only")
-        records = {self._relative(f): _record(f) for f in files}
+        records = {self._relative(f): checksum(f) for f in files}
         line = {"unit": unit, "files": records, **facts}
         if self._report is None:
             self._ledger.append(line)
@@ -328,55 +326,10 @@ class Run:
 
     def _is_sound(self, name: str, line: Mapping[str, Any]) -> bool:
         file, record = self.folder / name, line["files"][name]
-        return bool(_size(file) == record["bytes"] and _record(file) == record)
+        return bool(size_of(file) == record["bytes"] and checksum(file) == record)
 
     def _relative(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix()
-
-
-def _prepare(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        names = sorted(entry.name for entry in folder.iterdir())
-    except OSError as error:
-        raise RunFolderError(
-            f"can't make a run in {folder}: {error.strerror}; choose another --out"
-        ) from error
-    foreign = [name for name in names if name != LOCK_NAME and MARK not in name]
-    if foreign and RUN_FILE not in names and head_of(folder / LEDGER_FILE) is None:
-        raise RunFolderError(
-            f"{folder} is not empty and holds no run (it has {', '.join(foreign[:3])}); choose another --out"
-        )
-
-
-def _found(folder: Path) -> dict[str, Any]:
-    if not folder.is_dir():
-        raise RunFolderError(f"there is no folder {folder}")
-    if not (folder / RUN_FILE).is_file():
-        raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
-    identity = _read_identity(folder)
-    if head_of(folder / LEDGER_FILE) not in (None, _record(folder / RUN_FILE)):
-        raise RunFolderError(
-            f"{folder / RUN_FILE} is damaged: it isn't what was written; run the command that made it again"
-        )
-    return identity
-
-
-def _claim(folder: Path, wanted: dict[str, Any], kept: Callable[[list[str]], str] | None) -> list[str]:
-    """Say in ``run.json`` what the folder holds, or check that it is that; returns what was mended."""
-    file, text = folder / RUN_FILE, {"format": FORMAT, "identity": wanted}
-    head, data = head_of(folder / LEDGER_FILE), json_bytes(text)
-    is_there = file.exists()
-    if is_there and (head is None or _record(file) == head):
-        _check_same(folder, _read_identity(folder), wanted, kept)
-        return []
-    if head is not None and head != {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}:
-        raise RunFolderError(
-            f"{file} is {'damaged' if is_there else 'missing'}, and its checksum in the ledger isn't that of "
-            "this command: continue with the command that began it, or choose another --out"
-        )
-    write_json(file, text)
-    return [] if head is None else [f"{RUN_FILE} was damaged or missing and was written again"]
 
 
 def _parts(folder: Path) -> list[Path]:
@@ -392,70 +345,3 @@ def _join_parts(folder: Path, ledger: Ledger) -> None:
             ledger.append(line)
         part.close()
         file.unlink()
-
-
-def _read_identity(folder: Path) -> dict[str, Any]:
-    file = folder / RUN_FILE
-    value = read_json(file)
-    if not isinstance(value, dict) or not isinstance(value.get("identity"), dict):
-        raise RunFolderError(
-            f"{file} is damaged: it holds no identity; choose another --out or delete {folder}"
-        )
-    if value.get("format") != FORMAT:
-        raise RunFolderError(
-            f"{file} has format {value.get('format')!r}, this version knows {FORMAT}; choose another --out"
-        )
-    identity: dict[str, Any] = value["identity"]
-    return identity
-
-
-def _check_same(
-    folder: Path,
-    there: dict[str, Any],
-    now: dict[str, Any],
-    kept: Callable[[list[str]], str] | None,
-) -> None:
-    before, after = _flat(there), _flat(now)
-    keys = [k for k in {**before, **after} if before.get(k, _ABSENT) != after.get(k, _ABSENT)]
-    if not keys:
-        return
-    shown = "".join(
-        f"\n  {key}: {_said(before.get(key, _ABSENT))} there, {_said(after.get(key, _ABSENT))} now"
-        for key in keys[:SHOWN_DIFFERENCES]
-    )
-    more = f"\n  and {len(keys) - SHOWN_DIFFERENCES} more" if len(keys) > SHOWN_DIFFERENCES else ""
-    raise RunFolderError(
-        f"{folder} holds another run:{shown}{more}\n{'' if kept is None else kept(keys)}"
-        f"Choose another --out, or delete {folder} to begin anew"
-    )
-
-
-_ABSENT = object()  # a key that one of two runs doesn't have
-
-
-def _said(value: Any) -> str:
-    text = "nothing" if value is _ABSENT else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= SHOWN_LETTERS else f"{text[:SHOWN_LETTERS]}..."
-
-
-def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
-    if isinstance(value, dict) and value:
-        parts = [_flat(v, f"{prefix}.{k}" if prefix else str(k)) for k, v in value.items()]
-        return {key: leaf for part in parts for key, leaf in part.items()}
-    return {prefix: value}
-
-
-def _size(file: Path) -> int | None:
-    try:
-        return file.stat().st_size
-    except OSError:
-        return None
-
-
-def _record(file: Path) -> dict[str, Any]:
-    try:
-        with file.open("rb") as data:
-            digest = hashlib.file_digest(data, "sha256").hexdigest()
-            return {"bytes": data.tell(), "sha256": digest}
-    except OSError as error:
-        raise RunFolderError(f"can't read {file}: {error.strerror}") from error

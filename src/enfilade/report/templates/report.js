@@ -21,7 +21,12 @@
       return null; // a browser may keep nothing for pages from the disk
     }
   };
-  const color = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+  const swatch = root.appendChild(document.createElement("i"));
+  swatch.hidden = true;
+  const color = (name) => {
+    swatch.style.color = `var(--${name})`;
+    return getComputedStyle(swatch).color; // with light-dark() resolved
+  };
 
   if (["light", "dark"].includes(stored())) root.dataset.theme = stored();
   document.getElementById("theme").addEventListener("click", () => {

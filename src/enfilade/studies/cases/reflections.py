@@ -12,13 +12,12 @@ from enfilade.records import F32, Geometry, Mask
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import mirror_pixels
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
-from enfilade.studies.cases.windows import Windows
+from enfilade.studies.cases.windows import Example, Row, Windows
 
-__all__ = ["Example", "measure", "most_mirrors"]
+__all__ = ["measure", "most_mirrors"]
 
 FRAME_PX = 2  # of a mirror's border, which shows its frame beside it: left out
 SCANNED = 24  # frames of a path that are looked at for mirrors
-Example = dict[str, F32]
 
 
 def most_mirrors(windows: Windows, count: int) -> list[int]:
@@ -49,19 +48,12 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
     example : dict
         Colours by filter and ``reference`` of the probe with most mirrors, and ``mirror`` 0 or 1.
     """
-    windows.monitor.stage("mirrors", len(probes))
-    viewer = Viewer(windows.job.viewing, windows.job.settings.viewing)
-    rows, examples = [], []
-    for frame in probes:
-        row, example = _probe(windows, viewer, frame)
-        rows.append(row)
-        examples.append(example)
-        windows.monitor.advance()
+    rows, examples = windows.each("mirrors", probes, _probe)
     most = int(np.argmax([row["mirror_percent"] for row in rows]))
     return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
 
 
-def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[dict[str, Any], Example]:
+def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
     settings = windows.job.settings.antialias
     geometry, seen = windows.geometry(frame), windows.seen(frame)
     mirror = _inner(geometry)

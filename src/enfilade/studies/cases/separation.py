@@ -16,13 +16,12 @@ from enfilade.pipeline.views import View
 from enfilade.records import F32, U32, Mask
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
-from enfilade.studies.cases.windows import Windows
+from enfilade.studies.cases.windows import Example, Row, Windows
 
-__all__ = ["Example", "changed_pixels", "measure", "outlines"]
+__all__ = ["changed_pixels", "measure", "outlines"]
 
 GHOST_CD_M2 = 1.0  # difference on the screen, of 100, that separation makes: below it nothing is to be seen
 OUTLINE_PX = 2  # from an outline: what differs nearer to it is a matter of antialiasing
-Example = dict[str, F32]
 
 
 def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Example]:
@@ -40,14 +39,7 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
         Images of the probe with most ghost pixels, as Fig. 10 has them: ``raw``, ``together``, ``apart``
         colours, ``ghost``, ``motion`` and ``still`` JND of together against apart, ``speed_deg_s``.
     """
-    windows.monitor.stage("flow separation", len(probes))
-    viewer = Viewer(windows.job.viewing, windows.job.settings.viewing)
-    rows, examples = [], []
-    for frame in probes:
-        row, example = _probe(windows, viewer, frame)
-        rows.append(row)
-        examples.append(example)
-        windows.monitor.advance()
+    rows, examples = windows.each("flow separation", probes, _probe)
     most = int(np.argmax([row["ghosts"]["pixels"] for row in rows]))
     return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
 
@@ -70,7 +62,7 @@ def changed_pixels(viewer: Viewer, together: F32, apart: F32) -> Mask:
     return changed
 
 
-def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[dict[str, Any], Example]:
+def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
     settings, view = windows.job.settings.antialias, windows.view(frame)
     raw, reference = windows.traced(frame).color, windows.reference(frame).color
 
@@ -91,7 +83,7 @@ def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[dict[str, Any]
             "raw apart": (apart, raw),
         }.items()
     }
-    row: dict[str, Any] = {"frame": windows.job.path.numbers[frame]}
+    row: Row = {"frame": windows.job.path.numbers[frame]}
     for place, where in places.items():
         row[place] = {
             "pixels": 100.0 * float(where.mean()),

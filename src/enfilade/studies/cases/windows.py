@@ -9,6 +9,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,13 @@ from enfilade.pipeline.views import View, Views
 from enfilade.records import F32, Flow, Geometry, Keyframe, Segment, Shading, Warped
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.studies.cases.mirrored import mirrored
+from enfilade.studies.cases.seen import Viewer
 from enfilade.warp import composite, warp_keyframe
 
-__all__ = ["Windows", "probes_of"]
+__all__ = ["Example", "Row", "Windows", "probes_of"]
+
+Row = dict[str, Any]  # what is measured of a frame
+Example = dict[str, F32]  # its images
 
 KEPT, VIEWS_KEPT = 64, 24  # images and views in memory: some 600 MiB at 640x480
 END_FRAMES = 8  # of a path, where a temporal filter lacks half its support
@@ -55,6 +60,18 @@ class Windows:
     reference_spp: int
     _memory: OrderedDict[tuple[str, int], Shading] = field(default_factory=OrderedDict, init=False)
     _seen: OrderedDict[int, View] = field(default_factory=OrderedDict, init=False)
+
+    def each(
+        self, stage: str, probes: list[int], measured: Callable[[Windows, Viewer, int], tuple[Row, Example]]
+    ) -> tuple[list[Row], list[Example]]:
+        """Measure frames one by one, with progress: a row and images of each."""
+        self.monitor.stage(stage, len(probes))
+        viewer = Viewer(self.job.viewing, self.job.settings.viewing)
+        found = []
+        for frame in probes:
+            found.append(measured(self, viewer, frame))
+            self.monitor.advance()
+        return [row for row, _ in found], [example for _, example in found]
 
     def around(self, frame: int, reach: int) -> range:
         """Frames of the same shot at most `reach` away."""

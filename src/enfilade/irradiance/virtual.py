@@ -1,0 +1,101 @@
+"""Virtual images: where that seems to be which mirrors show and glass lets through (§5.4's future work)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque, vector3
+from enfilade.camera import Camera
+from enfilade.irradiance.cache import BEHIND
+from enfilade.irradiance.paths import Path, begun, chosen
+from enfilade.irradiance.replay import recorded
+from enfilade.pixels.rays import pinhole_directions
+from enfilade.records import Geometry, SurfaceClass
+from enfilade.renderer import LightRenderer, Rays
+
+__all__ = ["VirtualImages"]
+
+SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+ENDLESS = 1e4  # times as far as a mirror seems what it shows of the sky
+THROUGH = 0.999999  # chooses the lobe that lets light through
+LAYERS = 8  # of mirrors and glass, one behind the other
+
+
+class VirtualImages:
+    """Finds what is seen in mirrors and through glass."""
+
+    def __init__(self, renderer: LightRenderer) -> None:
+        self._renderer = renderer
+        self._look_on = recorded(self._look_on_kernel, renderer)
+
+    def of(self, geometry: Geometry) -> Geometry:
+        """What a frame shows, where it seems to be.
+
+        Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
+        :data:`~enfilade.irradiance.cache.BEHIND` added to the item's number, and the depth that of the
+        virtual image: as far away as the way to it is long, which is exact for plane mirrors. Everything else
+        stays.
+        """
+        pixels = np.flatnonzero(np.isin(geometry.surface, SHARP)).astype(np.uint32)
+        if not len(pixels):
+            return geometry
+        item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
+        path = begun(*_centre_rays(geometry.camera, pixels), spread=0.0)
+        way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
+        first = geometry.depth.ravel() * _lengths(geometry.camera)
+        item[pixels], normal[pixels] = BEHIND, 0.0
+        for _ in range(LAYERS):
+            path, found, turned, distance, is_sharp = self._look_on(path)
+            lane = pixels[np.array(path.lane)]
+            item[lane], normal[lane] = np.array(found) + BEHIND, np.array(turned).T
+            way[lane] = np.minimum(way[lane] + np.array(distance) / first[lane], ENDLESS)
+            path = chosen(path, dr.compress(is_sharp))
+            if not dr.width(path.lane):
+                break
+        size = geometry.item.shape
+        return replace(
+            geometry,
+            depth=geometry.depth * way.reshape(size),
+            item=item.reshape(size),
+            normal=np.ascontiguousarray(normal.reshape(*size, 3)),
+        )
+
+    def _look_on_kernel(self, path: Path) -> tuple[Path, Any, Any, Any, Any]:
+        """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
+        rng = PCG32(path.rng)
+        lit = self._renderer.lit(path.rays, path.bounce)
+        scattered = self._renderer.scatter(lit, rng, Float(THROUGH))
+        ahead = replace(path, rays=scattered.rays, bounce=scattered.bounce, rng=rng)
+        surfaces = self._renderer.lit(ahead.rays, ahead.bounce).surfaces
+        is_sharp = Bool(False)
+        for sharp in SHARP:
+            is_sharp |= surfaces.surface == int(sharp)
+        item = dr.select(surfaces.is_hit, surfaces.item, 0)
+        normal = dr.select(surfaces.is_hit, surfaces.normal, 0.0)
+        is_sharp &= surfaces.is_hit & scattered.is_alive
+        return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_sharp)
+
+
+def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, Any]:
+    """Rays through the centres of pixels, with a generator each."""
+    pixel = lanes(pixels)
+    row = pixel // opaque(camera.width)
+    direction = pinhole_directions(
+        Float(pixel - row * opaque(camera.width)) + 0.5,
+        Float(row) + 0.5,
+        direction_from_pixel=matrix3(camera.direction_from_pixel),
+    )
+    return Rays(vector3(camera.eye), direction), PCG32(dr.width(pixel))
+
+
+def _lengths(camera: Camera) -> npt.NDArray[np.float32]:
+    """Of the directions of unit depth through the centres of all pixels, (N,)."""
+    row, column = np.indices((camera.height, camera.width)).reshape(2, -1) + 0.5
+    directions = np.stack([column, row, np.ones_like(row)], axis=1) @ camera.direction_from_pixel.T
+    lengths: npt.NDArray[np.float32] = np.linalg.norm(directions, axis=1).astype(np.float32)
+    return lengths
