@@ -32,12 +32,22 @@ def made_up_summary(count=120, *, spacing=20, method="paper"):
             },
         },
         "per_frame": per_frame,
-        "segments": [] if method == "reference" else _segments(count, spacing),
+        **_rays(count if method == "decoupled" else 0, spacing),
+        "segments": _segments(count, spacing) if method == "paper" else [],
         "dropped_samples": 0,
         "peak_memory_bytes": 2_000_000_000,
         "video": "video.mp4",
         "split_percent": 10.0,
     }
+
+
+def _rays(count, spacing):
+    rows = [
+        {"frame": i + 1, "camera": 12.5, "lobes": 3.0, "light": light, "drafts": light / 2}
+        for i, light in enumerate(40.0 if i % spacing == 0 else 0.0 for i in range(count))
+    ]
+    kinds = [kind for kind in (rows[0] if rows else ()) if kind != "frame"]
+    return {"rays": {k: sum(row[k] for row in rows) / count for k in kinds}, "rays_per_frame": rows}
 
 
 def _segments(count, spacing):

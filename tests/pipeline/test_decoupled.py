@@ -56,6 +56,21 @@ def test_it_is_about_as_near_to_many_paths_as_tracing_every_frame_with_as_many(d
     assert summary["dropped_samples"] == 0
 
 
+def test_its_rays_are_counted(decoupled):
+    job, folder, summary = decoupled
+    rays, light = summary["rays"], job.settings.light
+    assert light.least_samples < rays["camera"] <= light.samples
+    assert rays["lobes"] == 0.0  # everything is diffuse
+    lines = list(Run.existing(folder).lines())
+    assert sum(sum(line.get("rays", {}).values()) for line in lines) == pytest.approx(
+        sum(rays.values()) * len(FRAMES) * 64 * 48
+    )
+    # Both keyframes are traced whole, and where fills see more a few pixels besides.
+    assert rays["light"] == pytest.approx(2 / 5 * light.paths, rel=0.1)
+    by_frame = {row["frame"]: row for row in summary["rays_per_frame"]}
+    assert by_frame[1]["drafts"] > 0.0 == by_frame[26]["drafts"]
+
+
 def test_a_run_that_lost_files_is_mended_to_the_same_bytes(decoupled):
     job, folder, _ = decoupled
     before = frame_bytes(folder)

@@ -64,7 +64,7 @@ def test_it_says_what_the_summary_says(runs, page_file):
     for stage in summary["table2"]["stages"]:
         assert f'<th scope="row">{stage}</th>' in text
     data = data_of(text)
-    assert [frame["traced"] for frame in data["frames"]] == [row["traced"] for row in summary["per_frame"]]
+    assert [frame["effort"] for frame in data["frames"]] == [row["traced"] for row in summary["per_frame"]]
     names = [panel["name"] for panel in data["panels"]]
     assert names == ["velocity", "traced", "predictions", "score"]
     assert data["panels"][0]["traces"][0]["y"] == pytest.approx(

@@ -16,6 +16,12 @@ def test_table_1_has_the_papers_columns():
     assert table[-1] == ["paper", "20.0", "7.9", "0.43", "5.8", "34.1"]
 
 
+def test_rays_are_listed_where_they_are_counted():
+    table = rows(run_tables(made_up_summary(method="decoupled"))[0])
+    assert table[1] == ["method", "camera", "lobes", "light", "drafts", "total"]
+    assert table[-1] == ["decoupled", "12.50", "3.00", "2.00", "1.00", "18.50"]
+
+
 def test_table_2_lists_the_stages_and_adds_up():
     table = rows(run_tables(made_up_summary())[1])
     assert ["fill", "2.5", "min", "4.8", "min", "1.25", "s", "62.5"] in table

@@ -80,14 +80,16 @@ class DecoupledFrames:
             estimate = _seen(workshop, table, frame, near, cache)
         with workshop.costs.of("scatter"):
             shown = table.virtual_images.of(view.geometry)
-            scattered = _scattered(workshop, table, shown, frame, cache, estimate)
+            scattered, lobe_rays = _scattered(workshop, table, shown, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
         dropped = scattered.dropped + estimate.shading.dropped
         file = workshop.run.file("raw", workshop.number(frame))
         with workshop.costs.of("files"):
             seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), source)
-        workshop.finish(raw_unit(workshop, frame), [file], frame=workshop.number(frame), dropped=dropped)
+        rays = {"camera": estimate.paths, "lobes": lobe_rays}
+        number = workshop.number(frame)
+        workshop.finish(raw_unit(workshop, frame), [file], frame=number, dropped=dropped, rays=rays)
         return _Parts(view, seen, scattered, source, shown)
 
     def _read(self, table: LightTable, frame: int) -> _Parts:
@@ -148,10 +150,10 @@ def _source(
 
 def _scattered(
     workshop: Workshop, table: LightTable, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
-) -> Shading:
-    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed.
+) -> tuple[Shading, int]:
+    """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and by how many rays.
 
-    Pixels where noise is left get more rays.
+    Pixels where noise is left get more of them.
     """
     path, settings = workshop.job.path, workshop.job.settings
     where = _grown(seen.is_marked, path.width)
@@ -174,7 +176,7 @@ def _scattered(
         if is_noisy.mean() > LEAST_NOISY:
             scattered.add(most - least, _grown(is_noisy, path.width)[where])
             image = smoothed(shown, scattered.shading.spread(flags))
-    return image
+    return image, scattered.paths
 
 
 def _luminance(shading: Shading) -> npt.NDArray[np.float32]:

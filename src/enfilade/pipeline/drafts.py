@@ -117,7 +117,7 @@ class Drafts:
             light.add(PATHS)
             direct, indirect = (shading.spread(where) for shading in light.shadings)
         write_light(file, direct, indirect, where)
-        workshop.finish(unit, [file], frame=number, dropped=direct.dropped)
+        workshop.finish(unit, [file], frame=number, dropped=direct.dropped, rays={"drafts": light.paths})
         return LightPage(frame, geometry, direct, indirect, where)
 
     def _read_or_scout(self, frame: int) -> Estimates:
@@ -129,14 +129,13 @@ class Drafts:
             return Estimates(*read_arrays(file, "keys", "sums", "counts"))
         parts: list[Estimates] = []
         with workshop.costs.of("scout"):
-            self._heard_by_lobes(frame, parts)
-            self._heard_by_gathering(frame, parts)
+            rays = self._heard_by_lobes(frame, parts) + self._heard_by_gathering(frame, parts)
             estimates = Estimates.joined(parts)
         write_arrays(file, {"keys": estimates.keys, "sums": estimates.sums, "counts": estimates.counts})
-        workshop.finish(unit, [file], frame=number, cells=len(estimates.keys))
+        workshop.finish(unit, [file], frame=number, cells=len(estimates.keys), rays={"drafts": rays})
         return estimates
 
-    def _heard_by_lobes(self, frame: int, parts: list[Estimates]) -> None:
+    def _heard_by_lobes(self, frame: int, parts: list[Estimates]) -> int:
         path, cache = self._workshop.job.path, self._pages(frame)
         rays = Estimate(
             path.cameras[frame],
@@ -148,8 +147,9 @@ class Drafts:
             is_stratified=True,
         )
         rays.add(LOBE_SPP)
+        return rays.paths
 
-    def _heard_by_gathering(self, frame: int, parts: list[Estimates]) -> None:
+    def _heard_by_gathering(self, frame: int, parts: list[Estimates]) -> int:
         page, cache = self.trace(frame), self._pages(frame)
         bounces = Estimate(
             page.geometry.camera,
@@ -162,3 +162,4 @@ class Drafts:
             is_stratified=True,
         )
         bounces.add(GATHER_SPP)
+        return bounces.paths

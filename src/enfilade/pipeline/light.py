@@ -25,7 +25,7 @@ from enfilade.pipeline.kept import Kept, nearest
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate
 from enfilade.pixels.lookup import Page
-from enfilade.records import LightPage, Mask, Segment, Shading
+from enfilade.records import LightPage, Mask, Segment
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
@@ -161,19 +161,14 @@ class LightTable:
             workshop.run.check(file)
             return LightPage(frame, geometry, *read_light(file))
         where = geometry.has_light if holes is None else holes
-        direct, indirect = self._estimated(frame, where)
-        write_light(file, direct, indirect, where)
-        workshop.finish(unit, [file], frame=number, pixels=int(where.sum()), dropped=direct.dropped)
-        return LightPage(frame, geometry, direct, indirect, where)
-
-    def _estimated(self, frame: int, where: Mask) -> tuple[Shading, Shading]:
-        """Direct and indirect light."""
         paths = self.paths
-        with self._workshop.costs.of("trace"):
+        with workshop.costs.of("trace"):
             light = self._light(frame, where, Purpose.LIGHT)
             light.add(paths)
         direct, indirect = (shading.spread(where) for shading in light.shadings)
-        return direct, indirect
+        write_light(file, direct, indirect, where)
+        workshop.finish(unit, [file], frame=number, dropped=direct.dropped, rays={"light": light.paths})
+        return LightPage(frame, geometry, direct, indirect, where)
 
     def _light(self, frame: int, where: Mask, purpose: Purpose) -> Estimate:
         workshop, cache = self._workshop, self.drafts.cache(frame)
@@ -204,7 +199,8 @@ class LightTable:
         share = max(min(len(self.keyframes), 2 * POOL + 1) / 2.0, 1.0)
         wanted = PILOT_PATHS * (jnd / settings.quality) ** 2 / (2.0 * share)
         paths = int(np.clip(4 * math.ceil(wanted / 4), *PATHS))
-        workshop.finish(unit, [], jnd=jnd, paths=paths)
+        rays = 2 * PILOT_PATHS * int(workshop.views[frame].geometry.has_light.sum())
+        workshop.finish(unit, [], frame=workshop.number(frame), jnd=jnd, paths=paths, rays={"drafts": rays})
         return paths
 
     def _pilot_jnd(self, frame: int) -> float:

@@ -81,7 +81,7 @@ class Estimate:
         self._chunk = chunk
         self._filter = pixel_filter
         self._random = random
-        self._paths = 0  # numbers given to paths so far
+        self._next = 0  # numbers given to paths so far
         self._asked = 0
         self._layers = layers
         self._is_stratified = is_stratified
@@ -97,8 +97,8 @@ class Estimate:
         where : (N,) bool
         """
         chosen = np.arange(len(self._pixels)) if where is None else np.flatnonzero(where)
-        for first in range(self._paths, self._paths + spp, PASS):
-            width = min(PASS, self._paths + spp - first)
+        for first in range(self._next, self._next + spp, PASS):
+            width = min(PASS, self._next + spp - first)
             step = max(self._chunk // width, 1)
             for start in range(0, len(chosen), step):
                 part = chosen[start : start + step]
@@ -107,8 +107,13 @@ class Estimate:
                 more = (stratified4(pixel, path, self._random),) if self._is_stratified else ()
                 found = self._radiance(self._rays(pixel, path), rng, *more)
                 self._sums[:, part] += _summed(found, width)
-        self._paths += spp
+        self._next += spp
         self._asked += spp * len(chosen)
+
+    @property
+    def paths(self) -> int:
+        """Paths traced so far, of all pixels together."""
+        return self._asked
 
     @property
     def shading(self) -> Shading:

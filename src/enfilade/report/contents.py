@@ -11,7 +11,7 @@ from enfilade.metric import sequence_score
 from enfilade.report.film import Film
 from enfilade.report.forecast import Forecast, forecast
 from enfilade.report.layers import LAYERS
-from enfilade.report.panels import panels
+from enfilade.report.panels import PURPOSES, panels
 from enfilade.report.seen import SeenRun
 from enfilade.report.tables import SOURCES, percent, seconds
 from enfilade.settings import Settings
@@ -41,11 +41,7 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         "video": _video(seen),
         "layers": [layer for layer in LAYERS if layer.name in film.layers],
         "panels": made,
-        "table1": {
-            "columns": SOURCES,
-            "shares": seen.figures["table1"],
-            "known": len(seen.figures["per_frame"]),
-        },
+        "effort": _effort(seen.figures),
         "table2": _times(seen.figures),
         "ahead": ahead,
         "left": _left(ahead),
@@ -56,6 +52,36 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         "data": json.dumps(_data(seen, film, made), ensure_ascii=True).replace("<", "\\u003c"),
         "has_reference": reference is not None,
     }
+
+
+def _effort(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """What was traced, and why: rays where the method counts them, and pixels (Table 1) otherwise."""
+    if rays := figures["rays"]:
+        return {
+            "title": "Rays per pixel and frame",
+            "table": "",
+            "columns": [*((name, f"{rays[kind]:.2f}") for kind, (name, _) in PURPOSES.items()),
+                        ("total", f"{sum(rays.values()):.2f}")],
+            "text": "Drafts are what tells where light comes from, and how many paths it takes.",
+            "headings": [name for name, _ in PURPOSES.values()] + ["rays"],
+        }  # fmt: skip
+    known, count = len(figures["per_frame"]), figures["frames"]
+    return {
+        "title": "Pixels traced",
+        "table": "Table 1",
+        "columns": [(name, percent(figures["table1"][key])) for key, name in SOURCES.items()],
+        "text": f"Percent of the pixels of {known}{'' if known == count else f' of {count}'} frames.",
+        "headings": ["slow, %", "specular, %", "holes, %", "keyframe, %", "traced, %"],
+    }
+
+
+def _efforts(figures: Mapping[str, Any]) -> dict[int, list[float]]:
+    """By frame, what stands under the headings of :func:`_effort`."""
+    if figures["rays"]:
+        rows, keys = figures["rays_per_frame"], tuple(PURPOSES)
+        return {row["frame"]: [*(row[k] for k in keys), sum(row[k] for k in keys)] for row in rows}
+    keys = ("slow", "specular", "hole", "keyframe", "traced")
+    return {row["frame"]: [row[k] for k in keys] for row in figures["per_frame"]}
 
 
 def _state(seen: SeenRun) -> dict[str, str]:
@@ -189,17 +215,15 @@ def _identity(seen: SeenRun) -> list[tuple[str, str]]:
 
 
 def _rows(seen: SeenRun, film: Film) -> list[dict[str, Any]]:
-    by_number = {row["frame"]: row for row in seen.figures["per_frame"]}
+    efforts = _efforts(seen.figures)
     rows = []
     for index, number in enumerate(seen.numbers):
-        row = by_number.get(number)
         found = film.beside.get(number, {})
         rows.append(
             {
                 "frame": number,
                 "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[index],
-                "shares": None if row is None else [row[k] for k in ("slow", "specular", "hole", "keyframe")],
-                "traced": None if row is None else row["traced"],
+                "effort": efforts.get(number),
                 "score": found.get("score_jnd"),
                 "psnr": found.get("psnr_db"),
             }
@@ -209,6 +233,7 @@ def _rows(seen: SeenRun, film: Film) -> list[dict[str, Any]]:
 
 def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, Any]:
     by_number = {row["frame"]: row for row in seen.figures["per_frame"]}
+    efforts = _efforts(seen.figures)
     frames = []
     for frame in film.frames:
         row = by_number.get(frame["number"], {})
@@ -218,7 +243,7 @@ def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, An
                 "number": frame["number"],
                 "index": frame["index"],
                 "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[frame["index"]],
-                "traced": row.get("traced"),
+                "effort": efforts.get(frame["number"], [None])[-1],
                 "isRaw": frame["is_raw"],
                 "isKeyframe": row.get("keyframe", 0.0) > 0.0,
                 "score": found.get("score_jnd"),
@@ -237,4 +262,5 @@ def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, An
             for n in film.layers
         ],
         "panels": made,
+        "unit": "" if seen.figures["rays"] else "%",
     }

@@ -12,7 +12,7 @@ from typing import Any
 from enfilade.records import Source
 from enfilade.report.layers import SOURCE_COLORS
 
-__all__ = ["panels"]
+__all__ = ["PURPOSES", "panels"]
 
 Panel = dict[str, Any]
 BLUE, VERMILION, GREEN = "#3D8FC6", "#D55E00", "#009E73"
@@ -21,6 +21,14 @@ REASONS = {  # of a row of the summary: name, colour
     "specular": ("specular", SOURCE_COLORS[Source.SPECULAR]),
     "hole": ("holes", SOURCE_COLORS[Source.HOLE]),
     "keyframe": ("keyframes", SOURCE_COLORS[Source.KEYFRAME]),
+}
+
+
+PURPOSES = {  # sent for: name, colour
+    "camera": ("what is seen", SOURCE_COLORS[Source.SLOW]),
+    "lobes": ("mirrors, glass and gloss", SOURCE_COLORS[Source.SPECULAR]),
+    "light": ("light of keyframes", SOURCE_COLORS[Source.KEYFRAME]),
+    "drafts": ("drafts of it", SOURCE_COLORS[Source.HOLE]),
 }
 
 
@@ -46,7 +54,7 @@ def panels(
     rows = figures["per_frame"]
     made = [
         _velocity(numbers, speed_deg_s, rows) if speed_deg_s else None,
-        _traced(rows, figures["table1"]) if rows else None,
+        _sent(figures) if figures["rays"] else _traced(rows, figures["table1"]) if rows else None,
         _predictions(figures["segments"], figures["split_percent"]),
         _score(beside) or _psnr(beside),
     ]
@@ -66,16 +74,8 @@ def _velocity(numbers: Sequence[int], speeds: Sequence[float], rows: Sequence[Ma
 
 
 def _traced(rows: Sequence[Mapping[str, Any]], table1: Mapping[str, float]) -> Panel:
-    frames = [row["frame"] for row in rows]
     traces = [
-        {
-            "type": "bar",
-            "name": name,
-            "x": frames,
-            "y": [round(row[key], 3) for row in rows],
-            "marker": {"color": color, "line": {"width": 0}},
-            "hovertemplate": f"%{{y:.1f}} % {name}<extra></extra>",
-        }
+        _bars(name, rows, key, color, "%{y:.1f} %")
         for key, (name, color) in REASONS.items()
         if any(row[key] > 0.0 for row in rows)
     ]
@@ -83,6 +83,31 @@ def _traced(rows: Sequence[Mapping[str, Any]], table1: Mapping[str, float]) -> P
     text = f"Pixels traced per frame by reason; {total:.1f} percent on average."
     panel = _panel("traced", "Pixels traced, by reason", "%", traces, text, top=100.0)
     return {**panel, "ticks": [0, 50, 100], "level": {"value": total, "name": f"mean {total:.1f} %"}}
+
+
+def _sent(figures: Mapping[str, Any]) -> Panel:
+    rows, rays = figures["rays_per_frame"], figures["rays"]
+    traces = [
+        _bars(name, rows, kind, color, "%{y:.1f}")
+        for kind, (name, color) in PURPOSES.items()
+        if rays[kind] > 0.0
+    ]
+    total = sum(rays.values())
+    text = f"Rays sent for a pixel of each frame, by purpose; {total:.1f} on average."
+    most = max(sum(row[kind] for kind in PURPOSES) for row in rows)
+    panel = _panel("rays", "Rays per pixel, by purpose", "", traces, text, top=1.05 * most)
+    return {**panel, "level": {"value": total, "name": f"mean {total:.1f}"}}
+
+
+def _bars(name: str, rows: Sequence[Mapping[str, Any]], key: str, color: str, value: str) -> dict[str, Any]:
+    return {
+        "type": "bar",
+        "name": name,
+        "x": [row["frame"] for row in rows],
+        "y": [round(row[key], 3) for row in rows],
+        "marker": {"color": color, "line": {"width": 0}},
+        "hovertemplate": f"{value} {name}<extra></extra>",
+    }
 
 
 def _predictions(segments: Sequence[Mapping[str, Any]], threshold: float) -> Panel | None:

@@ -73,8 +73,12 @@ def walkthrough_figure(summary: Mapping[str, Any]) -> Figure:
     panels = ["mean image velocity"]
     panels += ["predictions of the metric"] if segments else []
     width, height = summary["size"]
-    title = f"method {summary['method']}, {len(rows)} frames, {width}x{height}, {summary['spp']} spp"
-    figure, axes = new_figure(title, [*panels, "pixels traced, by reason"])
+    rays = summary["rays"]
+    effort = f"{sum(rays.values()):.1f} rays a pixel" if rays else f"{summary['spp']} spp"
+    title = f"method {summary['method']}, {len(rows)} frames, {width}x{height}, {effort}"
+    figure, axes = new_figure(
+        title, [*panels, "rays sent, by purpose" if rays else "pixels traced, by reason"]
+    )
 
     frames = [int(row["frame"]) for row in rows]
     keyframes = [int(row["frame"]) for row in rows if row["keyframe"]]
@@ -83,7 +87,10 @@ def walkthrough_figure(summary: Mapping[str, Any]) -> Figure:
     _draw_velocity(axes[0], frames, velocity, keyframes if len(keyframes) < len(frames) else [])
     if segments:
         _draw_predictions(axes[1], segments, float(summary.get("split_percent", SPLIT_PERCENT)))
-    _draw_traced(axes[-1], frames, rows, float(summary["table1"]["total"]))
+    if rays:
+        _draw_rays(axes[-1], summary["rays_per_frame"], rays)
+    else:
+        _draw_traced(axes[-1], frames, rows, float(summary["table1"]["total"]))
     return figure
 
 
@@ -149,6 +156,18 @@ def _draw_traced(ax: Any, frames: Sequence[int], rows: Sequence[Mapping[str, Any
     ax.axhline(mean, color=INK, linestyle="--", linewidth=1.0, label=f"mean {mean:.1f} %")
     ax.set_ylabel("traced, % of pixels")
     ax.set_ylim(0.0, 100.0)
+    legend(ax, columns=5)
+
+
+def _draw_rays(ax: Any, rows: Sequence[Mapping[str, Any]], mean: Mapping[str, float]) -> None:
+    names = {"camera": "slow", "lobes": "specular", "light": "keyframe", "drafts": "hole"}  # in these colours
+    counts: dict[str, tuple[str, Sequence[float]]] = {
+        kind: (SOURCE_COLORS[like], [float(row[kind]) for row in rows]) for kind, like in names.items()
+    }
+    stack(ax, [row["frame"] for row in rows], counts)
+    total = sum(mean.values())
+    ax.axhline(total, color=INK, linestyle="--", linewidth=1.0, label=f"mean {total:.1f}")
+    ax.set_ylabel("rays per pixel")
     legend(ax, columns=5)
 
 

@@ -19,18 +19,29 @@ SOURCES = {  # Table 1, in its order: key of the summary, heading
 }
 
 
+RAYS = {"camera": "camera", "lobes": "lobes", "light": "light", "drafts": "drafts"}  # key, heading
 WORST_FRAMES = 8  # of a comparison: what fits on a screen
 
 
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Tables 1 and 2 of a finished run.
+    """Tables 1 and 2 of a finished run; of one that counts rays, these in place of Table 1.
 
     Parameters
     ----------
     summary
         What ``summary.json`` holds.
     """
-    return [traced_table(summary), time_table(summary)]
+    first = rays_table(summary) if summary.get("rays") else traced_table(summary)
+    return [first, time_table(summary)]
+
+
+def rays_table(summary: Mapping[str, Any]) -> Table:
+    """Rays sent for a pixel and frame, by purpose."""
+    table = _table("Rays per pixel and frame", "method", *RAYS.values(), "total")
+    rays = summary["rays"]
+    counts = [*(rays[kind] for kind in RAYS), sum(rays.values())]
+    table.add_row(str(summary.get("method", "")), *(f"{count:.2f}" for count in counts))
+    return table
 
 
 def traced_table(summary: Mapping[str, Any]) -> Table:

@@ -8,6 +8,7 @@ from typing import Any
 __all__ = ["add_costs", "tally"]
 
 TRACED = {"slow": "slow", "specular": "specular", "occlusion": "hole", "keyframes": "keyframe"}
+RAYS = ("camera", "lobes", "light", "drafts")  # what rays are sent for, where a method counts them
 
 
 def tally(
@@ -30,7 +31,9 @@ def tally(
         ``frames``: of the path. ``table1``: pixels traced, percent of those of the frames that are known,
         by reason. ``table2``: seconds in total, by frame of the path and by stage, of all sessions that
         worked on the run. ``per_frame``: frames of which it is known where their pixels come from, in
-        percent, with their mean velocity (or None). ``segments``: what the metric said of each.
+        percent, with their mean velocity (or None). ``rays``: of a run that counts them, how many were sent
+        for a pixel and frame of the path, by purpose, and ``rays_per_frame``: the same of each frame, where
+        it is known. ``segments``: what the metric said of each.
         ``dropped_samples``: that were NaN or infinite.
     """
     kept = list(lines)
@@ -41,6 +44,7 @@ def tally(
         name: sum(row[source] for row in per_frame) / max(len(per_frame), 1)
         for name, source in TRACED.items()
     }
+    rays = _rays(path, kept)
     stages = add_costs(line.get("cost", {}) for line in kept)
     wall, cpu = (sum(s[kind] for s in stages.values()) for kind in ("wall_s", "cpu_s"))
     return {
@@ -53,6 +57,8 @@ def tally(
         "table1": {**table1, "total": sum(table1.values())},
         "table2": {"total_s": wall, "per_frame_s": wall / count, "cpu_s": cpu, "stages": stages},
         "per_frame": per_frame,
+        "rays": {kind: sum(row[kind] for row in rays) / count for kind in RAYS} if rays else {},
+        "rays_per_frame": rays,
         "segments": [_segment(line) for line in kept if "verdict" in line],
         "dropped_samples": sum(line.get("dropped", 0) for line in kept),
     }
@@ -81,6 +87,21 @@ def _per_frame(
             speed = None if speed_deg_s is None else speed_deg_s[index]
             rows.append({"frame": number, "velocity_deg_s": speed, **row, "traced": sum(row.values())})
     return rows
+
+
+def _rays(path: Mapping[str, Any], lines: list[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rays sent for a pixel of each frame."""
+    counted: dict[int, dict[str, int]] = {}
+    for line in lines:
+        for kind, count in line.get("rays", {}).items():
+            of = counted.setdefault(line["frame"], dict.fromkeys(RAYS, 0))
+            of[kind] += count
+    pixels = path["size"][0] * path["size"][1]
+    return [
+        {"frame": number, **{kind: count / pixels for kind, count in counted[number].items()}}
+        for number in path["frames"]
+        if number in counted
+    ]
 
 
 def _segment(line: Mapping[str, Any]) -> dict[str, Any]:

@@ -122,7 +122,7 @@
     canvas.setAttribute("aria-label", `Frame ${here.number}, ${kind}: ${title}`);
     fact("frame", `${here.number}, ${kind}`);
     fact("velocity", number(here.velocity, 2, "deg/s"));
-    fact("traced", number(here.traced, 1, "%"));
+    fact("effort", number(here.effort, 1, data.unit));
     fact("score", number(here.score, 2, "JND"));
     fact("psnr", number(here.psnr, 1, "dB"));
     for (const button of document.querySelectorAll("[data-layer]")) {
