@@ -133,7 +133,7 @@ def analytic_work(folder: Path) -> Work:
     scene = folder / "wall.analytic.json"
     scene.write_text(scene_text(AnalyticScene((wall, ball, mirror), noise=0.1)))
     path = walk(folder / "path.json")
-    flags = ("--spp", "4", "--keyframes-spacing", "12", "--viewing-diagonal-m", "0.0125")
+    flags = ("--method", "paper", "--spp", "4", "--keyframes-spacing", "12", "--viewing-diagonal-m", "0.0125")
     return made(folder, "analytic", (str(scene), "--path", str(path), *flags))
 
 

@@ -46,7 +46,8 @@ def render(folder: Path, size: str, count: int) -> dict:
     walk = {"format": "enfilade-path", "fps": FPS, "size": [int(width), int(height)], "keys": keys}
     path.write_text(json.dumps(walk))
     command = [sys.executable, "-m", "enfilade", "render", scene, "--path", path, "--out", folder / "run"]
-    subprocess.run([*map(str, command), "--spp", "4", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    flags = ["--method", "paper", "--spp", "4", "--quiet"]
+    subprocess.run([*map(str, command), *flags], check=True, stdout=subprocess.DEVNULL)
     return json.loads((folder / "run" / "summary.json").read_text())
 
 

@@ -90,7 +90,17 @@ def analytic(folder: Path, frames: int) -> list[str]:
     eyes = {at / 30: [0.02 * at, 0.0, 4.0] for at in (0, frames - 1)}
     keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
     path.write_text(json.dumps({"format": "enfilade-path", "fps": 30, "size": [32, 24], "keys": keys}))
-    flags = ["--spp", "2", "--viewing-diagonal-m", "0.0125", "--device", "cpu", "--quiet"]
+    flags = [
+        "--method",
+        "paper",
+        "--spp",
+        "2",
+        "--viewing-diagonal-m",
+        "0.0125",
+        "--device",
+        "cpu",
+        "--quiet",
+    ]
     out = ["--out", str(folder / "run")]
     return [sys.executable, "-m", "enfilade", "render", str(scene), "--path", str(path), *out, *flags]
 

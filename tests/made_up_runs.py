@@ -88,6 +88,7 @@ def made_up_plan(count=60):
             {"first": 21, "middle": 31, "last": 41},
             {"first": 41, "middle": 50, "last": 60},
         ],
+        "method": "paper",
         "forecast": {
             "traced_percent": 31.5,
             "traced_percent_least": 24.0,

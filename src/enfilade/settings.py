@@ -83,7 +83,9 @@ class SampleFilter(Enum):
 class TraceSettings(Section):
     """Path tracing."""
 
-    spp: int = option(64, "Paths traced for a pixel.", least=1, most=1_048_576)
+    spp: int = option(
+        64, "Paths traced for a pixel, by the methods paper and reference.", least=1, most=1_048_576
+    )
     seed: int = option(0, "Seed of all random numbers.", least=0, most=2**32 - 1)
     max_depth: int = option(
         0, "Longest path in edges; 0 takes what the scene's integrator says.", least=0, most=1024

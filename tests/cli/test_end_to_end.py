@@ -21,7 +21,7 @@ def inputs(tmp_path_factory):
     cameras = [{"camera_to_world": p.ravel().tolist(), "fov": 55, "aspect": 4 / 3} for p in poses]
     values = {"render_width": 64, "render_height": 48, "fps": 24, "seconds": FRAMES / 24}
     path.write_text(json.dumps({**values, "camera_type": "perspective", "camera_path": cameras}))
-    return scene, "--path", path, "--device", "cpu", "--spp", "2"
+    return scene, "--path", path, "--device", "cpu", "--spp", "2", "--method", "paper"
 
 
 @pytest.fixture(scope="module")

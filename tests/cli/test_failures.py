@@ -59,9 +59,9 @@ def test_a_bug_is_not_hidden(render, jobs):
 
 def test_interrupted_says_how_to_continue(render, jobs, camera_path):
     jobs.error = KeyboardInterrupt()
-    result = render("--spp", "4")
+    result = render("--seed", "4")
     assert result.exit_code == 130
-    assert f"enfilade render s.xml --path {camera_path} --out 'my run' --spp 4\n" in result.stderr
+    assert f"enfilade render s.xml --path {camera_path} --out 'my run' --seed 4\n" in result.stderr
     assert "stays in the run folder" in result.stderr
 
 

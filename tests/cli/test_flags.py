@@ -45,7 +45,7 @@ def test_a_flag_that_repeats_the_default_still_beats_the_file(settings, tmp_path
 def test_choices_switches_and_short_forms(settings):
     made = settings(
         *("--keyframes-placement", "equal-flow", "--metric-metering", "none", "--antialias-separate-items"),
-        *("--codec", "ffv1", "--spp", "3", "--ocio", "studio.ocio", "--view", "Film"),
+        *("--codec", "ffv1", "--method", "paper", "--spp", "3", "--ocio", "studio.ocio", "--view", "Film"),
     )
     assert made.keyframes.placement is Placement.EQUAL_FLOW
     assert made.metric.metering is Metering.NONE
@@ -53,6 +53,19 @@ def test_choices_switches_and_short_forms(settings):
     assert (made.video.codec, made.video.ocio, made.video.view) == ("ffv1", "studio.ocio", "Film")
     assert made.trace.spp == 3
     assert not settings("--antialias-no-separate-items").antialias.separate_items
+
+
+def test_a_flag_that_says_nothing_to_the_method_is_refused(run, camera_path):
+    line = ("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run")
+    for flags, said in (
+        (("--spp", "3"), "--quality"),
+        (("--quality", "5", "--method", "paper"), "--spp"),
+        (("--light-quality", "5", "--method", "reference"), "--spp"),
+    ):
+        result = run(*line, *flags)
+        assert result.exit_code == 2
+        assert said in result.stderr
+    assert not (camera_path.parent / "run").exists()
 
 
 def test_every_setting_has_a_flag():

@@ -22,6 +22,8 @@ def begun(run, camera_path, tmp_path):
         "cpu",
         "--spp",
         "2",
+        "--method",
+        "paper",
         "--out",
         tmp_path / "run",
     )

@@ -1,5 +1,7 @@
 """Walkthroughs by ``--method decoupled``."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,10 @@ from enfilade.monitor import Silence
 from enfilade.path import load_path
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job
+from enfilade.pipeline.plan import plan
+from enfilade.pipeline.rehearsal import excerpt_of
 from enfilade.pipeline.walkthrough import render
+from enfilade.records import Segment
 from enfilade.scenes import write_scene
 from enfilade.settings import Settings
 from enfilade.store import Run
@@ -69,6 +74,25 @@ def test_its_rays_are_counted(decoupled):
     assert rays["light"] == pytest.approx(2 / 5 * light.paths, rel=0.1)
     by_frame = {row["frame"]: row for row in summary["rays_per_frame"]}
     assert by_frame[1]["drafts"] > 0.0 == by_frame[26]["drafts"]
+
+
+def test_a_plan_rehearses_a_segment(decoupled):
+    job, _, summary = decoupled
+    made = plan(job, Silence())
+    forecast = made.forecast
+    assert made.keyframes == (1, 28)  # of five frames
+    assert forecast["rehearsed_frames"] == len(FRAMES)
+    assert forecast["rehearsed_size"] == [64, 48]
+    assert forecast["paths"] == job.settings.light.paths
+    # The segment is all there is.
+    assert forecast["rays"] == pytest.approx(summary["rays"])
+    assert forecast["seconds"] > 0.0
+    larger = replace(
+        job,
+        path=replace(job.path, cameras=tuple(replace(c, width=640, height=480) for c in job.path.cameras)),
+    )
+    excerpt = excerpt_of(larger.path, Segment(1, 3))
+    assert (excerpt.width, excerpt.height, excerpt.numbers) == (365, 274, FRAMES[1:4])
 
 
 def test_a_run_that_lost_files_is_mended_to_the_same_bytes(decoupled):

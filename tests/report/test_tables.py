@@ -40,6 +40,22 @@ def test_plan():
     assert "8.5 min" in forecast
 
 
+def test_a_rehearsed_plan():
+    forecast = {
+        "rays": {"camera": 12.0, "lobes": 3.0, "light": 2.0, "drafts": 1.5},
+        "paths": 16,
+        "seconds": 7200.0,
+        "cpu_seconds": 14000.0,
+        "rehearsed_frames": 9,
+        "rehearsed_size": [365, 274],
+    }
+    plan = {**made_up_plan(), "method": "decoupled", "forecast": forecast}
+    table = rows(plan_tables(plan)[1])
+    assert ["rays", "per", "pixel", "and", "frame", "18.5"] in table
+    assert ["time", "2.00", "h"] in table
+    assert table[-1] == ["Rehearsed", "with", "9", "frames", "at", "365x274."]
+
+
 def test_many_keyframes_are_cut_short():
     plan = {**made_up_plan(), "keyframes": list(range(1, 61, 2))}
     assert "21, 23, ... 59" in as_text(plan_tables(plan)[0])

@@ -21,6 +21,7 @@ _META = "enfilade.settings"
 SHORT = {
     ("trace", "spp"): "--spp",
     ("trace", "seed"): "--seed",
+    ("light", "quality"): "--quality",
     ("limits", "allow"): "--allow",
     ("video", "codec"): "--codec",
     ("video", "ocio"): "--ocio",
@@ -104,6 +105,11 @@ def settings_of(ctx: click.Context) -> Settings:
     return Settings.from_tables(tables)
 
 
+def flags_given(ctx: click.Context) -> set[tuple[str, str]]:
+    """Section and name of the settings that flags of this command set."""
+    return set(ctx.meta.get(_META, {}).get("flags", {}))
+
+
 def given_in(ctx: click.Context, section: str) -> set[str]:
     """Names of a section's settings that the file or a flag of this command sets.
 
@@ -114,7 +120,7 @@ def given_in(ctx: click.Context, section: str) -> set[str]:
     """
     given = ctx.meta.get(_META, {})
     table = read_tables(given["file"]).get(section, {}) if "file" in given else {}
-    flags = {name for of, name in given.get("flags", {}) if of == section}
+    flags = {name for of, name in flags_given(ctx) if of == section}
     return flags | set(table if isinstance(table, dict) else ())
 
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from enfilade.cli.flags import settings_of
+from enfilade.cli.flags import flags_given, settings_of
 from enfilade.device import Choice, activate
+from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
     from enfilade.pipeline.crew import Crew
@@ -18,7 +19,22 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-METHODS = ("reference", "paper", "decoupled")
+METHODS = ("decoupled", "paper", "reference")
+FOREIGN = {  # flags that say nothing to a method, and what does
+    "decoupled": {
+        (
+            "trace",
+            "spp",
+        ): "--spp counts the paths of --method paper and --method reference; decoupled traces "
+        "as many as --quality asks for"
+    },
+    "paper": {
+        ("light", "quality"): "--quality is that of --method decoupled; --method paper traces --spp paths"
+    },
+    "reference": {
+        ("light", "quality"): "--quality is that of --method decoupled; --method reference traces --spp paths"
+    },
+}
 JOB_SECTIONS = (
     "trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video", "limits",
 )  # fmt: skip
@@ -46,9 +62,9 @@ def job_options(command: Command) -> Command:
     method = click.option(
         "--method",
         type=click.Choice(METHODS),
-        default="paper",
+        default=METHODS[0],
         show_default=True,
-        help="Trace every frame (reference), or reuse what may be reused (paper).",
+        help="Reuse the light of keyframes (decoupled), their colours (paper), or nothing (reference).",
     )
     return path_options(method(command))
 
@@ -157,11 +173,13 @@ def job_of(
     Raises
     ------
     InputError
-        A setting, the path or the selection of frames is wrong.
+        A setting, the path or the selection of frames is wrong; a flag says nothing to the method.
     DeviceError
         The device is not there.
     """
     settings = settings_of(ctx)
+    for flag in flags_given(ctx) & FOREIGN[method].keys():
+        raise SettingsError(f"{FOREIGN[method][flag]}; leave it out, or choose another method")
     activate(device)
     from enfilade.path import load_path, parse_frames
     from enfilade.pipeline.job import Job

@@ -34,7 +34,7 @@ class Job:
         A Mitsuba scene, or planes and spheres in closed form (``.analytic.json``).
     path : CameraPath
     settings : Settings
-    method : {"reference", "paper"}
+    method : {"decoupled", "paper", "reference"}
     """
 
     scene: Path
@@ -106,8 +106,15 @@ class Job:
         Raises
         ------
         SceneError
+        SettingsError
+            The method asks more of the scene than it has.
         """
         if self.scene.name.endswith(ANALYTIC_SUFFIX):
+            if self.method == "decoupled":
+                raise SettingsError(
+                    f"{self.scene} has surfaces but no light to ask for: --method decoupled needs a "
+                    "Mitsuba scene; add --method paper"
+                )
             return  # its files are its own, and it has no plugins
         from enfilade.backends.scenecheck import check_scene
         from enfilade.backends.trial import try_scene

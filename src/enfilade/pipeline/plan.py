@@ -11,7 +11,9 @@ import numpy as np
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
-from enfilade.pipeline.survey import Survey, initial_segments, survey_path
+from enfilade.pipeline.rehearsal import forecast_decoupled
+from enfilade.pipeline.survey import Survey, survey_path
+from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
 from enfilade.records import Keyframe, Segment, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
@@ -37,8 +39,10 @@ class Plan:
         Numbers of the initial keyframes.
     segments : tuple of dict
         ``first``, ``last`` and ``middle`` of each initial segment.
+    method : str
     forecast : dict
-        ``traced_percent`` of all pixels when every specular surface has to be traced, and
+        Of the method. ``decoupled``: see :func:`~enfilade.pipeline.rehearsal.forecast_decoupled`. The
+        others: ``traced_percent`` of all pixels when every specular surface has to be traced, and
         ``traced_percent_least`` when none has; the share of each reason; ``paths`` and ``seconds``
         of tracing for the former. Segments that the metric will split are not foreseen.
     """
@@ -50,6 +54,7 @@ class Plan:
     hole_percent: tuple[float | None, ...]
     keyframes: tuple[int, ...]
     segments: tuple[dict[str, int], ...]
+    method: str
     forecast: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
@@ -60,7 +65,8 @@ class Plan:
 def plan(job: Job, monitor: Monitor) -> Plan:
     """Look at every frame of a path, place the initial keyframes, and estimate the cost.
 
-    Nothing is shaded but a handful of paths, which tell how long one takes.
+    Nothing is shaded but a handful of paths, which tell how long one takes; or, by the decoupled method, a
+    segment of the path in a small size.
 
     Raises
     ------
@@ -71,9 +77,15 @@ def plan(job: Job, monitor: Monitor) -> Plan:
     renderer = open_renderer(job.scene, job.settings.trace)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
-    shots = initial_segments(job.path, survey, job.settings)
-    segments = [segment for shot in shots for segment in shot]
-    holes = _expected_holes(job, views, segments, monitor)
+    segments = [segment for shot in segments_of(job, survey) for segment in shot]
+    holes: dict[int, float] = {}
+    if job.method == "decoupled":
+        forecast = forecast_decoupled(job, segments, monitor)
+    elif job.method == "paper":
+        holes = _expected_holes(job, views, segments, monitor)
+        forecast = _forecast(job, _shares(job, survey, segments, holes), renderer)
+    else:
+        forecast = _forecast(job, {"keyframes": 100.0}, renderer)
 
     numbers = job.path.numbers
     keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
@@ -85,7 +97,8 @@ def plan(job: Job, monitor: Monitor) -> Plan:
         hole_percent=tuple(holes.get(frame) for frame in range(len(job.path))),
         keyframes=tuple(numbers[k] for k in keyframes),
         segments=tuple(_numbered(job, segment) for segment in segments),
-        forecast=_forecast(job, survey, segments, holes, _path_seconds(job, renderer)),
+        method=job.method,
+        forecast=forecast,
     )
 
 
@@ -151,13 +164,8 @@ def _path_seconds(job: Job, renderer: Renderer) -> float:
     return seconds / (PROBE_PIXELS * PROBE_SPP)
 
 
-def _forecast(
-    job: Job,
-    survey: Survey,
-    segments: list[Segment],
-    holes: dict[int, float],
-    path_seconds: float,
-) -> dict[str, Any]:
+def _shares(job: Job, survey: Survey, segments: list[Segment], holes: dict[int, float]) -> dict[str, float]:
+    """Pixels that the paper's method will trace, percent, by reason."""
     count, keyframes = len(job.path), {s.first for s in segments} | {s.last for s in segments}
     shares = dict.fromkeys(("slow", "specular", "holes", "keyframes"), 0.0)
     shares["keyframes"] = 100.0 * len(keyframes) / count
@@ -172,13 +180,17 @@ def _forecast(
             shares["slow"] += slow / count
             shares["specular"] += survey.specular_percent[frame] * rest / count
             shares["holes"] += hole * rest / count
+    return shares
+
+
+def _forecast(job: Job, shares: dict[str, float], renderer: Renderer) -> dict[str, Any]:
     traced = min(sum(shares.values()), 100.0)
-    pixels = count * job.path.width * job.path.height
+    pixels = len(job.path) * job.path.width * job.path.height
     paths = round(traced / 100.0 * pixels * job.settings.trace.spp)
     return {
         "traced_percent": traced,
-        "traced_percent_least": min(traced, sum(shares.values()) - shares["specular"]),
+        "traced_percent_least": min(traced, sum(shares.values()) - shares.get("specular", 0.0)),
         "shares_percent": shares,
         "paths": paths,
-        "seconds": paths * path_seconds,
+        "seconds": paths * _path_seconds(job, renderer),
     }

@@ -16,7 +16,7 @@ from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.video import check_encodable
 
-METHODS = ("reference", "paper", "decoupled")
+METHODS = ("decoupled", "paper", "reference")
 LEAST_SPP = 2  # of the paper's method
 
 

@@ -76,7 +76,8 @@ def plan_tables(plan: Mapping[str, Any]) -> list[Table]:
     plan
         ``Plan.to_dict()``.
     """
-    return [_walk_table(plan), _forecast_table(plan["forecast"])]
+    made = _rehearsed_table if plan["method"] == "decoupled" else _forecast_table
+    return [_walk_table(plan), made(plan["forecast"])]
 
 
 def _walk_table(plan: Mapping[str, Any]) -> Table:
@@ -107,6 +108,19 @@ def _forecast_table(forecast: Mapping[str, Any]) -> Table:
     table.add_row("paths", f"{forecast['paths']:,}")
     table.add_row("time of tracing", seconds(forecast["seconds"]))
     table.caption = "Splits of segments are not foreseen."
+    return table
+
+
+def _rehearsed_table(forecast: Mapping[str, Any]) -> Table:
+    table = _table("Forecast", "", "")
+    table.add_row("rays per pixel and frame", f"{sum(forecast['rays'].values()):.1f}")
+    for kind, title in RAYS.items():
+        table.add_row(f"  {title}", f"{forecast['rays'][kind]:.2f}")
+    table.add_row("paths of a keyframe's pixel", str(forecast["paths"]))
+    table.add_row("time", seconds(forecast["seconds"]))
+    table.add_row("CPU time", seconds(forecast["cpu_seconds"]))
+    width, height = forecast["rehearsed_size"]
+    table.caption = f"Rehearsed with {forecast['rehearsed_frames']} frames at {width}x{height}."
     return table
 
 
