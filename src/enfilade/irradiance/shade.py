@@ -13,9 +13,9 @@ from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
 from enfilade.irradiance.paths import Path, begun, chosen, padded, scatter_add
-from enfilade.irradiance.replay import recorded
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
+from enfilade.pixels.replay import recorded
 from enfilade.renderer import LightRenderer, Lit, Rays
 
 BOUNCES = 16  # most bounces off lobes before a path is given up
@@ -76,11 +76,15 @@ class Shader:
     def __init__(self, renderer: LightRenderer, pixel_angle: float) -> None:
         self._renderer = renderer
         self._spread = CELL_PX * pixel_angle
-        self._meet = recorded(self._meet_kernel, renderer)
-        self._look_up = recorded(self._look_up_kernel, renderer)
-        self._go_on = recorded(self._go_on_kernel, renderer)
-        self._gather = recorded(self._gather_kernel, renderer)
-        self._estimate = recorded(self._estimate_kernel, renderer)
+
+        def state() -> Any:
+            return renderer.state
+
+        self._meet = recorded(self._meet_kernel, state)
+        self._look_up = recorded(self._look_up_kernel, state)
+        self._go_on = recorded(self._go_on_kernel, state)
+        self._gather = recorded(self._gather_kernel, state)
+        self._estimate = recorded(self._estimate_kernel, state)
 
     def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> Samples:
         """Radiance that the surfaces seen send by emission and by their diffuse lobes.

@@ -13,8 +13,8 @@ from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque,
 from enfilade.camera import Camera
 from enfilade.irradiance.cache import BEHIND
 from enfilade.irradiance.paths import Path, begun, chosen
-from enfilade.irradiance.replay import recorded
 from enfilade.pixels.rays import pinhole_directions
+from enfilade.pixels.replay import recorded
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import LightRenderer, Rays
 
@@ -31,7 +31,7 @@ class VirtualImages:
 
     def __init__(self, renderer: LightRenderer) -> None:
         self._renderer = renderer
-        self._look_on = recorded(self._look_on_kernel, renderer)
+        self._look_on = recorded(self._look_on_kernel, lambda: renderer.state)
 
     def of(self, geometry: Geometry) -> Geometry:
         """What a frame shows, where it seems to be.

@@ -66,9 +66,11 @@ class DecoupledFrames:
         here = parts[frame]
         others = [f for f in span if f != frame]
         shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
-        with workshop.costs.of("over time"):
-            scattered = over_time(here.lobes, [parts[f].lobes for f in others], shares)
-        made = Frame(here.seen + scattered, here.source)
+        color = here.seen
+        if np.any(here.source == Source.SPECULAR):
+            with workshop.costs.of("over time"):
+                color = color + over_time(here.lobes, [parts[f].lobes for f in others], shares)
+        made = Frame(color, here.source)
         dropped = here.scattered.dropped
         write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, dropped)
 
@@ -157,6 +159,9 @@ def _scattered(
     """
     path, settings = workshop.job.path, workshop.job.settings
     where = _grown(seen.is_marked, path.width)
+    if not where.any():
+        size = path.height, path.width
+        return Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)), 0
     scattered = Estimate(
         path.cameras[frame],
         np.flatnonzero(where).astype(np.uint32),

@@ -24,6 +24,7 @@ from enfilade.camera import Camera
 from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.pixels.estimate import estimate
+from enfilade.pixels.replay import recorded
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import (
     Bounce,
@@ -81,6 +82,7 @@ class MitsubaRenderer:
         self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
         self._file = file
+        self._surfaces = recorded(lambda rays: self._find(rays)[0], lambda: self.state)
         # Mitsuba prepares the sampling of a mesh that emits when it is first asked for: now, and not while a
         # kernel is recorded.
         if scene.emitters():
@@ -100,7 +102,8 @@ class MitsubaRenderer:
 
         Where a mask is partly transparent, its surface counts when it is at least half opaque.
         """
-        return self._find(rays)[0]
+        found: Surfaces = self._surfaces(rays)
+        return found
 
     @property
     def state(self) -> Any:

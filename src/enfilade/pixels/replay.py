@@ -11,22 +11,20 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.renderer import LightRenderer
-
 __all__ = ["recorded"]
 
 
-def recorded(kernel: Callable[..., Any], renderer: LightRenderer) -> Callable[..., Any]:
+def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[..., Any]:
     """A kernel that is traced when it is first called with arguments of some form, and replayed afterwards.
 
     Parameters
     ----------
     kernel
         Takes and returns trees of Dr.Jit arrays; what is no array counts as part of the form.
-    renderer
-        Whose arrays the kernel reads.
+    state
+        Tells all other arrays that the kernel reads.
     """
-    frozen = dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: renderer.state)
+    frozen = dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: state())
 
     def replayed(*arguments: Any) -> Any:
         # Garbage that shares NumPy's memory can't be let go while a kernel is recorded.
