@@ -28,7 +28,7 @@ def main() -> None:
     activate("auto")
     from enfilade.path import load_path
     from enfilade.pipeline.job import open_renderer
-    from enfilade.renderer import Purpose
+    from enfilade.renderer import Purpose, RandomKey
     from enfilade.scenes import write_scene
     from enfilade.settings import TraceSettings
 
@@ -44,7 +44,7 @@ def main() -> None:
 
     def seconds(pixels: np.ndarray) -> tuple[float, float]:
         wall, cpu = time.perf_counter(), time.process_time()
-        renderer.trace(camera, pixels, spp=arguments.spp, seed=0, frame=1, purpose=Purpose.FILL)
+        renderer.trace(camera, pixels, RandomKey(0, 1, Purpose.FILL), spp=arguments.spp)
         return time.perf_counter() - wall, time.process_time() - cpu
 
     seconds(chosen)  # compiles

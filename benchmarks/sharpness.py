@@ -1,0 +1,71 @@
+"""How much of the detail of the reference stands in what each contestant of a bench made.
+
+    python benchmarks/sharpness.py BENCH [--every 3]
+
+BENCH is the folder of an `enfilade bench`. By spatial frequency: the cross-spectrum of the encoded luminance
+with that of the reference, by that of the contestant that was path traced with most paths. Noise does not
+count, since it is not correlated; 1 is as sharp as path tracing.
+Contestants with another pixel filter than the traced one are left out.
+"""
+
+import argparse
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+
+BANDS = (1 / 32, 1 / 16, 1 / 8, 3 / 16, 1 / 4, 3 / 8, 1 / 2)  # edges, cycles per pixel
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("bench", type=Path)
+    parser.add_argument("--every", type=int, default=3, help="frames from one that is looked at to the next")
+    arguments = parser.parse_args()
+    found = json.loads((arguments.bench / "bench.json").read_text())
+    contestants = {c["name"]: c for c in found["contestants"]}
+    traced = max((c for c in contestants.values() if c["family"] == "traced"), key=lambda c: c["spp"])
+    bench, every = arguments.bench, arguments.every
+    reference = spectra(bench / "references" / f"reference-{traced['pixel_filter']}", every)
+    whole = shared(spectra(folder_of(bench, traced), every), reference)
+    edges = "".join(f"{low:>8.3f}-{high:.3f}" for low, high in itertools.pairwise(BANDS))
+    print(f"{'cycles per pixel':<18}{edges}")
+    for name, contestant in contestants.items():
+        if contestant["pixel_filter"] != traced["pixel_filter"]:
+            continue
+        share = shared(spectra(folder_of(bench, contestant), every), reference) / whole
+        print(f"{name:<18}" + "".join(f"{value:>14.3f}" for value in share))
+
+
+def folder_of(bench: Path, contestant: dict) -> Path:
+    """What a contestant has made."""
+    return bench / "contestants" / contestant["name"]
+
+
+def spectra(folder: Path, every: int) -> list[np.ndarray]:
+    """Fourier transforms of the encoded luminance of some frames, windowed."""
+    from enfilade.codec import read_exr
+    from enfilade.pixels.tone import luminance, srgb_encode
+
+    folder = folder / "frames" if (folder / "frames").is_dir() else folder
+    found = []
+    for file in sorted(folder.glob("*.exr"))[::every]:
+        color = np.clip(read_exr(file)["RGB"].astype(np.float32), 0.0, 1.0)
+        image = luminance(srgb_encode(color))
+        window = np.outer(np.hanning(image.shape[0]), np.hanning(image.shape[1]))
+        found.append(np.fft.fft2((image - image.mean()) * window))
+    return found
+
+
+def shared(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarray:
+    """What two sequences have in common, by band of frequency."""
+    cross = sum((a * np.conj(b)).real for a, b in zip(one, other, strict=True))
+    rows, columns = (np.fft.fftfreq(size) for size in cross.shape)
+    radius = np.hypot(rows[:, None], columns)
+    return np.array([cross[(radius >= a) & (radius < b)].mean() for a, b in itertools.pairwise(BANDS)])
+
+
+if __name__ == "__main__":
+    main()
