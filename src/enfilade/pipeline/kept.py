@@ -38,3 +38,9 @@ class Kept(OrderedDict[int, T]):
 def nearest(frames: list[int], frame: int, count: int) -> list[int]:
     """The so many of some frames that are nearest to one, nearest first."""
     return sorted(frames, key=lambda k: (abs(k - frame), k))[:count]
+
+
+def either_side(fills: list[int], frame: int) -> list[int]:
+    """The last of some frames that is not after one, and the first that is not before."""
+    before, after = [f for f in fills if f <= frame], [f for f in fills if f >= frame]
+    return sorted({*before[-1:], *after[:1]})

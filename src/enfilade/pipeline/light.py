@@ -21,7 +21,7 @@ from enfilade.irradiance import (
     seen_from,
 )
 from enfilade.pipeline.drafts import Drafts
-from enfilade.pipeline.kept import Kept, nearest
+from enfilade.pipeline.kept import Kept, either_side, nearest
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate
 from enfilade.pixels.lookup import Page
@@ -96,7 +96,7 @@ class LightTable:
         """
         settings = self._workshop.job.settings.light
         frames = [*nearest(self.keyframes, frame, settings.keyframes)]
-        frames += _around(self._fills_at(frame), frame)
+        frames += either_side(self._fills_at(frame), frame)
         pages = [self._page(f) for f in frames]
         shares = [max(1.0 - abs(f - frame) / (REACH * self._spacing), LEAST_SHARE) for f in frames]
         view = seen_from(self._workshop.views[frame].geometry, pages, shares)
@@ -123,7 +123,7 @@ class LightTable:
         A page that fills holes knows all that the keyframes don't, so that the two around a frame do.
         """
         middle = (first + last) // 2
-        if middle == first or self._holes(middle, _around(fills, middle)).mean() < LEAST_HOLES:
+        if middle == first or self._holes(middle, either_side(fills, middle)).mean() < LEAST_HOLES:
             return fills
         self._trace(middle, self._holes(middle, []))
         fills = sorted([*fills, middle])
@@ -219,9 +219,3 @@ class LightTable:
                 page = LightPage(frame, geometry, direct, indirect, where)
                 shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
             return workshop.judge.compare(*shown, valid=where).score
-
-
-def _around(fills: list[int], frame: int) -> list[int]:
-    """The last of some frames that is not after one, and the first that is not before."""
-    before, after = [f for f in fills if f <= frame], [f for f in fills if f >= frame]
-    return sorted({*before[-1:], *after[:1]})

@@ -1,0 +1,80 @@
+"""The light of a shot: what frames between the keyframes know of what they see."""
+
+import numpy as np
+import pytest
+
+from enfilade.monitor import Silence
+from enfilade.path import load_path
+from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.kept import either_side
+from enfilade.pipeline.light import LEAST_HOLES, LightTable
+from enfilade.pipeline.survey import survey_path
+from enfilade.pipeline.units import segments_of
+from enfilade.pipeline.workshop import Workshop
+from enfilade.scenes import write_scene
+from enfilade.settings import Settings
+from enfilade.store import Run
+
+FRAMES = tuple(range(20, 36, 2))  # the camera turns: between the keyframes something else is seen
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory):
+    """A workshop, and the light of its shot."""
+    folder = tmp_path_factory.mktemp("light")
+    files = write_scene("room", folder / "room", preset="small")
+    path = load_path(files.path, size=(96, 72), frames=FRAMES)
+    settings = Settings.from_tables({"light": {"spacing": 7, "paths": 4}, "keyframes": {"adaptation": 0.0}})
+    job = Job(files.scene, path, settings, "decoupled")
+    renderer = open_renderer(job.scene, job.settings.trace)
+    with Run.open(folder / "run", job.identity(renderer)) as run:
+        workshop = Workshop(job, renderer, run, Silence())
+        survey = survey_path(workshop.views, path, settings, Silence())
+        table = LightTable(workshop, segments_of(job, survey)[0])
+        yield workshop, table
+
+
+def _known(workshop, table, frame):
+    """Share of a frame's lit pixels whose light some page knows."""
+    near, _ = table.around(frame)
+    has_light = workshop.views[frame].geometry.has_light
+    return (np.array(near.pages[0].items) > 0)[has_light.ravel()].mean()
+
+
+def test_pages_between_the_keyframes_fill_the_holes(lit):
+    workshop, table = lit
+    assert table.keyframes == [0, 7]
+    before = [_known(workshop, table, frame) for frame in range(8)]
+    assert min(before) < 1.0 - 2 * LEAST_HOLES
+    for segment in table.segments:
+        table.prepare(segment)
+    after = [_known(workshop, table, frame) for frame in range(8)]
+    assert min(after) > 1.0 - 2 * LEAST_HOLES
+    assert all(b <= a for b, a in zip(before, after, strict=True))
+    (line,) = (line for line in workshop.run.lines() if line["unit"].startswith("light"))
+    assert line["fills"]
+    pages = [line for line in workshop.run.lines() if line["unit"].startswith("keyframe")]
+    # A page that fills holes is small.
+    whole = [p["rays"]["light"] for p in pages if p["frame"] in (20, 34)]
+    small = [p["rays"]["light"] for p in pages if p["frame"] in line["fills"]]
+    assert max(small) < 0.5 * min(whole)
+
+
+def test_cells_know_what_no_draft_sees(lit):
+    workshop, table = lit
+    estimates = [table.drafts.scout(frame) for frame in table.keyframes]
+    assert all(len(e.keys) for e in estimates)
+    lines = {line["unit"]: line for line in workshop.run.lines()}
+    assert lines["cells 20"]["cells"] == len(estimates[0].keys)
+    for estimate in estimates:
+        assert np.isfinite(estimate.sums).all()
+        assert (estimate.counts > 0).all()
+        assert np.unique(estimate.keys).size == len(estimate.keys)
+
+
+@pytest.mark.parametrize(
+    ("fills", "frame", "expected"),
+    [([], 3, []), ([2, 5, 9], 4, [2, 5]), ([2, 5, 9], 5, [5]), ([2, 5, 9], 1, [2]), ([2, 5, 9], 12, [9])],
+)
+def test_two_fills_around_a_frame(fills, frame, expected):
+    assert either_side(fills, frame) == expected
