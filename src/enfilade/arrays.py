@@ -104,10 +104,17 @@ def _aligned(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def image(values: Any, height: int, width: int) -> npt.NDArray[Any]:
     """NumPy image (H, W) or (H, W, C) of flat lanes; evaluates them; always a copy."""
-    array = np.array(values)
-    if array.ndim == 1:
-        return array.reshape(height, width)
-    return np.ascontiguousarray(array.T).reshape(height, width, array.shape[0])
+    if dr.depth_v(values) == 1:
+        return np.array(values).reshape(height, width)
+    return rows(values).reshape(height, width, -1)
+
+
+def rows(vectors: Any) -> npt.NDArray[Any]:
+    """NumPy array (N, C) of vectors; evaluates them.
+
+    Made by NumPy: Dr.Jit would compile a kernel for each N.
+    """
+    return np.stack([np.array(axis) for axis in vectors], axis=1)
 
 
 def opaque(value: float | int, kind: Any = None) -> Any:

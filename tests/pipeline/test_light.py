@@ -1,10 +1,12 @@
 """The light of a shot: what frames between the keyframes know of what they see."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from enfilade.monitor import Silence
 from enfilade.path import load_path
+from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.kept import either_side
 from enfilade.pipeline.light import LEAST_HOLES, LightTable
@@ -78,3 +80,27 @@ def test_cells_know_what_no_draft_sees(lit):
 )
 def test_two_fills_around_a_frame(fills, frame, expected):
     assert either_side(fills, frame) == expected
+
+
+def test_nothing_is_compiled_after_the_first_frames(tmp_path):
+    files = write_scene("atrium", tmp_path / "atrium", preset="small")
+    path = load_path(files.path, size=(64, 48), frames=tuple(range(20, 36)))
+    settings = Settings.from_tables({"light": {"spacing": 5, "paths": 4}})
+    job = Job(files.scene, path, settings, "decoupled")
+    renderer = open_renderer(job.scene, job.settings.trace)
+    with Run.open(tmp_path / "run", job.identity(renderer)) as run:
+        workshop = Workshop(job, renderer, run, Silence())
+        survey = survey_path(workshop.views, path, settings, Silence())
+        table = LightTable(workshop, segments_of(job, survey)[0])
+        for segment in table.segments:
+            table.prepare(segment)
+        frames = DecoupledFrames(workshop)
+        for frame in range(4):
+            frames.shade(table, frame)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            for frame in range(4, 16):
+                frames.shade(table, frame)
+            kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+    assert kernels
+    assert not [k["operation_count"] for k in kernels if not k["cache_hit"] or k["cache_disk"]]

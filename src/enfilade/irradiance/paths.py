@@ -93,7 +93,8 @@ def padded(lanes: Any) -> tuple[Any, Any]:
 
 
 def scatter_add(radiance: Any, sent: Any, lane: Any) -> None:
-    """Add to each lane's radiance; a lane has one path, so that the order does not matter."""
+    """Add to each lane's radiance. A lane has one path that carries anything."""
     for target, value in zip(radiance, sent, strict=True):
-        dr.scatter_add(target, Float(value), lane)
+        # Told that nothing meets there, Dr.Jit needs neither atomics nor copies, and no kernel for each size.
+        dr.scatter_add(target, Float(value), lane, value != 0.0, dr.ReduceMode.NoConflicts)
     dr.eval(radiance)

@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque
+from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
 from enfilade.irradiance.paths import Path, begun, chosen, padded, scatter_add
@@ -330,7 +330,7 @@ class Shader:
 
 
 def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any, count: int) -> None:
-    values = np.array(light).T[:count]
+    values = rows(light)[:count]
     for key in keys:
         heard(Estimates.of(np.array(key)[:count], values))
 

@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque, vector3
+from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque, rows, vector3
 from enfilade.camera import Camera
 from enfilade.irradiance.cache import BEHIND
 from enfilade.irradiance.paths import Path, begun, chosen
@@ -52,7 +52,7 @@ class VirtualImages:
         for _ in range(LAYERS):
             path, found, turned, distance, is_sharp = self._look_on(path)
             lane = pixels[np.array(path.lane)]
-            item[lane], normal[lane] = np.array(found) + BEHIND, np.array(turned).T
+            item[lane], normal[lane] = np.array(found) + BEHIND, rows(turned)
             way[lane] = np.minimum(way[lane] + np.array(distance) / first[lane], ENDLESS)
             path = chosen(path, dr.compress(is_sharp))
             if not dr.width(path.lane):

@@ -127,5 +127,5 @@ def _is_one_of(seen: Surfaces, classes: tuple[SurfaceClass, ...]) -> Any:
 
 def _add(total: Any, lane: Any, value: Any) -> None:
     for target, part in zip(total, value, strict=True):
-        dr.scatter_add(target, Float(part), lane)
+        dr.scatter_add(target, Float(part), lane, mode=dr.ReduceMode.NoConflicts)
     dr.eval(total)
