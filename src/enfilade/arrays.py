@@ -114,6 +114,7 @@ def rows(vectors: Any) -> npt.NDArray[Any]:
 
     Made by NumPy: Dr.Jit would compile a kernel for each N.
     """
+    dr.eval(vectors)  # all axes by one kernel
     return np.stack([np.array(axis) for axis in vectors], axis=1)
 
 
