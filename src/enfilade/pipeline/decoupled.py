@@ -25,7 +25,7 @@ from enfilade.pixels.estimate import LUMINANCE, Estimate
 from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
-EDGE_CONTRAST = 0.001  # by JND of the quality: relative deviation above which a pixel takes more camera rays
+EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
 REACH = 3  # frames to each side over which that is averaged
 NOISE_CONTRAST = 0.025  # the same of what lobes scatter, once it is smoothed; time will average it
 LEAST_NOISY = 0.01  # of a frame's pixels: fewer are left as they are
