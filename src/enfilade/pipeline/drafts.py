@@ -23,7 +23,7 @@ from enfilade.records import LightPage
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 
 COARSER = 2  # times fewer pixels across than a frame has
-PATHS = 8  # of a draft's pixel
+PATHS = 4  # of a draft's pixel
 POOL = 4  # keyframes to each side with which a draft is pooled
 PAGES = 4  # drafts in which a point is looked up
 GATHER_SPP = 4  # bounces of a draft's pixel that look for what no draft sees
