@@ -207,6 +207,11 @@ class LightSettings(Section):
     least_lobe_samples: int = option(
         8, "Rays of every pixel that shows a glossy, mirroring or transparent surface.", least=2, most=4096
     )
+    denoiser: str = option(
+        "none",
+        "Quality of Open Image Denoise on the light of keyframes, in place of smoothing it along surfaces.",
+        choices=("none", "fast", "balanced", "high"),
+    )
     lobe_samples: int = option(24, "... and of those where they differ much.", least=2, most=4096)
 
 

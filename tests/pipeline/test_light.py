@@ -4,6 +4,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from enfilade.irradiance import light_of
 from enfilade.monitor import Silence
 from enfilade.path import load_path
 from enfilade.pipeline.decoupled import DecoupledFrames
@@ -80,6 +81,33 @@ def test_cells_know_what_no_draft_sees(lit):
 )
 def test_two_fills_around_a_frame(fills, frame, expected):
     assert either_side(fills, frame) == expected
+
+
+def test_a_denoiser_takes_noise_out_of_the_light(tmp_path):
+    pytest.importorskip("pyoidn")
+    files = write_scene("room", tmp_path / "room", preset="small")
+    path = load_path(files.path, size=(160, 120), frames=(20, 22))
+
+    def light(paths, denoiser):
+        settings = Settings.from_tables({"light": {"paths": paths, "denoiser": denoiser}})
+        job = Job(files.scene, path, settings, "decoupled")
+        renderer = open_renderer(job.scene, job.settings.trace)
+        with Run.open(tmp_path / f"{paths}-{denoiser}", job.identity(renderer)) as run:
+            workshop = Workshop(job, renderer, run, Silence())
+            survey = survey_path(workshop.views, path, settings, Silence())
+            table = LightTable(workshop, segments_of(job, survey)[0])
+            for segment in table.segments:
+                table.prepare(segment)
+            near, _ = table.around(0)
+            return light_of(near.pages[0])
+
+    truth, plain, fast, again = light(64, "none"), light(4, "none"), light(4, "fast"), light(4, "fast")
+
+    def error(found):
+        return np.abs(np.log((found + 0.05) / (truth + 0.05))).mean()
+
+    assert error(fast) < 0.9 * error(plain)
+    np.testing.assert_array_equal(fast, again)
 
 
 def test_nothing_is_compiled_after_the_first_frames(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -80,7 +80,7 @@ def open_page(page: LightPage) -> Page:
     return _page(page.geometry, lanes(page.is_known), layers)
 
 
-def pooled(page: LightPage, around: Sequence[Page]) -> Page:
+def pooled(page: LightPage, around: Sequence[Page], denoised: Callable[[F32], F32] | None = None) -> Page:
     """What all pages together know of the surfaces of one, smoothed along them.
 
     Light that falls on a surface does not depend on who looks: each page that sees a point has an estimate
@@ -91,6 +91,8 @@ def pooled(page: LightPage, around: Sequence[Page]) -> Page:
     page
     around
         Pages opened, the one itself among them.
+    denoised
+        Takes an image of light, (H, W, 3), and takes the noise out of it; None smooths along surfaces.
 
     Direct light, which has edges, is smoothed apart from indirect light, which has more noise.
 
@@ -100,8 +102,12 @@ def pooled(page: LightPage, around: Sequence[Page]) -> Page:
         Opened, of one layer; known where ``page`` is.
     """
     layers, _ = _gathered(page.geometry, around, [1.0] * len(around))
-    groups = np.where(page.is_known, page.geometry.item, np.uint32(0))
-    smoothed = [_smooth(page.geometry, groups, light, variance) for light, variance in layers]
+    if denoised is None:
+        groups = np.where(page.is_known, page.geometry.item, np.uint32(0))
+        smoothed = [_smooth(page.geometry, groups, light, variance) for light, variance in layers]
+    else:
+        size = page.is_known.shape
+        smoothed = [(lanes(denoised(image(light, *size))), variance) for light, variance in layers]
     light = sum((light for light, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
     return _page(page.geometry, lanes(page.is_known), [(light, variance)])

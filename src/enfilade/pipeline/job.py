@@ -13,6 +13,7 @@ import numpy as np
 from enfilade import __version__
 from enfilade.camera import Camera
 from enfilade.codec import read_json
+from enfilade.denoise import denoiser_name, why_no_denoiser
 from enfilade.device import active
 from enfilade.errors import CameraPathError, RunFolderError, SettingsError
 from enfilade.records import CameraPath
@@ -92,8 +93,13 @@ class Job:
                 "enfilade": __version__,
                 "renderer": name,
                 "variant": _variant(self.scene),
+                **({"denoiser": denoiser_name()} if self._denoises else {}),
             },
         }
+
+    @property
+    def _denoises(self) -> bool:
+        return self.method == "decoupled" and self.settings.light.denoiser != "none"
 
     def check_scene(self, *, is_tried: bool = False) -> None:
         """Refuse a scene that reaches for what is not its own, or for too much, before it is loaded.
@@ -107,8 +113,10 @@ class Job:
         ------
         SceneError
         SettingsError
-            The method asks more of the scene than it has.
+            The method asks more of the scene than it has, or the settings more than is installed.
         """
+        if self._denoises and (why := why_no_denoiser()):
+            raise SettingsError(why)
         if self.scene.name.endswith(ANALYTIC_SUFFIX):
             if self.method == "decoupled":
                 raise SettingsError(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from enfilade.codec import read_light, write_light
+from enfilade.denoise import denoise
 from enfilade.errors import SettingsError
 from enfilade.irradiance import (
     LightCache,
@@ -25,7 +26,7 @@ from enfilade.pipeline.kept import Kept, either_side, nearest
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate
 from enfilade.pixels.lookup import Page
-from enfilade.records import LightPage, Mask, Segment
+from enfilade.records import F32, Geometry, LightPage, Mask, Segment
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
@@ -67,6 +68,7 @@ class LightTable:
         self._fills: dict[Segment, list[int]] = {}
         self.drafts = Drafts(workshop, self.renderer, self.shader, self.keyframes)
         settings = workshop.job.settings.light
+        self._quality = settings.denoiser
         self._traced: Kept[LightPage] = Kept(TRACED)
         self._opened: Kept[Page] = Kept(2 * (2 * POOL + 1))
         self._pooled: Kept[Page] = Kept(settings.keyframes + FILLS + 1)
@@ -144,7 +146,15 @@ class LightTable:
         around += nearest(sorted(set().union(*self._fills.values())), frame, 2 * POOL + 1)
         with self._workshop.costs.of("pool"):
             pages = [self._open(f) for f in sorted({*around, frame})]
-            return pooled(self._trace(frame), pages)
+            page = self._trace(frame)
+            # A page that fills holes is too small for a denoiser to make anything of.
+            is_denoised = self._quality != "none" and frame in self.keyframes
+            return pooled(page, pages, partial(self._denoised, page.geometry) if is_denoised else None)
+
+    def _denoised(self, geometry: Geometry, light: F32) -> F32:
+        has_light = geometry.has_light[..., None].astype(np.float32)
+        white = np.broadcast_to(has_light, light.shape)  # the light has no albedo in it
+        return denoise(light, white, geometry.normal, quality=self._quality)
 
     def _open(self, frame: int) -> Page:
         return self._opened.made(frame, lambda: open_page(self._trace(frame)))
