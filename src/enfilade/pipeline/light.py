@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -26,7 +27,7 @@ from enfilade.pipeline.kept import Kept, either_side, nearest
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate
 from enfilade.pixels.lookup import Page
-from enfilade.records import F32, Geometry, LightPage, Mask, Segment
+from enfilade.records import F32, Geometry, LightPage, Mask, Segment, Shading
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose
 
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
@@ -36,6 +37,7 @@ LEAST_HOLES = 5e-3  # of a frame's pixels: fewer are left to the frames themselv
 PILOT_PATHS = 4  # of each of the two estimates that tell how many paths are needed
 PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
 FILLS = 2  # pages that fill holes in which a frame looks: the one before and the one after it
+EVEN = 0.25  # of the spread of evenly shared paths counts as noise; pages differ by 0.3 to 0.6 of it
 TRACED = 4  # pages kept as they were traced
 
 
@@ -175,7 +177,7 @@ class LightTable:
         with workshop.costs.of("trace"):
             light = self._light(frame, where, Purpose.LIGHT)
             light.add(paths)
-        direct, indirect = (shading.spread(where) for shading in light.shadings)
+        direct, indirect = _layers(light, where)
         write_light(file, direct, indirect, where)
         workshop.finish(unit, [file], frame=number, dropped=direct.dropped, rays={"light": light.paths})
         return LightPage(frame, geometry, direct, indirect, where)
@@ -225,7 +227,14 @@ class LightTable:
             for purpose in (Purpose.PILOT, Purpose.LIGHT):
                 light = self._light(frame, where, purpose)
                 light.add(PILOT_PATHS)
-                direct, indirect = (shading.spread(where) for shading in light.shadings)
+                direct, indirect = _layers(light, where)
                 page = LightPage(frame, geometry, direct, indirect, where)
                 shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
             return workshop.judge.compare(*shown, valid=where).score
+
+
+def _layers(light: Estimate, where: Mask) -> tuple[Shading, Shading]:
+    """Direct and indirect light of some pixels as images, with the variance that it has from page to page."""
+    spread = [shading.spread(where) for shading in light.shadings]
+    direct, indirect = (replace(s, variance=np.float32(EVEN) * s.variance) for s in spread)
+    return direct, indirect
