@@ -203,7 +203,7 @@ class LightSettings(Section):
     spacing: int = option(8, "Uniform spacing of the keyframes of light, frames.", least=2)
     keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
     least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=1, most=4096)
-    samples: int = option(20, "Camera rays of a pixel that shows an edge.", least=1, most=4096)
+    samples: int = option(32, "Camera rays of a pixel that shows an edge.", least=1, most=4096)
     least_lobe_samples: int = option(
         8, "Rays of every pixel that shows a glossy, mirroring or transparent surface.", least=2, most=4096
     )

@@ -67,7 +67,7 @@ PRESETS = (
     Preset(
         "decoupled-4",
         "decoupled",
-        {"light": {"quality": 4.0, "samples": 32, "least_lobe_samples": 16, "lobe_samples": 48}},
+        {"light": {"quality": 4.0, "least_lobe_samples": 16, "lobe_samples": 48}},
     ),
 )
 
