@@ -12,7 +12,10 @@ from enfilade.renderer import Bounce, Lit, Rays
 
 __all__ = ["Path", "begun", "chosen", "padded", "scatter_add"]
 
-LEAST_LANES = 1021  # of a kernel; fewer might be as many as some array of the scene: another recording
+STEP = (
+    1021  # lanes of a kernel are a multiple of it: else they might be as many as some array of the scene has,
+)
+# which to a recorded kernel is another form of its arguments
 
 
 @dataclass(frozen=True)
@@ -86,9 +89,9 @@ def chosen(path: Path, lanes: Any) -> Path:
 
 
 def padded(lanes: Any) -> tuple[Any, Any]:
-    """Lanes of a list, repeated until they are enough for a kernel, and which are no repetitions."""
+    """Lanes of a list, the last repeated until they suit a recorded kernel, and which are no repetitions."""
     count = dr.width(lanes)
-    index = dr.arange(UInt, max(count, LEAST_LANES))
+    index = dr.arange(UInt, -(-count // STEP) * STEP)
     return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)
 
 

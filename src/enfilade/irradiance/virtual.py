@@ -46,6 +46,7 @@ class VirtualImages:
             return geometry
         item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
         path = begun(*_centre_rays(geometry.camera, pixels), spread=0.0)
+        path = chosen(path, path.lane)
         way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
         first = geometry.depth.ravel() * _lengths(geometry.camera)
         item[pixels], normal[pixels] = BEHIND, 0.0

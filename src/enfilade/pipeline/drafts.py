@@ -27,7 +27,7 @@ PATHS = 4  # of a draft's pixel
 POOL = 4  # keyframes to each side with which a draft is pooled
 PAGES = 4  # drafts in which a point is looked up
 GATHER_SPP = 4  # bounces of a draft's pixel that look for what no draft sees
-LOBE_SPP = 2  # rays of a frame's pixel that look for the same off mirrors, glass and glossy surfaces
+LOBE_SPP = 4  # rays of a frame's pixel that look for the same off mirrors, glass and glossy surfaces
 SCOUTS = 8  # keyframes whose estimates of what no draft sees a frame shares
 
 
