@@ -31,10 +31,14 @@ def lit(tmp_path_factory):
     job = Job(files.scene, path, settings, "decoupled")
     renderer = open_renderer(job.scene, job.settings.trace)
     with Run.open(folder / "run", job.identity(renderer)) as run:
-        workshop = Workshop(job, renderer, run, Silence())
-        survey = survey_path(workshop.views, path, settings, Silence())
-        table = LightTable(workshop, segments_of(job, survey)[0])
-        yield workshop, table
+        yield _begun(job, renderer, run)
+
+
+def _begun(job, renderer, run):
+    """A workshop, and the light of the only shot, of which nothing is traced yet."""
+    workshop = Workshop(job, renderer, run, Silence())
+    survey = survey_path(workshop.views, job.path, job.settings, Silence())
+    return workshop, LightTable(workshop, segments_of(job, survey)[0])
 
 
 def _known(workshop, table, frame):
@@ -93,9 +97,7 @@ def test_a_denoiser_takes_the_place_of_smoothing(tmp_path):
         job = Job(files.scene, path, settings, "decoupled")
         renderer = open_renderer(job.scene, job.settings.trace)
         with Run.open(tmp_path / f"{paths}-{denoiser}", job.identity(renderer)) as run:
-            workshop = Workshop(job, renderer, run, Silence())
-            survey = survey_path(workshop.views, path, settings, Silence())
-            table = LightTable(workshop, segments_of(job, survey)[0])
+            _, table = _begun(job, renderer, run)
             for segment in table.segments:
                 table.prepare(segment)
             near, _ = table.around(0)
@@ -118,9 +120,7 @@ def test_nothing_is_compiled_after_the_first_frames(tmp_path):
     job = Job(files.scene, path, settings, "decoupled")
     renderer = open_renderer(job.scene, job.settings.trace)
     with Run.open(tmp_path / "run", job.identity(renderer)) as run:
-        workshop = Workshop(job, renderer, run, Silence())
-        survey = survey_path(workshop.views, path, settings, Silence())
-        table = LightTable(workshop, segments_of(job, survey)[0])
+        workshop, table = _begun(job, renderer, run)
         for segment in table.segments:
             table.prepare(segment)
         frames = DecoupledFrames(workshop)
