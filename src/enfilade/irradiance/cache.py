@@ -143,7 +143,7 @@ def over_time(
     Parameters
     ----------
     here, others
-        Geometry with virtual images (:meth:`~enfilade.irradiance.shade.Shader.shown`), smoothed colours with
+        Geometry with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`), smoothed colours with
         the noise that is left, and the pixels that have them: of the frame, and of frames around it.
     shares
         How much each of the others counts; the frame itself counts one.

@@ -12,10 +12,9 @@ from enfilade.renderer import Bounce, Lit, Rays
 
 __all__ = ["Path", "begun", "chosen", "padded", "scatter_add"]
 
-STEP = (
-    1021  # lanes of a kernel are a multiple of it: else they might be as many as some array of the scene has,
-)
-# which to a recorded kernel is another form of its arguments
+# Lanes of a recorded kernel are a multiple of this: else they might be as many as some array of the scene
+# has, which is another form of its arguments.
+STEP = 1021
 
 
 @dataclass(frozen=True)
