@@ -143,8 +143,8 @@ def over_time(
     Parameters
     ----------
     here, others
-        Geometry with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`), smoothed colours with
-        the noise that is left, and the pixels that have them: of the frame, and of frames around it.
+        Geometry with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`), smoothed colours
+        with the noise that is left, and the pixels that have them: of the frame, and of frames around it.
     shares
         How much each of the others counts; the frame itself counts one.
 
