@@ -231,6 +231,9 @@ class Renderer(Protocol):
         ...
 
 
+MOST_EDGES = 4  # that a path may have behind it when the path tracer is asked for the rest of it
+
+
 @runtime_checkable
 class LightRenderer(Renderer, Protocol):
     """A renderer that can also be asked for the light apart from the surfaces it falls on.
@@ -266,14 +269,18 @@ class LightRenderer(Renderer, Protocol):
         lit
         rng : PCG32
         edges
-            How many lead from the camera to the surface, 1 or 2: they count where the scene limits the
-            length of paths.
+            How many lead from the camera to the surface, 1 to ``MOST_EDGES``: they count where the scene
+            limits the length of paths.
 
         Returns
         -------
         direct, indirect : Array3f
             By light straight from emitters, and by all other.
         """
+        ...
+
+    def rest(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
+        """Estimate the radiance that everything but the diffuse lobe sends; as :meth:`light` otherwise."""
         ...
 
     def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:

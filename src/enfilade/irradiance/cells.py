@@ -53,7 +53,8 @@ class Cells:
         width : Float
             Of the path there, scene units.
         jitter : Array3f
-            In [0, 1): moves a point by up to half a cell, so that many lookups interpolate.
+            In [0, 1): moves a point by up to half a cell, so that many lookups interpolate. Where the cell
+            that it is moved to is not known, its own is asked.
 
         Returns
         -------
@@ -62,11 +63,12 @@ class Cells:
         """
         light, is_known = Array3f(0), Bool(False)
         for level in range(LEVELS):
-            key = cell_key(position, normal, item, width, level, jitter)
-            lane = self._search(key)
-            is_here = dr.gather(UInt64, self.keys, lane) == key
-            light = dr.select(is_here & ~is_known, dr.gather(Array3f, self.light, lane), light)
-            is_known |= is_here
+            for moved in (jitter, 0.5):
+                key = cell_key(position, normal, item, width, level, moved)
+                lane = self._search(key)
+                is_here = dr.gather(UInt64, self.keys, lane) == key
+                light = dr.select(is_here & ~is_known, dr.gather(Array3f, self.light, lane), light)
+                is_known |= is_here
         return light, is_known
 
     def _search(self, key: Any) -> Any:

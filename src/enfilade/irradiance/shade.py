@@ -16,19 +16,11 @@ from enfilade.irradiance.paths import Path, begun, chosen, padded, scatter_add
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
 from enfilade.pixels.replay import recorded
-from enfilade.renderer import LightRenderer, Lit, Rays
+from enfilade.renderer import LightRenderer, Rays
 
-BOUNCES = 16  # most bounces off lobes before a path is given up
+BOUNCES = 3  # off lobes that are followed from cache to cache; what goes on then is path traced to its end
 BRIGHT = 4.0  # one over the throughput below which a path is faint
 LEAST_CHANCE = 0.05  # of a faint path to go on
-MOST_CHANCE = (
-    1.0,
-    1.0,
-    1.0,
-    1.0,
-    0.5,
-    0.25,
-)  # of any path, by bounce; the last holds on: some are trapped in glass
 BLACK = 1e-4  # albedo below which no light is looked up
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
 CELL_BLUR = 0.25  # ... and at what is seen through a lobe, of the lobe's width
@@ -50,12 +42,41 @@ class _Step:
         Where there are other lobes.
     path : Path
         On their way to the surface that was met.
+    spot : _Spot
+        Of the surface that was met.
     """
 
     sent: Any
     is_missing: Any
     goes_on: Any
     path: Path
+    spot: _Spot
+
+
+@dataclass(frozen=True)
+class _Spot:
+    """What looking up the light of a surface that was met takes, without the scene.
+
+    Attributes
+    ----------
+    position, normal : Array3f
+    item : UInt
+    width : Float
+        Of the path there, scene units.
+    weight : Array3f
+        What the diffuse lobe's light counts in the image; 0 where there is none.
+    """
+
+    position: Any
+    normal: Any
+    item: Any
+    width: Any
+    weight: Any
+
+    @property
+    def counts(self) -> Any:
+        """Whether it is worth looking up light; Bool."""
+        return dr.max(dr.abs(self.weight)) > 0.0
 
 
 class Shader:
@@ -81,10 +102,11 @@ class Shader:
             return renderer.state
 
         self._meet = recorded(self._meet_kernel, state)
-        self._look_up = recorded(self._look_up_kernel, state)
+        self._look_up = recorded(_look_up_kernel, lambda: None)
         self._go_on = recorded(self._go_on_kernel, state)
         self._gather = recorded(self._gather_kernel, state)
         self._estimate = recorded(self._estimate_kernel, state)
+        self._finish = recorded(self._finish_kernel, state)
 
     def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> Samples:
         """Radiance that the surfaces seen send by emission and by their diffuse lobes.
@@ -134,9 +156,7 @@ class Shader:
         Array3f
         """
         radiance = dr.zeros(Array3f, dr.width(rng.state))
-        path = begun(rays, rng, self._spread)
-        path = chosen(path, dr.compress(self._meet(LightCache(), path).goes_on))
-        self._follow(radiance, cache, path, 0, heard, square)
+        self._follow(radiance, cache, begun(rays, rng, self._spread), 0, heard, square)
         return radiance
 
     def gathered(
@@ -187,16 +207,17 @@ class Shader:
         while bounce < BOUNCES and dr.width(path.lane):
             # The first bounce off what is seen counts; then faint paths are ended at random.
             least = 1.0 if bounce == 0 else LEAST_CHANCE
-            most = MOST_CHANCE[min(bounce, len(MOST_CHANCE) - 1)]
             first = None if square is None else dr.gather(Array4f, square, path.lane)
             dr.eval(first)
             square = None
-            direct, step = self._go_on(cache, path, opaque(least), opaque(most), first)
+            direct, step = self._go_on(cache, path, opaque(least), first)
             scatter_add(radiance, direct, path.lane)
             scatter_add(radiance, step.sent, step.path.lane)
             self._add_missing(radiance, cache, step, jitter=jitter, heard=heard)
             path = chosen(step.path, dr.compress(step.goes_on))
             bounce += 1
+        if dr.width(path.lane):
+            scatter_add(radiance, self._finish(path), path.lane)
 
     def _add_missing(
         self,
@@ -225,10 +246,12 @@ class Shader:
         missing: Any = dr.compress(step.is_missing)
         further = LightCache(cells=cache.cells) if is_asked else cache
         if (further.pages or further.cells) and dr.width(missing):
-            found = self._look_up(further, chosen(path, missing), opaque(jitter))
-            scatter_add(radiance, found.sent, found.path.lane)
-            still: Any = dr.compress(found.is_missing)
-            missing = dr.gather(UInt, padded(missing)[0], still)
+            lanes, is_real = padded(missing)
+            spot, rng = dr.gather(_Spot, step.spot, lanes), dr.gather(PCG32, path.rng, lanes)
+            dr.eval(spot, rng)
+            found, is_missing = self._look_up(further, spot, rng, opaque(jitter))
+            scatter_add(radiance, dr.select(is_real, found, 0.0), dr.gather(UInt, path.lane, lanes))
+            missing = dr.gather(UInt, lanes, dr.compress(is_missing & is_real))
         if not dr.width(missing):
             return
         unknown = chosen(path, missing)
@@ -246,41 +269,28 @@ class Shader:
     def _met(self, cache: LightCache, path: Path) -> tuple[Any, _Step]:
         """What is emitted where rays meet a surface; and what it scatters, as far as that is known."""
         lit = self._renderer.lit(path.rays, path.bounce)
-        albedo, is_diffuse = _diffuse(lit)
-        found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
-        sent = path.throughput * dr.select(is_diffuse & is_known, albedo * found, 0.0)
-        carries = path.carries
-        is_missing = is_diffuse & ~is_known & carries
-        step = _Step(Array3f(sent), Bool(is_missing), Bool(lit.has_lobe & carries), path)
+        albedo, carries = lit.surfaces.albedo, path.carries
+        is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
+        spot = _Spot(
+            position=lit.position,
+            normal=lit.surfaces.normal,
+            item=lit.surfaces.item,
+            width=path.width_at(lit),
+            weight=dr.select(is_diffuse & carries, path.throughput * albedo, 0.0),
+        )
+        sent, is_missing = _known(cache, spot)
+        step = _Step(sent, is_missing, Bool(lit.has_lobe & carries), path, spot)
         return Array3f(path.throughput * lit.emission), step
 
-    def _look_up_kernel(self, cache: LightCache, path: Path, jitter: Any) -> _Step:
-        """What the diffuse lobes send, by pages and cells."""
-        lit = self._renderer.lit(path.rays, path.bounce)
-        albedo, is_diffuse = _diffuse(lit)
-        found, is_known = cache.find(lit.position, lit.surfaces.normal, lit.surfaces.item)
-        if cache.cells:
-            rng = PCG32(path.rng)
-            rng.state ^= UNRELATED
-            moved = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
-            moved = 0.5 + jitter * (moved - 0.5)
-            light, is_in_cell = cache.cells.find(
-                lit.position, lit.surfaces.normal, lit.surfaces.item, path.width_at(lit), moved
-            )
-            found = dr.select(is_known, found, light)
-            is_known |= is_in_cell
-        sent = dr.select(is_diffuse & is_known, path.throughput * albedo * found, 0.0)
-        return _Step(Array3f(sent), Bool(is_diffuse & ~is_known & path.carries), Bool(False), path)
-
     def _go_on_kernel(
-        self, cache: LightCache, path: Path, least: Any, most: Any, square: Any
+        self, cache: LightCache, path: Path, least: Any, square: Any
     ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce)
         scattered = self._renderer.scatter(lit, rng if square is None else Leading(square, rng))
         throughput = path.throughput * scattered.throughput
-        chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, most)
+        chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, 1.0)
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
         blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
         ahead = Path(
@@ -293,11 +303,11 @@ class Shader:
             rng=rng,
         )
         emitted, step = self._met(cache, ahead)
-        return Array3f(path.throughput * scattered.direct), _Step(
+        return Array3f(path.throughput * scattered.direct), replace(
+            step,
             sent=dr.select(is_alive, emitted + step.sent, 0.0),
             is_missing=Bool(step.is_missing & is_alive),
             goes_on=Bool(step.goes_on & is_alive),
-            path=ahead,
         )
 
     def _gather_kernel(self, cache: LightCache, path: Path, square: Any) -> tuple[Any, _Step]:
@@ -328,6 +338,13 @@ class Shader:
         keys = tuple(cell_key(*at, level) for level in range(LEVELS))
         return Array3f(path.throughput * lit.surfaces.albedo), light, keys, rng
 
+    def _finish_kernel(self, path: Path) -> Any:
+        """What the other lobes of the surfaces that rays meet send, by path tracing."""
+        rng = PCG32(path.rng)
+        lit = self._renderer.lit(path.rays, path.bounce)
+        direct, indirect = self._renderer.rest(lit, rng, edges=BOUNCES + 1)
+        return Array3f(path.throughput * (direct + indirect))
+
 
 def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any, count: int) -> None:
     values = rows(light)[:count]
@@ -335,7 +352,21 @@ def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any,
         heard(Estimates.of(np.array(key)[:count], values))
 
 
-def _diffuse(lit: Lit) -> tuple[Any, Any]:
-    """Albedo, and where it is worth looking up light."""
-    albedo = lit.surfaces.albedo
-    return albedo, lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
+def _known(cache: LightCache, spot: _Spot) -> tuple[Any, Any]:
+    """What diffuse lobes send, and where it is not known."""
+    found, is_known = cache.find(spot.position, spot.normal, spot.item)
+    return Array3f(dr.select(is_known, spot.weight * found, 0.0)), Bool(~is_known & spot.counts)
+
+
+def _look_up_kernel(cache: LightCache, spot: _Spot, rng: Any, jitter: Any) -> tuple[Any, Any]:
+    """What diffuse lobes send by pages and cells, and where it is not known."""
+    sent, is_missing = _known(cache, spot)
+    if cache.cells:
+        rng = PCG32(rng)
+        rng.state ^= UNRELATED
+        moved = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+        moved = 0.5 + jitter * (moved - 0.5)
+        light, is_in_cell = cache.cells.find(spot.position, spot.normal, spot.item, spot.width, moved)
+        sent = dr.select(is_missing & is_in_cell, spot.weight * light, sent)
+        is_missing &= ~is_in_cell
+    return sent, is_missing

@@ -56,8 +56,14 @@ class Light:
 
     def light(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
-        lobe = self.scatter_diffuse(lit, rng)
-        # What the path tracer finds in the direction of the lobe, its first emitter weighted.
+        return self._onward(self.scatter_diffuse(lit, rng), rng, edges)
+
+    def rest(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LightRenderer.rest`."""
+        return self._onward(self.scatter(lit, rng), rng, edges)
+
+    def _onward(self, lobe: Scattered, rng: Any, edges: int) -> tuple[Any, Any]:
+        """What a lobe sends: sampled lights, and what the path tracer finds, its first emitter weighted."""
         found = self._radiance(lobe.rays, rng, edges)
         ray = mi.Ray3f(mi.Point3f(lobe.rays.origin), mi.Vector3f(lobe.rays.direction))
         following = self._scene.ray_intersect(ray, lobe.is_alive)

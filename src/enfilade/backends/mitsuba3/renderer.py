@@ -27,6 +27,7 @@ from enfilade.pixels.estimate import estimate
 from enfilade.pixels.replay import recorded
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import (
+    MOST_EDGES,
     Bounce,
     Lit,
     PixelFilter,
@@ -77,7 +78,7 @@ class MitsubaRenderer:
         self._scene = scene
         self._chunk = settings.chunk
         self._integrator = _integrator(scene, settings.max_depth)
-        self._onward = [_shortened(self._integrator, edges) for edges in (1, 2)]
+        self._onward = [_shortened(self._integrator, edges) for edges in range(1, MOST_EDGES + 1)]
         self._sampler = _lane_sampler()
         self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
@@ -130,6 +131,10 @@ class MitsubaRenderer:
     def light(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""
         return self._light.light(lit, rng, edges)
+
+    def rest(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LightRenderer.rest`."""
+        return self._light.rest(lit, rng, edges)
 
     def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
         """See :meth:`enfilade.renderer.LightRenderer.scatter_diffuse`."""
