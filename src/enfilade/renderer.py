@@ -247,7 +247,7 @@ class LightRenderer(Renderer, Protocol):
         """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
         ...
 
-    def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
+    def lit(self, rays: Rays, bounce: Bounce | None = None, active: Any = True) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
         Parameters
@@ -255,6 +255,8 @@ class LightRenderer(Renderer, Protocol):
         rays
         bounce
             Where the rays come from; None for camera rays.
+        active : Bool
+            Rays that are traced; others hit nothing.
         """
         ...
 

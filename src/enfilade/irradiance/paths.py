@@ -44,7 +44,7 @@ class Path:
 
     @property
     def carries(self) -> Any:
-        """Whether it brings anything: those that only fill up a list do not; Bool."""
+        """Whether it brings anything: those that have ended or only fill up a list do not; Bool."""
         return dr.max(dr.abs(self.throughput)) > 0.0
 
     def width_at(self, lit: Lit) -> Any:

@@ -268,18 +268,18 @@ class Shader:
 
     def _met(self, cache: LightCache, path: Path) -> tuple[Any, _Step]:
         """What is emitted where rays meet a surface; and what it scatters, as far as that is known."""
-        lit = self._renderer.lit(path.rays, path.bounce)
-        albedo, carries = lit.surfaces.albedo, path.carries
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
+        albedo = lit.surfaces.albedo
         is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
         spot = _Spot(
             position=lit.position,
             normal=lit.surfaces.normal,
             item=lit.surfaces.item,
             width=path.width_at(lit),
-            weight=dr.select(is_diffuse & carries, path.throughput * albedo, 0.0),
+            weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
         )
         sent, is_missing = _known(cache, spot)
-        step = _Step(sent, is_missing, Bool(lit.has_lobe & carries), path, spot)
+        step = _Step(sent, is_missing, Bool(lit.has_lobe), path, spot)
         return Array3f(path.throughput * lit.emission), step
 
     def _go_on_kernel(
@@ -287,7 +287,7 @@ class Shader:
     ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
         scattered = self._renderer.scatter(lit, rng if square is None else Leading(square, rng))
         throughput = path.throughput * scattered.throughput
         chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, 1.0)
@@ -297,23 +297,18 @@ class Shader:
             lane=path.lane,
             rays=scattered.rays,
             bounce=scattered.bounce,
-            throughput=Array3f(throughput / chance),
+            throughput=Array3f(dr.select(is_alive, throughput / chance, 0.0)),
             width=path.width_at(lit),
             spread=dr.maximum(path.spread, blur),
             rng=rng,
         )
         emitted, step = self._met(cache, ahead)
-        return Array3f(path.throughput * scattered.direct), replace(
-            step,
-            sent=dr.select(is_alive, emitted + step.sent, 0.0),
-            is_missing=Bool(step.is_missing & is_alive),
-            goes_on=Bool(step.goes_on & is_alive),
-        )
+        return Array3f(path.throughput * scattered.direct), replace(step, sent=emitted + step.sent)
 
     def _gather_kernel(self, cache: LightCache, path: Path, square: Any) -> tuple[Any, _Step]:
         """Scatter off the diffuse lobe that the rays meet, and meet the next surface."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
         lobe = self._renderer.scatter_diffuse(lit, Leading(square, rng))
         ahead = Path(
             lane=path.lane,
@@ -330,7 +325,7 @@ class Shader:
     def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
         """Light where rays meet a surface, by path tracing, with its weight in the image and its cells."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
         width = path.width_at(lit)
         direct, indirect = self._renderer.light(lit, rng, edges=2 if path.bounce else 1)
         light = Array3f(direct + indirect)
@@ -341,7 +336,7 @@ class Shader:
     def _finish_kernel(self, path: Path) -> Any:
         """What the other lobes of the surfaces that rays meet send, by path tracing."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
         direct, indirect = self._renderer.rest(lit, rng, edges=BOUNCES + 1)
         return Array3f(path.throughput * (direct + indirect))
 

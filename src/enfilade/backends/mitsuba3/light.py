@@ -12,7 +12,7 @@ from enfilade.arrays import Array3f, Bool
 from enfilade.backends.mitsuba3.lobes import LEAST_ALBEDO, Lobes
 from enfilade.renderer import Bounce, Lit, Rays, Scattered
 
-Radiance = Callable[[Rays, Any, int], Any]
+Radiance = Callable[[Rays, Any, int, Any], Any]
 
 
 class Light:
@@ -22,8 +22,8 @@ class Light:
     ----------
     scene : mitsuba.Scene
     radiance
-        The path tracer: radiance along rays, given a random number generator for each, and how many edges
-        their paths have behind them.
+        The path tracer: radiance along rays, given a random number generator for each, how many edges
+        their paths have behind them, and which are to be traced.
     """
 
     def __init__(self, scene: Any, radiance: Radiance) -> None:
@@ -64,7 +64,7 @@ class Light:
 
     def _onward(self, lobe: Scattered, rng: Any, edges: int) -> tuple[Any, Any]:
         """What a lobe sends: sampled lights, and what the path tracer finds, its first emitter weighted."""
-        found = self._radiance(lobe.rays, rng, edges)
+        found = self._radiance(lobe.rays, rng, edges, lobe.is_alive)
         ray = mi.Ray3f(mi.Point3f(lobe.rays.origin), mi.Vector3f(lobe.rays.direction))
         following = self._scene.ray_intersect(ray, lobe.is_alive)
         whole = following.emitter(self._scene).eval(following, lobe.is_alive)

@@ -113,13 +113,13 @@ class MitsubaRenderer:
         own = self._scene, self._integrator, self._onward, items.number, items.is_passable, items.materials
         return own, self._light.state
 
-    def lit(self, rays: Rays, bounce: Bounce | None = None) -> Lit:
+    def lit(self, rays: Rays, bounce: Bounce | None = None, active: Any = True) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
         Camera rays look through masks as :meth:`surfaces` does; scattered ones meet them as Mitsuba's own
         paths do.
         """
-        surfaces, seen = self._find(rays, from_camera=bounce is None)
+        surfaces, seen = self._find(rays, active, from_camera=bounce is None)
         return Lit(
             surfaces=surfaces,
             position=Array3f(seen.p),
@@ -144,14 +144,14 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
         return self._light.scatter(lit, rng, choice)
 
-    def _find(self, rays: Rays, *, from_camera: bool = True) -> tuple[Surfaces, Any]:
+    def _find(self, rays: Rays, active: Any = True, *, from_camera: bool = True) -> tuple[Surfaces, Any]:
         direction = mi.Vector3f(rays.direction)
         length = dr.norm(direction)
         ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
         if from_camera:
-            seen, distance = self._visible(ray)
+            seen, distance = self._visible(ray, Bool(active))
         else:
-            seen = self._scene.ray_intersect(ray)
+            seen = self._scene.ray_intersect(ray, Bool(active))
             distance = seen.t
 
         is_hit = seen.is_valid()
@@ -189,22 +189,22 @@ class MitsubaRenderer:
             random=random,
         )
 
-    def _radiance_onward(self, rays: Rays, rng: Any, edges: int) -> Any:
+    def _radiance_onward(self, rays: Rays, rng: Any, edges: int, active: Any) -> Any:
         """Along rays that have edges of their path behind them."""
-        return self._radiance(rays, rng, self._onward[edges - 1])
+        return self._radiance(rays, rng, self._onward[edges - 1], active)
 
-    def _radiance(self, rays: Rays, rng: Any, integrator: Any = None) -> Any:
+    def _radiance(self, rays: Rays, rng: Any, integrator: Any = None, active: Any = True) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         self._sampler.rng = rng
         integrator = integrator or self._integrator
-        radiance, _, _ = integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray))
+        radiance, _, _ = integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray), None, active)
         # Nothing may be kept that holds NumPy's memory: it can't be let go while a kernel is recorded.
         self._sampler.rng = None
         return radiance
 
-    def _visible(self, ray: Any) -> tuple[Any, Any]:
+    def _visible(self, ray: Any, active: Any) -> tuple[Any, Any]:
         """First interaction of camera rays whose surface does not let the ray pass, and its distance."""
-        seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True))
+        seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
         distance = Float(seen.t)
         if not self._items.any_passable:
             return seen, distance
