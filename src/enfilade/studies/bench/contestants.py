@@ -58,6 +58,11 @@ PRESETS = (
     Preset("paper-16", "paper", {"trace": {"spp": 16}}),
     Preset("paper-64", "paper", {"trace": {"spp": 64}}),
     Preset(
+        "decoupled-60",
+        "decoupled",
+        {"light": {"quality": 60.0, "samples": 8, "least_lobe_samples": 2, "lobe_samples": 8}},
+    ),
+    Preset(
         "decoupled-30",
         "decoupled",
         {"light": {"quality": 30.0, "samples": 8, "least_lobe_samples": 4, "lobe_samples": 8}},
