@@ -44,14 +44,18 @@ def folder_of(bench: Path, contestant: dict) -> Path:
     return bench / "contestants" / contestant["name"]
 
 
+def frames_of(folder: Path) -> list[Path]:
+    """The frames of a reference or of a contestant, in order."""
+    return sorted((folder / "frames" if (folder / "frames").is_dir() else folder).glob("*.exr"))
+
+
 def spectra(folder: Path, every: int) -> list[np.ndarray]:
     """Fourier transforms of the encoded luminance of some frames, windowed."""
     from enfilade.codec import read_exr
     from enfilade.pixels.tone import luminance, srgb_encode
 
-    folder = folder / "frames" if (folder / "frames").is_dir() else folder
     found = []
-    for file in sorted(folder.glob("*.exr"))[::every]:
+    for file in frames_of(folder)[::every]:
         color = np.clip(read_exr(file)["RGB"].astype(np.float32), 0.0, 1.0)
         image = luminance(srgb_encode(color))
         window = np.outer(np.hanning(image.shape[0]), np.hanning(image.shape[1]))

@@ -282,9 +282,7 @@ class Shader:
         step = _Step(sent, is_missing, Bool(lit.has_lobe), path, spot)
         return Array3f(path.throughput * lit.emission), step
 
-    def _go_on_kernel(
-        self, cache: LightCache, path: Path, least: Any, square: Any
-    ) -> tuple[Any, _Step]:
+    def _go_on_kernel(self, cache: LightCache, path: Path, least: Any, square: Any) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce, path.carries)

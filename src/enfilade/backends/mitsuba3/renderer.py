@@ -197,7 +197,9 @@ class MitsubaRenderer:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         self._sampler.rng = rng
         integrator = integrator or self._integrator
-        radiance, _, _ = integrator.sample(self._scene, self._sampler, mi.RayDifferential3f(ray), None, active)
+        radiance, _, _ = integrator.sample(
+            self._scene, self._sampler, mi.RayDifferential3f(ray), None, active
+        )
         # Nothing may be kept that holds NumPy's memory: it can't be let go while a kernel is recorded.
         self._sampler.rng = None
         return radiance

@@ -1,0 +1,66 @@
+"""What pops or flickers in what each contestant of a bench made: broad errors, and how they change over time.
+
+    python benchmarks/stability.py BENCH [--block 8]
+
+BENCH is the folder of an `enfilade bench`. Encoded colours less those of the reference with the same pixel
+filter, averaged over blocks of pixels, where noise that is seen as grain goes away: as RMS, and as RMS of the
+change from one frame to the next, for the median and the worst frame. What pops at a keyframe is a worst
+frame far above the median. The mean is over all pixels and frames, by that of the reference.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from sharpness import folder_of, frames_of
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("bench", type=Path)
+    parser.add_argument("--block", type=int, default=8, help="width of a block, pixels")
+    arguments = parser.parse_args()
+    found = json.loads((arguments.bench / "bench.json").read_text())
+    print(f"{'':<18}{'error':>10}{'change':>10}{'worst':>10}{'in frame':>10}{'mean':>10}")
+    for contestant in found["contestants"]:
+        reference = arguments.bench / "references" / f"reference-{contestant['pixel_filter']}"
+        files = frames_of(reference)
+        folder = frames_of(folder_of(arguments.bench, contestant))
+        error, change, mean = broad_errors(folder, files, arguments.block)
+        worst = int(change.argmax())
+        numbers = f"{error:>10.4f}{np.median(change):>10.4f}{change[worst]:>10.4f}"
+        print(f"{contestant['name']:<18}{numbers}{files[worst + 1].stem:>10}{mean:>10.4f}")
+
+
+def broad_errors(files: list[Path], references: list[Path], block: int) -> tuple[float, np.ndarray, float]:
+    """RMS over all frames, RMS of the change from each frame to the next, and the mean by the reference's."""
+    errors, sums = [], np.zeros(2)
+    for file, reference in zip(files, references, strict=True):
+        one, other = encoded(file), encoded(reference)
+        errors.append(averaged(one - other, block))
+        sums += one.mean(), other.mean()
+    difference = np.array(errors)
+    change = np.sqrt((np.diff(difference, axis=0) ** 2).mean(axis=(1, 2, 3)))
+    return float(np.sqrt((difference**2).mean())), change, float(sums[0] / sums[1])
+
+
+def encoded(file: Path) -> np.ndarray:
+    """Colours as a display is sent them, (H, W, 3)."""
+    from enfilade.codec import read_exr
+    from enfilade.pixels.tone import srgb_encode
+
+    return srgb_encode(np.clip(read_exr(file)["RGB"].astype(np.float32), 0.0, 1.0))
+
+
+def averaged(image: np.ndarray, block: int) -> np.ndarray:
+    """Means of square blocks; what fills none at the right and at the bottom is left out."""
+    rows, columns = (size // block for size in image.shape[:2])
+    whole = image[: rows * block, : columns * block]
+    return whole.reshape(rows, block, columns, block, 3).mean(axis=(1, 3))
+
+
+if __name__ == "__main__":
+    main()
