@@ -7,6 +7,8 @@ positions and normals (``P``, ``N``) and ``.R .G .B`` for the rest; the layer ``
 from __future__ import annotations
 
 import contextlib
+import functools
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -23,6 +25,7 @@ __all__ = ["Array", "exr_pixels", "read_attributes", "read_exr", "write_exr"]
 
 Array = npt.NDArray[Any]
 
+MOST_THREADS = 8  # that pack pixels
 MAX_PIXELS = 1 << 28  # of a file that is read: 16384 x 16384; checked before memory is taken
 MAGIC = b"\x76\x2f\x31\x01"  # first bytes of every OpenEXR file
 DIRECTIONS = frozenset({"P", "N"})  # layers whose three channels are X Y Z
@@ -63,6 +66,7 @@ def write_exr(
     if taken := STANDARD.intersection(extra):
         raise ValueError(f"OpenEXR keeps these attributes for itself: {', '.join(sorted(taken))}")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **extra}
+    _start_threads()
     with whole_file(file) as beside:
         beside.touch()  # where it can't be, the operating system says why, which OpenEXR does not
         try:
@@ -129,6 +133,12 @@ def read_attributes(file: Path) -> dict[str, Any]:
         The file is missing, is no OpenEXR, or its header is damaged.
     """
     return {name: value for name, value in _part_headers(file)[0].items() if name not in STANDARD}
+
+
+@functools.cache
+def _start_threads() -> None:
+    """Let OpenEXR pack several blocks of lines at a time; it does not by itself."""
+    OpenEXR.set_global_thread_count(min(len(os.sched_getaffinity(0)), MOST_THREADS))
 
 
 def _channels(layers: Mapping[str, Array]) -> dict[str, Array]:

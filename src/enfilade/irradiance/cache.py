@@ -21,6 +21,7 @@ BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a 
 PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
 
+EVEN = 0.5  # of the spread of rays that share out their directions evenly counts as noise
 SPECKLE = 2.0  # times the brightest of its neighbours that a pixel may be
 LEVELS = 4  # of the wavelet that smooths a page
 DEVIATIONS = 3.0  # of the luminance, across which it smooths
@@ -122,7 +123,8 @@ def smoothed(geometry: Geometry, shading: Shading) -> Shading:
     """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left."""
     # Virtual images: their normals are not those of the planes in which they seem to lie.
     geometry = replace(geometry, depth=np.where(geometry.item < BEHIND, geometry.depth, np.float32(0)))
-    light, variance = _smooth(geometry, geometry.item, _even(shading), lanes(shading.variance))
+    noise = EVEN * lanes(shading.variance)
+    light, variance = _smooth(geometry, geometry.item, _without_speckles(shading), noise)
     size = shading.variance.shape
     light = with_soft_edges(
         light, lanes(geometry.item), width=size[1], height=size[0], sigma=GAUSSIAN_SIGMA_PX
@@ -179,7 +181,7 @@ def _fronts(geometry: Geometry) -> Any:
     return dr.select(is_real, lanes(geometry.normal), toward)
 
 
-def _even(shading: Shading) -> Any:
+def _without_speckles(shading: Shading) -> Any:
     height, width = shading.variance.shape
     return without_speckles(lanes(shading.color), width=width, height=height, times=SPECKLE)
 

@@ -251,7 +251,8 @@ class Shader:
             dr.eval(spot, rng)
             found, is_missing = self._look_up(further, spot, rng, opaque(jitter))
             scatter_add(radiance, dr.select(is_real, found, 0.0), dr.gather(UInt, path.lane, lanes))
-            missing = dr.gather(UInt, lanes, dr.compress(is_missing & is_real))
+            still: Any = dr.compress(is_missing & is_real)
+            missing = dr.gather(UInt, lanes, still)
         if not dr.width(missing):
             return
         unknown = chosen(path, missing)
