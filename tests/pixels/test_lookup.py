@@ -5,7 +5,7 @@ import pytest
 
 from enfilade.arrays import Array3f, UInt, lanes, matrix3, vector3
 from enfilade.camera import Camera, look_at
-from enfilade.pixels.lookup import FLOOR, Page, footprint, lookup
+from enfilade.pixels.lookup import FLOOR, Page, footprint, lookup, packed
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
@@ -24,11 +24,12 @@ def page():
     return depth, item, value
 
 
-def found(page, points, item, normal=(0.0, 0.0, 1.0)):
+def found(page, points, item, normal=(0.0, 0.0, 1.0), normals=None):
     depth, items, value = page
     opened = Page(
         depths=lanes(depth),
         items=lanes(items),
+        normals=None if normals is None else packed(lanes(normals)),
         values=(lanes(value), 2.0 * lanes(value)),
         variances=(lanes(value[..., 0]), lanes(value[..., 1])),
         eye=vector3(CAMERA.eye),
@@ -68,6 +69,29 @@ def test_it_does_what_loops_do(page, item):
     np.testing.assert_allclose(np.array(got.totals[0]).T, [t for t, _ in wanted], atol=5e-4)
     np.testing.assert_allclose(np.array(got.totals[1]), 2.0 * np.array(got.totals[0]), rtol=1e-5)
     assert 0.2 < np.mean([w > 0 for _, w in wanted]) < 0.8
+
+
+def test_pixels_whose_surface_is_turned_count_by_the_cosine(page):
+    points = np.random.default_rng(3).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
+    turned = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    turned[..., 0], turned[..., 2] = np.sin(1.1), np.cos(1.1)
+    plain, got = found(page, points, 1), found(page, points, 1, normals=turned)
+    np.testing.assert_allclose(np.array(got.weight), np.cos(1.1) * np.array(plain.weight), atol=3e-3)
+    other_way = found(page, points, 1, normals=turned * np.float32([1, 1, -1]))
+    assert not np.array(other_way.weight).any()
+
+
+def test_of_two_surfaces_that_meet_that_with_the_normal_counts_alone(page):
+    upright = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    upright[::2, :, 2], upright[1::2, :, 1] = 1.0, 1.0
+    depth, items, value = page
+    value[::2], value[1::2] = 1.0, 5.0
+    points = np.random.default_rng(4).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
+    got = found((depth, items, value), points, 1, normals=upright)
+    weight = np.array(got.weight)
+    known = weight > 0.05
+    assert known.any()
+    np.testing.assert_allclose(np.array(got.totals[0])[:, known] / weight[known], 1.0, atol=0.02)
 
 
 def test_the_other_side_of_a_surface_is_not_known(page):

@@ -12,7 +12,7 @@ import numpy as np
 from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
 from enfilade.irradiance.cells import Cells
 from enfilade.pixels.estimate import GAUSSIAN_SIGMA_PX, LUMINANCE
-from enfilade.pixels.lookup import Page, footprint, lookup
+from enfilade.pixels.lookup import Page, footprint, lookup, packed
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, without_speckles
 from enfilade.records import F32, U32, Geometry, LightPage, Mask, Shading
@@ -160,7 +160,9 @@ def over_time(
     total, weight = Array3f(color), Float(1)
     luminance = dr.dot(color, Array3f(*LUMINANCE))
     for (around, shading, known), share in zip(others, shares, strict=True):
-        page = _page(around, lanes(known), [(lanes(shading.color), lanes(shading.variance))])
+        page = _page(
+            around, lanes(known), [(lanes(shading.color), lanes(shading.variance))], has_normals=False
+        )
         found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
@@ -251,12 +253,15 @@ def _points(geometry: Geometry) -> Any:
     return vector3(camera.eye) + lanes(geometry.depth) * direction
 
 
-def _page(geometry: Geometry, is_known: Any, layers: Sequence[tuple[Any, Any]]) -> Page:
+def _page(
+    geometry: Geometry, is_known: Any, layers: Sequence[tuple[Any, Any]], *, has_normals: bool = True
+) -> Page:
     """A page in memory of Dr.Jit's own: what shares NumPy's can't be freed while a kernel is recorded."""
     camera = geometry.camera
     page = Page(
         depths=dr.select(is_known, lanes(geometry.depth), 0.0),
         items=dr.select(is_known, lanes(geometry.item), 0),
+        normals=packed(lanes(geometry.normal)) if has_normals else None,
         values=tuple(dr.select(is_known, light, 0.0) for light, _ in layers),
         variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
         eye=vector3(camera.eye),
@@ -265,5 +270,5 @@ def _page(geometry: Geometry, is_known: Any, layers: Sequence[tuple[Any, Any]]) 
         width=camera.width,
         height=camera.height,
     )
-    dr.eval(page.depths, page.items, page.values, page.variances)
+    dr.eval(page.depths, page.items, page.normals, page.values, page.variances)
     return page

@@ -9,6 +9,7 @@ import drjit as dr
 
 from enfilade.arrays import Array3f, Float, Int, UInt
 
+SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 FLOOR = 1e-3  # weight that each agreeing tap has at least: a lone one at the border still counts
 
 
@@ -21,6 +22,8 @@ class Page:
     depths : Float
     items : UInt
         Images, width * height lanes; where a pixel is not known, its depth is 0.
+    normals : UInt or None
+        The same, of :func:`packed`. None for surfaces whose normals say nothing.
     values : tuple of Array3f
     variances : tuple of Float
         The same, one a layer.
@@ -32,6 +35,7 @@ class Page:
 
     depths: Any
     items: Any
+    normals: Any | None
     values: tuple[Any, ...]
     variances: tuple[Any, ...]
     eye: Any
@@ -65,7 +69,8 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
 
     Of the four pixels around a point's projection those count that see the same item, within a
     tolerance of the point's own tangent plane: surfaces that hide it, or that meet it at an edge,
-    do not. A page that looked at the other side of the surface knows nothing.
+    do not. Those whose normals differ count less, by the cosine: the light on them differs, too. A page
+    that looked at the other side of the surface knows nothing.
 
     Parameters
     ----------
@@ -107,11 +112,25 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
             is_same = is_inside & (dr.gather(UInt, page.items, lane, is_inside) == item)
             is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
             share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
+            if page.normals is not None:
+                turned = dr.dot(normal, _unpacked(dr.gather(UInt, page.normals, lane, is_inside))) * scale
+                share *= dr.maximum(turned, 0.0)
             for layer, (value, variance) in enumerate(zip(page.values, page.variances, strict=True)):
                 totals[layer] += share * dr.gather(Array3f, value, lane, is_same)
                 variances[layer] += share * dr.gather(Float, variance, lane, is_same)
             weight += share
     return Found(tuple(totals), tuple(variances), weight)
+
+
+def packed(normal: Any) -> Any:
+    """Unit vectors in 32 bits each, ten an axis; UInt."""
+    x, y, z = (UInt(dr.round(dr.clip(0.5 + 0.5 * axis, 0.0, 1.0) * SCALE)) for axis in normal)
+    return x | (y << 10) | (z << 20)
+
+
+def _unpacked(word: Any) -> Any:
+    """Vectors of :func:`packed`; Array3f."""
+    return Array3f(word & 1023, (word >> 10) & 1023, word >> 20) * (2.0 / SCALE) - 1.0
 
 
 def footprint(position: Any, normal: Any, eye: Any) -> Any:
