@@ -140,8 +140,6 @@ def _missing(film: Film, seen: SeenRun) -> list[str]:
     ]
     if incomplete:
         notes.append(f"not every frame has the layers: {', '.join(incomplete)}")
-    if not seen.figures["segments"] and seen.identity["method"] != "paper":
-        notes.append(f"the method {seen.identity['method']} has no predictions for segments")
     return notes
 
 
