@@ -92,3 +92,17 @@ def test_estimates_that_are_not_finite_are_left_out():
 def test_few_estimates_are_not_believed(count):
     estimates = Estimates.joined([Estimates.of(np.full(count, 9, np.uint64), np.ones((count, 3)))])
     assert estimates.opened() is None
+
+
+def test_where_the_cell_next_door_is_unknown_the_point_finds_its_own():
+    point, up = np.float32([[0.1, 0.2, 0.01]]), np.float32([[0.0, 0.0, 1.0]])
+    own = Estimates.of(np.repeat(keys(point, up, 0.5), LEAST_ESTIMATES), np.ones((LEAST_ESTIMATES, 3)))
+    beside = keys(point + np.float32([0.0, 0.0, -0.1]), up, 0.5)
+    assert beside != keys(point, up, 0.5)
+    at = Array3f(point.T), Array3f(up.T), UInt(1), Float(0.5)
+    below = Array3f(0.5, 0.5, 0.0)  # half a cell down: nothing is known there
+    light, is_known = own.opened().find(*at, below)
+    assert np.array(is_known).all()
+    np.testing.assert_allclose(np.array(light), 1.0)
+    both = Estimates.joined([own, Estimates.of(np.repeat(beside, LEAST_ESTIMATES), np.full((4, 3), 7.0))])
+    np.testing.assert_allclose(np.array(both.opened().find(*at, below)[0]), 7.0)

@@ -16,9 +16,9 @@ from enfilade.irradiance.paths import Path, begun, chosen, padded, scatter_add
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
 from enfilade.pixels.replay import recorded
-from enfilade.renderer import LightRenderer, Rays
+from enfilade.renderer import MOST_EDGES, LightRenderer, Rays
 
-BOUNCES = 3  # off lobes that are followed from cache to cache; what goes on then is path traced to its end
+BOUNCES = MOST_EDGES - 1  # off lobes, from cache to cache; what goes on then is path traced to its end
 BRIGHT = 4.0  # one over the throughput below which a path is faint
 LEAST_CHANCE = 0.05  # of a faint path to go on
 BLACK = 1e-4  # albedo below which no light is looked up
@@ -336,7 +336,7 @@ class Shader:
         """What the other lobes of the surfaces that rays meet send, by path tracing."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce, path.carries)
-        direct, indirect = self._renderer.rest(lit, rng, edges=BOUNCES + 1)
+        direct, indirect = self._renderer.rest(lit, rng, edges=MOST_EDGES)
         return Array3f(path.throughput * (direct + indirect))
 
 

@@ -97,7 +97,7 @@ def write_page(folder: Path, file: Path, wishes: Wishes, monitor: Monitor) -> li
         *view_notes,
         *(against.notes if against else []),
         *film.notes,
-        *_missing(film, seen),
+        *_missing(film),
     ]
     if dropped := seen.figures["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
@@ -126,7 +126,7 @@ def _view(seen: SeenRun) -> tuple[View, list[str]]:
         return plain, [f"shown with the sRGB view, not that of the run: {error}"]
 
 
-def _missing(film: Film, seen: SeenRun) -> list[str]:
+def _missing(film: Film) -> list[str]:
     if not film.frames:
         return []
     notes = []
