@@ -5,7 +5,7 @@
 BENCH is the folder of an `enfilade bench`. Encoded colours less those of the reference with the same pixel
 filter, averaged over blocks of pixels, where noise that is seen as grain goes away: as RMS, and as RMS of the
 change from one frame to the next, for the median and the worst frame. What pops at a keyframe is a worst
-frame far above the median. The mean is over all pixels and frames, by that of the reference.
+frame far above the median. The mean is that of linear radiance over all pixels and frames, by the reference's.
 """
 
 import argparse
@@ -39,20 +39,26 @@ def broad_errors(files: list[Path], references: list[Path], block: int) -> tuple
     """RMS over all frames, RMS of the change from each frame to the next, and the mean by the reference's."""
     errors, sums = [], np.zeros(2)
     for file, reference in zip(files, references, strict=True):
-        one, other = encoded(file), encoded(reference)
-        errors.append(averaged(one - other, block))
+        one, other = radiance(file), radiance(reference)
+        errors.append(averaged(encoded(one) - encoded(other), block))
         sums += one.mean(), other.mean()
     difference = np.array(errors)
     change = np.sqrt((np.diff(difference, axis=0) ** 2).mean(axis=(1, 2, 3)))
     return float(np.sqrt((difference**2).mean())), change, float(sums[0] / sums[1])
 
 
-def encoded(file: Path) -> np.ndarray:
-    """Colours as a display is sent them, (H, W, 3)."""
+def radiance(file: Path) -> np.ndarray:
+    """Linear colours of a frame, (H, W, 3)."""
     from enfilade.codec import read_exr
+
+    return read_exr(file)["RGB"].astype(np.float32)
+
+
+def encoded(color: np.ndarray) -> np.ndarray:
+    """Colours as a display is sent them."""
     from enfilade.pixels.tone import srgb_encode
 
-    return srgb_encode(np.clip(read_exr(file)["RGB"].astype(np.float32), 0.0, 1.0))
+    return srgb_encode(np.clip(color, 0.0, 1.0))
 
 
 def averaged(image: np.ndarray, block: int) -> np.ndarray:
