@@ -5,7 +5,7 @@
 BENCH is the folder of an `enfilade bench`. Encoded colours less those of the reference with the same pixel
 filter, averaged over blocks of pixels, where noise that is seen as grain goes away: as RMS, and as RMS of the
 change from one frame to the next, for the median and the worst frame. What pops at a keyframe is a worst
-frame far above the median. The mean is that of linear radiance over all pixels and frames, by the reference's.
+frame far above the median. The mean is of linear radiance over all pixels and frames, by the reference's.
 """
 
 import argparse
