@@ -105,10 +105,12 @@ def test_transparent_frames_are_named(tmp_path):
 
 def test_each_frame_is_read_once(sequence, monkeypatch):
     read = []
-    from enfilade.video import images
+    from enfilade.pipeline.compare import pairs
+    from enfilade.video import images, open_sequence
 
     original = images.read_exr
     monkeypatch.setattr(images, "read_exr", lambda file: read.append(file.name) or original(file))
+    monkeypatch.setattr(pairs, "FencedSequence", lambda source, _limits: open_sequence(source))
     test, reference = sequence("t", [textured()] * 5), sequence("r", [textured(0.5)] * 5, flow_px=1.0)
     judged(test, reference)
     later = [name for name in read if name != "0001.exr"]  # the first also tells size and layers
@@ -135,7 +137,7 @@ def _peak_bytes(sequences, flow):
 
     opened = iter(sequences)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pairs, "open_sequence", lambda _: next(opened))
+        patch.setattr(pairs, "FencedSequence", lambda *_: next(opened))
         tracemalloc.start()
         try:
             compare("test", "reference", terms(mode="paper", flow=flow), Notes())

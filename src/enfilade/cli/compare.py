@@ -105,7 +105,7 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @json_option
 @quiet_option
 @debug_option
-@settings_options("viewing", "metric")
+@settings_options("viewing", "metric", "limits")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -176,6 +176,7 @@ def _terms(
         fps=fps,
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
         has_kernels=device != "none",
+        limits=settings.limits,
     )
 
 

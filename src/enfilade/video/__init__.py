@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from enfilade.video.codecs import video_suffix
 from enfilade.video.encode import check_encodable, encode_video, exact_fps
+from enfilade.video.fence import FencedSequence
 from enfilade.video.sequence import Sequence, open_sequence
 
-__all__ = ["Sequence", "check_encodable", "encode_video", "exact_fps", "open_sequence", "video_suffix"]
+__all__ = [
+    "FencedSequence",
+    "Sequence",
+    "check_encodable",
+    "encode_video",
+    "exact_fps",
+    "open_sequence",
+    "video_suffix",
+]

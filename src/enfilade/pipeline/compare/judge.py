@@ -17,7 +17,7 @@ from enfilade.pipeline.compare.pairs import Pair, open_pairs
 from enfilade.pipeline.compare.verdict import Band, FrameDifference, Part, SequenceDifference
 from enfilade.pixels.tone import srgb_encode
 from enfilade.records import F32
-from enfilade.settings import MetricSettings, ViewingSettings
+from enfilade.settings import LimitSettings, MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
 __all__ = ["JudgedFrame", "Terms", "compare", "metric_options"]
@@ -73,6 +73,8 @@ class Terms:
         Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
     has_kernels
         Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active.
+    limits
+        Memory and time of the processes that decode.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
@@ -83,6 +85,7 @@ class Terms:
     fps: float | None = None
     exposure_ev: float | None = None
     has_kernels: bool = False
+    limits: LimitSettings = field(default_factory=LimitSettings)
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
@@ -126,7 +129,7 @@ def compare(
         A sequence can't be read, the two differ in length, size or frame rate, or pixels are NaN or
         infinite. The message names the frame.
     """
-    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev)
+    pairs = open_pairs(test, reference, terms.limits, fps=terms.fps, exposure_ev=terms.exposure_ev)
     conditions = terms.conditions(pairs.size, pairs.fps)
     motion = open_motion(pairs.test, pairs.reference, terms.flow)
     monitor.say(motion.text)

@@ -12,7 +12,8 @@ from enfilade.errors import ImageError
 from enfilade.monitor import Monitor
 from enfilade.pixels.tone import display_luminance, srgb_encode
 from enfilade.records import F32
-from enfilade.video import Sequence, open_sequence
+from enfilade.settings import LimitSettings
+from enfilade.video import FencedSequence, Sequence
 from enfilade.viewing import Viewing
 
 __all__ = ["Pair", "Pairs", "open_pairs"]
@@ -124,14 +125,21 @@ class Pairs:
 
 
 def open_pairs(
-    test: Path | str, reference: Path | str, *, fps: float | None, exposure_ev: float | None
+    test: Path | str,
+    reference: Path | str,
+    limits: LimitSettings,
+    *,
+    fps: float | None,
+    exposure_ev: float | None,
 ) -> Pairs:
-    """Open two sequences to be compared.
+    """Open two sequences to be compared, each decoded by a process of its own.
 
     Parameters
     ----------
     test, reference
         Whatever :func:`enfilade.video.open_sequence` reads.
+    limits
+        Memory and time of those processes.
     fps, exposure_ev
         See :class:`Pairs`.
 
@@ -140,7 +148,8 @@ def open_pairs(
     ImageError
         One can't be read, they differ in length, size or frame rate, or are runs of different exposure.
     """
-    return Pairs(open_sequence(test), open_sequence(reference), fps=fps, exposure_ev=exposure_ev)
+    sequences = [FencedSequence(source, limits) for source in (test, reference)]
+    return Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
 
 
 def _squared_error(test: F32, reference: F32) -> float:
