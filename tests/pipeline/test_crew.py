@@ -1,19 +1,22 @@
 """Whoever does the work, and whatever befalls them, the run is the same."""
 
 import dataclasses
+import itertools
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
 
 from enfilade.errors import NoSpaceError, SettingsError, UnfinishedError
 from enfilade.monitor import Silence
-from enfilade.pipeline import worker
+from enfilade.pipeline import units, worker
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job, read_job
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
+from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
 from small_runs import frame_bytes, job_of
 
@@ -103,7 +106,7 @@ def test_a_unit_that_always_fails_is_named_and_the_rest_is_done(whole, tmp_path,
     with monkeypatch.context() as patch:
         patch.setattr(worker, "make_inbetween", poisoned)
         with pytest.raises(
-            UnfinishedError, match=r"1 of the run's units .*: raw 5 \(ZeroDiv.*but for 13"
+            UnfinishedError, match=r"1 of the run's units .*: raw 5 \(ZeroDiv.*but for 14"
         ) as error:
             render(job, tmp_path / "run", monitor)
     assert error.value.units == ("raw 5",)
@@ -146,7 +149,7 @@ def test_what_is_damaged_is_found_when_it_is_used_and_made_again(whole, tmp_path
     for number in (3, 5, 8):  # frames whose remaking reads some of the damaged ones
         (tmp_path / "run" / "frames" / f"{number:04d}.exr").unlink()
     (tmp_path / "run" / "raw" / "0012.exr").unlink()
-    (tmp_path / "run" / "video.mp4").unlink()
+    (tmp_path / "run" / "clips" / "0001.mp4").unlink()
     monitor = Watcher()
     render(job, tmp_path / "run", monitor, crew)
     assert digest(tmp_path / "run") == digest(whole)
@@ -202,3 +205,26 @@ def test_an_unknown_executor_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SettingsError, match="there is no executor 'threads'"):
         render(make_job(tmp_path), tmp_path / "run", Silence(), Crew("threads"))
     assert not (tmp_path / "run").exists()
+
+
+def test_clips_of_the_video_are_units(tmp_path, monkeypatch):
+    monkeypatch.setattr(units, "CLIP", 5)
+    summary = render(make_job(tmp_path), tmp_path / "run", Silence())
+    run = Run.existing(tmp_path / "run")
+    names = ["clip 1-5", "clip 6-10", "clip 11-13"]
+    assert [line["unit"] for line in run.lines() if line["unit"].startswith("clip")] == names
+    video = tmp_path / "run" / summary["video"]
+    assert len(open_sequence(video)) == 13
+    whole, clip = video.read_bytes(), tmp_path / "run" / "clips" / "0006.mp4"
+    clip.unlink()
+    video.unlink()
+    render(make_job(tmp_path), tmp_path / "run", Silence())
+    assert clip.exists()
+    assert video.read_bytes() == whole
+
+
+def test_a_clock_that_is_set_back_changes_nothing(tmp_path, monkeypatch, whole):
+    hours = itertools.count(1_000_000_000, -3600)
+    monkeypatch.setattr(time, "time", lambda: float(next(hours)))
+    render(make_job(tmp_path), tmp_path / "run", Silence())
+    assert digest(tmp_path / "run") == digest(whole)

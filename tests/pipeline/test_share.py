@@ -92,7 +92,14 @@ def test_the_template_is_one_of_open_job_description(begun):
     write_template(begun, begun / "farm.json", chunks=2)
     made = json.loads((begun / "farm.json").read_text())
     assert made == template(begun, 2)
-    assert [step["name"] for step in made["steps"]] == ["plan", "keyframes", "segments", "frames", "video"]
+    assert [step["name"] for step in made["steps"]] == [
+        "plan",
+        "keyframes",
+        "segments",
+        "frames",
+        "clips",
+        "video",
+    ]
     line = [str(OPENJD), "check", str(begun / "farm.json")]
     done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
     assert done.returncode == 0, done.stdout

@@ -12,7 +12,7 @@ import pytest
 from enfilade.errors import ImageError, RunFolderError, SettingsError
 from enfilade.pixels.tone import srgb_encode
 from enfilade.settings import VideoSettings
-from enfilade.video import encode_video, exact_fps, open_sequence, video_suffix
+from enfilade.video import encode_video, exact_fps, join_videos, open_sequence, video_suffix
 
 CODECS = ("h264", "ffv1", "av1", "prores")
 BARS = np.float32(
@@ -180,3 +180,36 @@ def test_frames_per_second_are_what_was_meant(tmp_path, fps, exact):
 def test_impossible_rates_are_refused(fps):
     with pytest.raises(ValueError, match="frames per second"):
         exact_fps(fps)
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("fps", [30.0, 23.976])
+def test_joined_clips_are_the_video(tmp_path, codec, fps):
+    rng = np.random.default_rng(4)
+    wide = rng.random((64, 160, 3)).astype(np.float32)
+    frames = [np.ascontiguousarray(wide[:, i : i + 96]) for i in range(20)]
+    suffix, settings = video_suffix(codec), VideoSettings(codec=codec)
+    clips = []
+    for first, last in ((0, 9), (9, 18), (18, 20)):
+        clip = encoded(tmp_path / f"{first}{suffix}", frames[first:last], fps=fps, codec=codec)
+        clips.append((clip, last - first))
+    files = [tmp_path / f"{name}{suffix}" for name in ("joined", "again")]
+    for file in files:
+        join_videos(file, clips, fps=fps, settings=settings)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    joined = open_sequence(files[0])
+    assert joined.fps == pytest.approx(float(exact_fps(fps)), abs=1e-6)
+    parts = [frame for clip, _ in clips for frame in open_sequence(clip)]
+    assert all(np.array_equal(a, b) for a, b in zip(joined, parts, strict=True))
+    with av.open(str(files[0])) as container:
+        times = [float(frame.pts * frame.time_base) for frame in container.decode(video=0)]
+    np.testing.assert_allclose(times, np.arange(20) / float(exact_fps(fps)), atol=6e-4)  # Matroska's are ms
+
+
+def test_a_clip_that_is_damaged(tmp_path):
+    clip = encoded(tmp_path / "0.mp4", bars())
+    with pytest.raises(ImageError, match=r"0\.mp4 holds 3 frames, not 4"):
+        join_videos(tmp_path / "a.mp4", [(clip, 4)], fps=24.0, settings=VideoSettings())
+    with pytest.raises(ImageError, match=r"1\.mp4 is missing or damaged"):
+        join_videos(tmp_path / "a.mp4", [(tmp_path / "1.mp4", 4)], fps=24.0, settings=VideoSettings())
+    assert not (tmp_path / "a.mp4").exists()

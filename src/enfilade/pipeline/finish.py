@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from enfilade.pipeline.inbetween import read_raw
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import F32, U8, Flow, Frame, Geometry, Source
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.video import encode_video, video_suffix
+from enfilade.video import encode_video, join_videos, video_suffix
 
 
 def result_unit(workshop: Workshop, frame: int) -> str:
@@ -70,26 +71,39 @@ def trace_reference(workshop: Workshop, frame: int) -> None:
     write_frame_result(workshop, frame, view.geometry, view.flow, made, shading.dropped)
 
 
-def write_video(workshop: Workshop) -> str:
-    """Encode the finished frames; returns the file's name in the run folder."""
-    job = workshop.job
-    file = workshop.run.folder / f"video{video_suffix(job.settings.video.codec)}"
-    workshop.monitor.stage("video", len(job.path))
-    if workshop.run.done("video"):
-        workshop.monitor.advance(len(job.path))
-        return file.name
+def write_clip(workshop: Workshop, name: str, span: range) -> None:
+    """Encode finished frames, a part of the video."""
+    job, file = workshop.job, _clip(workshop, span)
+    workshop.monitor.stage("video", len(span))
     with workshop.costs.of("video"):
         encode_video(
             file,
-            _finished(workshop),
+            _finished(workshop, span),
             fps=job.path.fps,
             width=job.path.width,
             height=job.path.height,
             settings=job.settings.video,
             exposure_ev=job.settings.viewing.exposure_ev,
         )
+    workshop.finish(name, [file])
+
+
+def write_video(workshop: Workshop, spans: Sequence[range]) -> None:
+    """Put the clips together."""
+    job = workshop.job
+    clips = [_clip(workshop, span) for span in spans]
+    with workshop.costs.of("video"):
+        for clip in clips:
+            workshop.run.check(clip)
+        file = workshop.run.folder / f"video{video_suffix(job.settings.video.codec)}"
+        counted = [(clip, len(span)) for clip, span in zip(clips, spans, strict=True)]
+        join_videos(file, counted, fps=job.path.fps, settings=job.settings.video)
     workshop.finish("video", [file])
-    return file.name
+
+
+def _clip(workshop: Workshop, span: range) -> Path:
+    suffix = video_suffix(workshop.job.settings.video.codec)
+    return workshop.run.file("clips", workshop.number(span.start)).with_suffix(suffix)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +162,8 @@ def write_frame_result(
     )
 
 
-def _finished(workshop: Workshop) -> Iterator[F32]:
-    for frame in range(len(workshop.job.path)):
+def _finished(workshop: Workshop, span: range) -> Iterator[F32]:
+    for frame in span:
         file = workshop.run.file("frames", workshop.number(frame))
         workshop.run.check(file)
         yield read_exr(file)["RGB"].astype(np.float32)

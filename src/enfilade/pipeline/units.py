@@ -33,20 +33,23 @@ class Step:
 
 
 BLOCK = 16  # frames that one worker does in a row where it can: they share what is in memory
+CLIP = 240  # frames that are encoded in one go; x264 begins anew after 250
 # Stages, in the order in which their units are begun.
-SURVEY, DRAFTS, CELLS, PILOT, KEYFRAMES, LIGHT, INBETWEENS, FRAMES, VIDEO = range(9)
+SURVEY, DRAFTS, CELLS, PILOT, KEYFRAMES, LIGHT, INBETWEENS, FRAMES, CLIPS, VIDEO = range(10)
 
 # Steps of a run by method, one after the other.
 STEPS: dict[str, list[Step]] = {
     "reference": [
         Step("plan", {"survey"}),
         Step("frames", {"reference"}, is_shared=True),
+        Step("clips", {"clip"}, is_shared=True),
     ],
     "paper": [
         Step("plan", {"survey"}),
         Step("keyframes", {"keyframe"}, is_shared=True),
         Step("segments", {"keyframe", "segment", "raw"}, is_shared=True),
         Step("frames", {"antialias"}, is_shared=True),
+        Step("clips", {"clip"}, is_shared=True),
     ],
     "decoupled": [
         Step("plan", {"survey"}),
@@ -56,6 +59,7 @@ STEPS: dict[str, list[Step]] = {
         Step("keyframes", {"page"}, is_shared=True),
         Step("light", {"light"}, is_shared=True),
         Step("frames", {"decoupled"}, is_shared=True),
+        Step("clips", {"clip"}, is_shared=True),
     ],
 }
 
@@ -81,7 +85,7 @@ class Blueprint:
         if self._job.method != "reference":
             return [survey]
         frames = [self._frame(f, "reference", stage="trace", needs=()) for f in range(len(self._job.path))]
-        return [survey, *frames, self._video()]
+        return [survey, *frames, *self._video()]
 
     def follow(self, unit: Unit) -> Iterator[Unit]:
         """Units that come of one that is finished."""
@@ -137,7 +141,7 @@ class Blueprint:
                 window = range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
                 needs = tuple(f"raw {self._numbers[f]}" for f in window)
                 yield self._frame(frame, "antialias", stage="antialiasing", needs=needs)
-        yield self._video()
+        yield from self._video()
 
     def _keyframe(self, frame: int, root: int) -> Iterator[Unit]:
         name = f"keyframe {self._numbers[frame]}"
@@ -182,7 +186,7 @@ class Blueprint:
         for index, (shot, segments) in enumerate(zip(self._job.path.shots(), self.shots(), strict=True)):
             yield from self._lit_shot(index, shot, segments)
             last.append(f"lit {index}")
-        yield self._video()
+        yield from self._video()
 
     def _lit_shot(self, index: int, shot: range, segments: list[Segment]) -> Iterator[Unit]:
         """What makes the frames of a shot, in rounds: each needs all of the one before."""
@@ -234,8 +238,15 @@ class Blueprint:
         name, facts = f"frame {self._numbers[frame]}", {"frame": frame, **(facts or {})}
         return Unit(name, kind, facts, needs, (FRAMES, frame), f"frame {frame // BLOCK}", stage)
 
-    def _video(self) -> Unit:
-        return Unit("video", "video", needs=tuple(f"frame {n}" for n in self._numbers), order=(VIDEO,))
+    def _video(self) -> Iterator[Unit]:
+        spans = clips_of(self._job)
+        for span in spans:
+            needs = tuple(f"frame {self._numbers[f]}" for f in span)
+            facts = {"frame": span.start}
+            yield Unit(clip_name(self._job, span), "clip", facts, needs, (CLIPS, span.start), "clip")
+        yield Unit(
+            "video", "video", needs=tuple(clip_name(self._job, span) for span in spans), order=(VIDEO,)
+        )
 
 
 def segments_of(job: Job, survey: Survey) -> list[list[Segment]]:
@@ -245,6 +256,17 @@ def segments_of(job: Job, survey: Survey) -> list[list[Segment]]:
         spaced = replace(settings.keyframes, spacing=settings.light.spacing)
         settings = replace(settings, keyframes=spaced)
     return initial_segments(job.path, survey, settings)
+
+
+def clips_of(job: Job) -> list[range]:
+    """Frames of each clip of the video."""
+    count = len(job.path)
+    return [range(first, min(first + CLIP, count)) for first in range(0, count, CLIP)]
+
+
+def clip_name(job: Job, span: range) -> str:
+    """Name of a clip in the ledger."""
+    return f"clip {job.path.numbers[span[0]]}-{job.path.numbers[span[-1]]}"
 
 
 def segment_name(first: int, last: int) -> str:

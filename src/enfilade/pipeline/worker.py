@@ -10,13 +10,13 @@ from typing import Any
 from enfilade.arrays import release_memory
 from enfilade.monitor import Monitor
 from enfilade.pipeline.decoupled import DecoupledFrames
-from enfilade.pipeline.finish import Antialiasing, trace_reference, write_video
+from enfilade.pipeline.finish import Antialiasing, trace_reference, write_clip, write_video
 from enfilade.pipeline.inbetween import make_copy, make_inbetween, make_keyframe
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.refine import Verdict, refine
 from enfilade.pipeline.survey import Survey, survey_path
-from enfilade.pipeline.units import segment_name, segments_of
+from enfilade.pipeline.units import clip_name, clips_of, segment_name, segments_of
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import Segment
 from enfilade.store import Run
@@ -55,14 +55,17 @@ class Worker:
             There is no such kind.
         """
         self._run.refresh()
-        if kind != self._kind and kind in ("antialias", "video"):
+        if kind != self._kind and kind in ("antialias", "clip"):
             release_memory()  # of the stages before
         self._kind = kind
         match kind:
             case "survey":
                 self._survey()
+            case "clip":
+                span = next(s for s in clips_of(self._job) if s.start == facts["frame"])
+                write_clip(self._workshop, clip_name(self._job, span), span)
             case "video":
-                write_video(self._workshop)
+                write_video(self._workshop, clips_of(self._job))
             case "segment":
                 self._judge(facts)
             case "raw":

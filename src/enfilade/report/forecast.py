@@ -82,9 +82,9 @@ class _Work:
             totals |= {"raw": ("frames before antialiasing", count)}
         if self._method == "decoupled":
             totals |= {"keyframe": ("keyframes", None), "light": ("segments lit", None)}
-        totals |= {"frame": ("frames", count), "video": ("video", 1)}
-        extra = {name: (name, None) for name in self._units if name not in totals}
-        ordered = [*list(totals.items())[:-2], *extra.items(), *list(totals.items())[-2:]]
+        last = {"frame": ("frames", count), "clip": ("clips of the video", None), "video": ("video", 1)}
+        extra = {name: (name, None) for name in self._units if name not in totals and name not in last}
+        ordered = [*totals.items(), *extra.items(), *last.items()]
         return [
             Step(title, len(self._units.get(kind, [])), total, self._spent(kind))
             for kind, (title, total) in ordered

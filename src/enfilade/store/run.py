@@ -18,7 +18,7 @@ from enfilade.store.lock import LOCK_NAME, Lock, writer_of
 
 __all__ = ["KINDS", "Run"]
 
-KINDS = ("drafts", "keyframes", "cells", "raw", "frames")
+KINDS = ("drafts", "keyframes", "cells", "raw", "frames", "clips")
 PARTS = "parts"  # folder of the ledgers of those who share a run
 RESERVED = frozenset({"unit", "files"})  # keys of a ledger line that are ours
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ from enfilade.video.codecs import Codec, codec_named
 from enfilade.video.view import View, open_view
 from enfilade.video.ycbcr import planes_from_rgb, quantized
 
-__all__ = ["encode_video", "exact_fps"]
+__all__ = ["check_encodable", "encode_video", "exact_fps", "join_videos"]
 
 BT709 = 1  # primaries and matrix, ITU-T H.273, tables 2 and 4
 IDENTITY_MATRIX = 0  # R'G'B' as it is, ITU-T H.273, table 4
@@ -72,20 +74,87 @@ def encode_video(
     options = codec.options_for(settings.quality)
     view = open_view(settings, exposure_ev)
     pictures = _pictures(frames, (height, width, 3), view, pixels, codec.bits)
-    with whole.whole_file(file) as beside:
-        beside.touch()
-        try:
-            with _container(beside, codec) as container:
-                stream = _stream(container, codec, exact_fps(fps), options)
-                stream.width, stream.height, stream.pix_fmt = width, height, pixels
-                _tag(stream.codec_context, view, pixels)
-                for picture in pictures:
-                    container.mux(stream.encode(picture))
-                container.mux(stream.encode(None))
-        except av.FFmpegError as error:
-            if error.errno in whole.FULL:
-                raise whole.unwritable(file, OSError(error.errno, error.strerror)) from error
-            raise whole.unwritable(file, f"{codec.encoder}: {error}") from error
+    with _written(file, codec) as container:
+        stream = _stream(container, codec, exact_fps(fps), options)
+        stream.width, stream.height, stream.pix_fmt = width, height, pixels
+        _tag(stream.codec_context, view, pixels)
+        for picture in pictures:
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+
+
+def join_videos(
+    file: Path, clips: Sequence[tuple[Path, int]], *, fps: float | Fraction, settings: VideoSettings
+) -> None:
+    """Put clips one after another, as they were encoded; the same clips, the same bytes.
+
+    Parameters
+    ----------
+    file
+        Of the suffix of the clips.
+    clips : sequence of (Path, int)
+        Videos that :func:`encode_video` wrote with these settings, and the number of their frames.
+    fps, settings
+        Theirs.
+
+    Raises
+    ------
+    ImageError
+        A clip is missing or damaged, or does not hold as many frames.
+    RunFolderError, NoSpaceError
+        The file can't be written. An older one stays.
+    """
+    rate = exact_fps(fps)
+    # A short clip may be decoded with less delay than the others.
+    delay = max(_delay(clip, rate) for clip, _ in clips)
+    first = 0
+    with _written(file, codec_named(settings.codec)) as container:
+        stream = None
+        for clip, count in clips:
+            with _opened(clip) as opened:
+                stream = stream or _copied(container, opened.streams.video[0])
+                held = 0
+                for packet in _packets(opened):
+                    shown = first + _frame(packet.pts, packet, rate)
+                    packet.stream, packet.time_base = stream, 1 / rate
+                    packet.pts, packet.dts, packet.duration = shown, first + held - delay, 1
+                    container.mux(packet)
+                    held += 1
+            if held != count:
+                raise ImageError(f"{clip} holds {held} frames, not {count}; delete it to make it again")
+            first += count
+
+
+def _delay(clip: Path, rate: Fraction) -> int:
+    """Frames by which a clip is decoded before it is shown."""
+    with _opened(clip) as opened:
+        return max((-_frame(packet.dts, packet, rate) for packet in islice(_packets(opened), 1)), default=0)
+
+
+def _opened(clip: Path) -> Any:
+    try:
+        return av.open(str(clip))
+    except (av.FFmpegError, OSError) as error:
+        raise ImageError(f"{clip} is missing or damaged ({error}); delete it to make it again") from error
+
+
+def _copied(container: Any, template: Any) -> Any:
+    """A stream for packets of another."""
+    # Not opaque, PyAV looks for an encoder of the decoder's name, which AV1 has not.
+    stream = container.add_stream_from_template(template, opaque=True)
+    stream.codec_context.codec_tag = template.codec_context.codec_tag  # ProRes's profile stands nowhere else
+    return stream
+
+
+def _packets(opened: Any) -> Iterator[Any]:
+    """Of the picture; the last one that FFmpeg gives is empty."""
+    return (packet for packet in opened.demux(video=0) if packet.size)
+
+
+def _frame(time: int, packet: Any, rate: Fraction) -> int:
+    """Number of the frame that a time means: containers round theirs."""
+    unit: Fraction = packet.time_base
+    return round(time * unit * rate)
 
 
 def check_encodable(settings: VideoSettings, *, width: int, height: int, exposure_ev: float) -> None:
@@ -119,6 +188,20 @@ def exact_fps(fps: float | Fraction) -> Fraction:
         if ntsc > 0 and abs(float(ntsc) - fps) < NTSC_TOLERANCE:
             return ntsc
     return Fraction(fps).limit_denominator(1001)
+
+
+@contextmanager
+def _written(file: Path, codec: Codec) -> Iterator[Any]:
+    """A container that becomes `file` when the block ends without an error."""
+    with whole.whole_file(file) as beside:
+        beside.touch()
+        try:
+            with _container(beside, codec) as container:
+                yield container
+        except av.FFmpegError as error:
+            if error.errno in whole.FULL:
+                raise whole.unwritable(file, OSError(error.errno, error.strerror)) from error
+            raise whole.unwritable(file, f"{codec.encoder}: {error}") from error
 
 
 def _container(file: Path, codec: Codec) -> Any:
