@@ -35,7 +35,7 @@ COUNTS = {"kills": 200, "disk": 50, "bits": 50, "mitsuba": 10}
 QUICK = {"kills": 5, "disk": 5, "bits": 5, "mitsuba": 1}
 CLUSTER_KILLS, QUICK_CLUSTER_KILLS = 10, 5
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
-STORED = ("keyframes", "cells", "drafts", "raw", "frames")
+STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
 TIMEOUT_S = 1800  # a busy machine is no failure
 
 
