@@ -43,8 +43,9 @@ def write_exr(
     layers: Mapping[str, Array],
     *,
     attributes: Mapping[str, str | float | int] | None = None,
+    is_exact: bool = True,
 ) -> None:
-    """Write layers as one OpenEXR file (scan lines, ZIP): the same input, the same bytes.
+    """Write layers as one OpenEXR file of scan lines: the same input, the same bytes.
 
     Parameters
     ----------
@@ -53,6 +54,9 @@ def write_exr(
         All of one size. The dtype is kept: half, float or uint. ``""`` is ``RGB``.
     attributes
         Of the header. Numbers lose what does not fit in 32 bits; a string keeps everything.
+    is_exact
+        Otherwise floats are rounded to 16 significant bits (PXR24 in place of ZIP): a third of the size, in
+        half the time. Half floats and integers stay what they are.
 
     Raises
     ------
@@ -65,7 +69,8 @@ def write_exr(
     extra = dict(attributes or {})
     if taken := STANDARD.intersection(extra):
         raise ValueError(f"OpenEXR keeps these attributes for itself: {', '.join(sorted(taken))}")
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **extra}
+    compression = OpenEXR.ZIP_COMPRESSION if is_exact else OpenEXR.PXR24_COMPRESSION
+    header = {"compression": compression, "type": OpenEXR.scanlineimage, **extra}
     _start_threads()
     with whole_file(file) as beside:
         beside.touch()  # where it can't be, the operating system says why, which OpenEXR does not

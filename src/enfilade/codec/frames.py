@@ -194,7 +194,8 @@ def write_result(
     """Write a delivered frame, in formats that other programs read.
 
     ``R G B``, ``N`` and ``albedo`` are half floats, ``Z``, ``P``, ``forward.u/v`` and ``backward.u/v``
-    floats, ``item`` and ``source`` unsigned integers.
+    floats, ``item`` and ``source`` unsigned integers. Floats are rounded to 16 significant bits: a point 10 m
+    away to 0.2 mm.
 
     Parameters
     ----------
@@ -227,7 +228,7 @@ def write_result(
         "backward": flow.backward,
         "source": source.astype(np.uint32),
     }
-    write_exr(file, layers, attributes=attributes)
+    write_exr(file, layers, attributes=attributes, is_exact=False)
 
 
 def _half(values: F32) -> F16:
