@@ -203,16 +203,24 @@ class LightSettings(Section):
     spacing: int = option(8, "Uniform spacing of the keyframes of light, frames.", least=2)
     keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
     least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=1, most=4096)
-    samples: int = option(32, "Camera rays of a pixel that shows an edge.", least=1, most=4096)
-    least_lobe_samples: int = option(
-        8, "Rays of every pixel that shows a glossy, mirroring or transparent surface.", least=2, most=4096
+    samples: int = option(
+        0,
+        "Camera rays of a pixel that shows an edge; 0: as many as the quality asks for.",
+        least=0,
+        most=4096,
+    )
+    lobe_samples: int = option(
+        0,
+        "Rays of a pixel that shows a glossy, mirroring or transparent surface; 0: as many as the quality "
+        "asks for.",
+        least=0,
+        most=4096,
     )
     denoiser: str = option(
         "none",
         "Quality of Open Image Denoise on the light of keyframes, in place of smoothing it along surfaces.",
         choices=("none", "fast", "balanced", "high"),
     )
-    lobe_samples: int = option(24, "... and of those where they differ much.", least=2, most=4096)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ its own motion: that of the surface, or of the virtual image in a mirror.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,9 +27,9 @@ from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
-REACH = 3  # frames to each side over which that is averaged
-NOISE_CONTRAST = 0.025  # the same of what lobes scatter, once it is smoothed; time will average it
-LEAST_NOISY = 0.01  # of a frame's pixels: fewer are left as they are
+EDGE_SAMPLES = 256.0, 8, 32  # camera rays of such a pixel at a quality of one JND; fewest and most
+LOBE_SAMPLES = 34.0, 2, 34  # lobe rays of a pixel, likewise, but by the root of the quality
+REACH = 3  # frames to each side over which what lobes scatter is averaged
 
 
 def raw_unit(workshop: Workshop, frame: int) -> str:
@@ -130,12 +131,13 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.GATHER),
     )
-    seen.add(settings.light.least_samples)
-    if settings.light.samples > settings.light.least_samples:
+    least, quality = settings.light.least_samples, settings.light.quality
+    most = settings.light.samples or _between(EDGE_SAMPLES, quality)
+    seen.add(least)
+    if most > least:
         shading = seen.shading
-        limit = EDGE_CONTRAST * settings.light.quality
-        is_edge = np.sqrt(shading.variance) > limit * _luminance(shading)
-        seen.add(settings.light.samples - settings.light.least_samples, _grown(is_edge, path.width))
+        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * quality * _luminance(shading)
+        seen.add(most - least, _grown(is_edge, path.width))
     return seen
 
 
@@ -155,7 +157,8 @@ def _scattered(
 ) -> tuple[Shading, int]:
     """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and by how many rays.
 
-    Pixels where noise is left get more of them.
+    All pixels take as many: a second pass over the scene for those where noise is left would cost what
+    half as many more for all do.
     """
     path, settings = workshop.job.path, workshop.job.settings
     where = _grown(seen.is_marked, path.width)
@@ -171,17 +174,15 @@ def _scattered(
         random=workshop.random(frame, Purpose.SCATTER),
         is_stratified=True,
     )
-    least, most = settings.light.least_lobe_samples, settings.light.lobe_samples
-    scattered.add(least)
+    light = settings.light
+    scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
     flags = where.reshape(path.height, path.width)
-    image = smoothed(shown, scattered.shading.spread(flags))
-    if most > least:
-        whole = _luminance(seen.shading) + _luminance(image).ravel()
-        is_noisy = np.sqrt(image.variance).ravel() > NOISE_CONTRAST * settings.light.quality * whole
-        if is_noisy.mean() > LEAST_NOISY:
-            scattered.add(most - least, _grown(is_noisy, path.width)[where])
-            image = smoothed(shown, scattered.shading.spread(flags))
-    return image, scattered.paths
+    return smoothed(shown, scattered.shading.spread(flags)), scattered.paths
+
+
+def _between(samples: tuple[float, int, int], quality: float) -> int:
+    at_one, least, most = samples
+    return min(max(round(at_one / quality), least), most)
 
 
 def _luminance(shading: Shading) -> npt.NDArray[np.float32]:

@@ -54,25 +54,13 @@ class Preset:
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
+QUALITIES = (60.0, 30.0, 15.0, 8.0, 4.0)
 PRESETS = (
     Preset("paper-16", "paper", {"trace": {"spp": 16}}),
     Preset("paper-64", "paper", {"trace": {"spp": 64}}),
-    Preset(
-        "decoupled-60",
-        "decoupled",
-        {"light": {"quality": 60.0, "samples": 8, "least_lobe_samples": 2, "lobe_samples": 8}},
-    ),
-    Preset(
-        "decoupled-30",
-        "decoupled",
-        {"light": {"quality": 30.0, "samples": 8, "least_lobe_samples": 4, "lobe_samples": 8}},
-    ),
-    Preset("decoupled-15", "decoupled", {"light": {"quality": 15.0, "samples": 16}}),
-    Preset("decoupled-8", "decoupled", {"light": {"quality": 8.0}}),
-    Preset(
-        "decoupled-4",
-        "decoupled",
-        {"light": {"quality": 4.0, "least_lobe_samples": 16, "lobe_samples": 48}},
+    *(
+        Preset(f"decoupled-{quality:g}", "decoupled", {"light": {"quality": quality}})
+        for quality in QUALITIES
     ),
 )
 
