@@ -162,7 +162,7 @@ def measure_workers(folder: Path) -> None:
 
 def measure_ray(folder: Path) -> None:
     """The same long units by worker processes and by Ray."""
-    line = mitsuba(folder, 4096, "20-27")
+    line = mitsuba(folder, 512, "20-27")
     seconds = {name: run_seconds(folder, line, name, 2) for name in ("processes", "ray")}
     times = ", ".join(f"{name} {s:.1f} s" for name, s in seconds.items())
     print(f"ray: {times}, overhead {100 * (seconds['ray'] / seconds['processes'] - 1):.1f} %")

@@ -16,6 +16,7 @@ from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import Segment, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.report.plots import walkthrough_figure
 from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement
 from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
 from enfilade.studies.cases import times as table2
@@ -421,6 +422,7 @@ def test_a_scene_is_measured_once(tmp_path):
     found = measure(("room",), items, terms, tmp_path, told)["room"]
     assert told.stages
     summary = found["statistics"]["summary"]
+    assert len(walkthrough_figure(summary).axes) == 3
     assert summary["frames"] == 60
     initial = [s for s in summary["segments"] if s["depth"] == 0]
     plain = [s for s in found["statistics"]["plain_segments"] if s["depth"] == 0]

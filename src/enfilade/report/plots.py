@@ -73,7 +73,7 @@ def walkthrough_figure(summary: Mapping[str, Any]) -> Figure:
     panels = ["mean image velocity"]
     panels += ["predictions of the metric"] if segments else []
     width, height = summary["size"]
-    rays = summary["rays"]
+    rays = summary.get("rays", {})  # the paper's method has none
     effort = f"{sum(rays.values()):.1f} rays a pixel" if rays else f"{summary['spp']} spp"
     title = f"method {summary['method']}, {len(rows)} frames, {width}x{height}, {effort}"
     figure, axes = new_figure(
