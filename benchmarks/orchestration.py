@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 KINDS = ("length", "overhead", "workers", "ray")
@@ -153,11 +154,19 @@ def mitsuba(folder: Path, spp: int, frames: str) -> list[str]:
 
 
 def measure_workers(folder: Path) -> None:
-    """The same frames by one worker and by two, each of one thread."""
+    """The same frames by one worker and by two, each of one thread; and by two commands at once."""
     line = mitsuba(folder, 256, "20-35")
     seconds = {count: run_seconds(folder, line, "processes", count) for count in (1, 2)}
+    halves = [mitsuba(folder, 256, frames) for frames in ("20-27", "28-35")]
+    with ThreadPoolExecutor() as pool:
+        waits = [
+            pool.submit(run_seconds, folder / str(number), half, "in-process", 1)
+            for number, half in enumerate(halves)
+        ]
+        apart = max(wait.result() for wait in waits)
     times = ", ".join(f"{count} workers {s:.1f} s" for count, s in seconds.items())
     print(f"workers: {times}, gain {seconds[1] / seconds[2]:.2f}")
+    print(f"two commands at once, half of the frames each: {apart:.1f} s, gain {seconds[1] / apart:.2f}")
 
 
 def measure_ray(folder: Path) -> None:
