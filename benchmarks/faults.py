@@ -466,7 +466,7 @@ def try_bits(work: Work, folder: Path, chance: random.Random, count: int, tally:
         with scratch(folder) as out:
             shutil.copytree(work.whole, out)
             is_used = number % 2 == 0
-            kinds = ("raw", "frames", "") if is_used else ("keyframes", "raw", "frames", "video", "")
+            kinds = ("raw", "frames", "clips", "") if is_used else ("keyframes", *STORED[3:], "video", "")
             file = chance.choice(candidates(out, chance.choice(kinds)))
             if is_used:
                 forget_users(out, file)
@@ -492,9 +492,10 @@ def forget_users(out: Path, file: Path) -> None:
     """Remove what is made of a file, so that it is used again."""
     if file.parent.name == "raw":
         (out / "frames" / file.name).unlink()
-    elif file.parent.name == "frames":
-        for video in out.glob("video.*"):
-            video.unlink()
+    elif file.parent.name in ("frames", "clips"):
+        clips = (out / "clips").iterdir() if file.parent.name == "frames" else ()
+        for made in [*out.glob("video.*"), *clips]:
+            made.unlink()
 
 
 def flip(file: Path, chance: random.Random) -> None:

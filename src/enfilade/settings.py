@@ -211,8 +211,8 @@ class LightSettings(Section):
     )
     lobe_samples: int = option(
         0,
-        "Rays of a pixel that shows a glossy, mirroring or transparent surface; 0: as many as the quality "
-        "asks for.",
+        "Rays of a pixel that shows a glossy, mirroring or transparent surface, 2 or more; 0: as many as the "
+        "quality asks for.",
         least=0,
         most=4096,
     )

@@ -13,7 +13,9 @@ from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.rehearsal import excerpt_of
-from enfilade.pipeline.walkthrough import render
+from enfilade.pipeline.share import Share, do_share, go_on
+from enfilade.pipeline.units import STEPS
+from enfilade.pipeline.walkthrough import prepare, render
 from enfilade.records import Segment
 from enfilade.scenes import write_scene
 from enfilade.settings import Settings
@@ -120,3 +122,18 @@ def test_lost_fills_are_traced_by_workers_as_they_were(decoupled):
 def test_a_renderer_without_light_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="needs a Mitsuba scene"):
         rendered(tmp_path, job_of(tmp_path, wall(), slide(3), method="decoupled"))
+
+
+def test_shares_of_every_step_make_the_same_run(decoupled, tmp_path):
+    job, whole, _ = decoupled
+    folder = tmp_path / "run"
+    prepare(job, folder)
+    for step in STEPS["decoupled"]:
+        count = 2 if step.name == "shading" else 1  # a frame needs some that others have shaded
+        for number in range(1, count + 1):
+            do_share(folder, Share(step.name, number, count), Silence(), Crew())
+    left = {line["unit"] for line in Run.existing(whole).lines()}
+    left -= {line["unit"] for line in Run.existing(folder).lines()}
+    assert left == {"video"}
+    go_on(folder, Silence(), Crew())
+    assert Run.existing(folder).digest() == Run.existing(whole).digest()

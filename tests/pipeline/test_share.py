@@ -117,5 +117,5 @@ def test_the_template_run_by_open_job_description_makes_the_same_run(whole, begu
 
 @pytest.mark.slow
 def test_submitit_makes_the_same_run(whole, begun):
-    assert len(submit(begun, "local", 2, {"timeout_min": 5})) == 1 + 3 * 2 + 1
+    assert len(submit(begun, "local", 2, {"timeout_min": 5})) == 1 + 3 * 2 + 1 + 1  # the clip and the video
     assert Run.existing(begun).digest() == whole

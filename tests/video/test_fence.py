@@ -122,3 +122,16 @@ def test_a_message_that_ends_early():
         assert pixels["a"].tolist() == [0.0, 0.0, 0.0]
         with pytest.raises(EOFError):
             receive(here, most_bytes=100)
+
+
+def test_modules_that_lie_where_one_stands_are_not_run(tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text("raise SystemExit(7)")
+    exrs(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert len(FencedSequence(tmp_path, LIMITS)) == 3
+
+
+def test_an_exr_that_takes_too_much_memory_is_not_called_damaged(tmp_path):
+    write_exr(tmp_path / "a.exr", {"RGB": np.zeros((5000, 5000, 3), np.float32)})
+    with pytest.raises(ImageError, match="needs more --limits-trial-mb"):
+        FencedSequence(tmp_path / "a.exr", replace(LIMITS, trial_mb=700))

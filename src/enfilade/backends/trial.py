@@ -32,7 +32,7 @@ def try_scene(scene: Path, limits: LimitSettings, variant: str) -> None:
     SceneError
         It crashed, took too long, or Mitsuba refused the scene.
     """
-    line = [sys.executable, "-m", "enfilade.backends.trial", str(scene), str(limits.trial_mb), variant]
+    line = [sys.executable, "-P", "-m", "enfilade.backends.trial", str(scene), str(limits.trial_mb), variant]
     try:
         done = subprocess.run(  # noqa: S603
             line, capture_output=True, text=True, errors="replace", check=False, timeout=limits.trial_s
@@ -57,8 +57,10 @@ def _load(scene: str, megabytes: int, variant: str) -> int:
     activate("gpu" if is_gpu else "cpu")
     from enfilade.backends.mitsuba3 import MitsubaRenderer
 
-    most = resource.RLIM_INFINITY if is_gpu else megabytes * MB  # CUDA maps all of the GPU's memory
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    if not is_gpu:  # CUDA maps all of the GPU's memory
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        most = megabytes * MB if hard == resource.RLIM_INFINITY else min(megabytes * MB, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         MitsubaRenderer(Path(scene), TraceSettings())

@@ -105,7 +105,7 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @json_option
 @quiet_option
 @debug_option
-@settings_options("viewing", "metric", "limits")
+@settings_options("viewing", "metric", "limits.trial_mb", "limits.trial_s")
 @click.pass_context
 def command(
     ctx: click.Context,

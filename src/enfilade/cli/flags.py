@@ -70,10 +70,10 @@ class SettingsCommand(click.Command):
 
 
 def settings_options(*names: str) -> Callable[[Command], Command]:
-    """Decorate a command with ``--settings`` and a flag for each setting of the named sections."""
+    """Decorate a command with ``--settings`` and flags for settings: ``section`` or ``section.name``."""
 
     def decorate(command: Command) -> Command:
-        options = [SettingOption(n, f) for n in names for f in dataclasses.fields(sections()[n])]
+        options = [option for name in names for option in _options_of(name)]
         file = click.Option(
             ["--settings", "settings_file"],
             type=click.Path(path_type=Path),
@@ -86,6 +86,12 @@ def settings_options(*names: str) -> Callable[[Command], Command]:
         return command
 
     return decorate
+
+
+def _options_of(name: str) -> list[SettingOption]:
+    section, _, setting = name.partition(".")
+    known = dataclasses.fields(sections()[section])
+    return [SettingOption(section, field) for field in known if setting in ("", field.name)]
 
 
 def settings_of(ctx: click.Context) -> Settings:

@@ -17,6 +17,7 @@ from typing import Any
 from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell
 from enfilade.executors.unit import Unit
 
+CHILD = "enfilade.executors.child"
 RECEIVED = 1 << 16  # bytes taken at once
 LOG_TAIL = 1 << 14  # bytes of a dead worker's log that are kept
 GRACE_S = 5.0  # in which a killed worker must be gone
@@ -87,7 +88,7 @@ class Processes:
         self._logs.mkdir(parents=True, exist_ok=True)
         ours, theirs = socket.socketpair()
         file = self._logs / f"worker-{slot}.log"
-        command = [sys.executable, "-m", "enfilade.executors.child", str(theirs.fileno()), str(os.getpid())]
+        command = [sys.executable, "-P", "-m", CHILD, str(theirs.fileno()), str(os.getpid())]
         with theirs, file.open("wb") as log:
             process = subprocess.Popen(  # noqa: S603
                 command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=log, stderr=log

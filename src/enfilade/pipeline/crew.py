@@ -261,10 +261,10 @@ class _Progress:
         if not unit.stage:
             self._now = ""
             return
-        if unit.stage != self._now:
-            self._now = unit.stage
-            self._begun.add(unit.stage)
-            self._monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
+        self._now = unit.stage
+        self._begun.add(unit.stage)
+        # Each time: what workers say of their clips comes in between.
+        self._monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
         self._monitor.advance()
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from enfilade.codec import write_json
 from enfilade.errors import EnfiladeError
 from enfilade.pipeline.job import read_job
-from enfilade.pipeline.units import STEPS
+from enfilade.pipeline.units import CLIPS_STEP, STEPS, clips_of
 
 TEMPLATE = "farm.template.json"  # in the run folder
 SPECIFICATION = "jobtemplate-2023-09"
@@ -52,7 +52,8 @@ def template(folder: Path, chunks: int | None = None) -> dict[str, Any]:
     count = chunks or chunks_for(len(job.path))
     steps: list[dict[str, Any]] = []
     for step in STEPS[job.method]:
-        steps.append(_step(step.name, steps, count if step.is_shared else 1))
+        most = len(clips_of(job)) if step.name == CLIPS_STEP else count
+        steps.append(_step(step.name, steps, min(count, most) if step.is_shared else 1))
     steps.append(_step(LAST, steps, 0))
     return {
         "specificationVersion": SPECIFICATION,

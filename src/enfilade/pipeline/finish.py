@@ -91,6 +91,7 @@ def write_clip(workshop: Workshop, name: str, span: range) -> None:
 def write_video(workshop: Workshop, spans: Sequence[range]) -> None:
     """Put the clips together."""
     job = workshop.job
+    workshop.monitor.stage("video", 0)
     clips = [_clip(workshop, span) for span in spans]
     with workshop.costs.of("video"):
         for clip in clips:
@@ -167,4 +168,5 @@ def _finished(workshop: Workshop, span: range) -> Iterator[F32]:
         file = workshop.run.file("frames", workshop.number(frame))
         workshop.run.check(file)
         yield read_exr(file)["RGB"].astype(np.float32)
+        workshop.monitor.stage("video", 0)
         workshop.monitor.advance()

@@ -37,19 +37,20 @@ CLIP = 240  # frames that are encoded in one go; x264 begins anew after 250
 # Stages, in the order in which their units are begun.
 SURVEY, DRAFTS, CELLS, PILOT, KEYFRAMES, LIGHT, INBETWEENS, FRAMES, CLIPS, VIDEO = range(10)
 
+CLIPS_STEP = "clips"
 # Steps of a run by method, one after the other.
 STEPS: dict[str, list[Step]] = {
     "reference": [
         Step("plan", {"survey"}),
         Step("frames", {"reference"}, is_shared=True),
-        Step("clips", {"clip"}, is_shared=True),
+        Step(CLIPS_STEP, {"clip"}, is_shared=True),
     ],
     "paper": [
         Step("plan", {"survey"}),
         Step("keyframes", {"keyframe"}, is_shared=True),
         Step("segments", {"keyframe", "segment", "raw"}, is_shared=True),
         Step("frames", {"antialias"}, is_shared=True),
-        Step("clips", {"clip"}, is_shared=True),
+        Step(CLIPS_STEP, {"clip"}, is_shared=True),
     ],
     "decoupled": [
         Step("plan", {"survey"}),
@@ -58,8 +59,9 @@ STEPS: dict[str, list[Step]] = {
         Step("pilot", {"pilot"}),
         Step("keyframes", {"page"}, is_shared=True),
         Step("light", {"light"}, is_shared=True),
+        Step("shading", {"shade"}, is_shared=True),
         Step("frames", {"decoupled"}, is_shared=True),
-        Step("clips", {"clip"}, is_shared=True),
+        Step(CLIPS_STEP, {"clip"}, is_shared=True),
     ],
 }
 
@@ -243,7 +245,7 @@ class Blueprint:
         for span in spans:
             needs = tuple(f"frame {self._numbers[f]}" for f in span)
             facts = {"frame": span.start}
-            yield Unit(clip_name(self._job, span), "clip", facts, needs, (CLIPS, span.start), "clip")
+            yield Unit(clip_name(self._job, span), "clip", facts, needs, (CLIPS, span.start))
         yield Unit(
             "video", "video", needs=tuple(clip_name(self._job, span) for span in spans), order=(VIDEO,)
         )

@@ -5,6 +5,7 @@
     run.json         identity: scene fingerprint, path, settings, versions, method
     keyframes/NNNN.exr   cells/NNNN.npz   raw/NNNN.exr   frames/NNNN.exr   by frame number, 4 digits or more
     ledger.jsonl     one line for each finished unit of work
+    clips/NNNN.mp4   parts of the video, by the number of their first frame
     summary.json     plots/     video.mp4
     run.lock         who is writing here
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import resource
 import signal
@@ -66,19 +67,30 @@ def _serve(line: socket.socket, seconds: float) -> None:
         except MemoryError:
             sys.exit(1)
         except InputError as error:
+            if _is_out_of_memory(error.__cause__):
+                sys.exit(1)
             head, pixels = {"error": type(error).__name__, "text": str(error)}, {}
         else:
             head = {"value": answer}
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        send(line, head, pixels)
+        try:
+            send(line, head, pixels)
+        except ConnectionError:
+            return
+
+
+def _is_out_of_memory(error: BaseException | None) -> bool:
+    return isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
 
 
 def _main(handle: int, parent: int, megabytes: int, seconds: float) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ^C is for the command, which closes the line
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it died before
         sys.exit(1)
-    resource.setrlimit(resource.RLIMIT_AS, (megabytes * MB, megabytes * MB))
+    most = megabytes * MB
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with socket.socket(fileno=handle) as line:
         _serve(line, seconds)

@@ -114,7 +114,7 @@ def join_videos(
             with _opened(clip) as opened:
                 stream = stream or _copied(container, opened.streams.video[0])
                 held = 0
-                for packet in _packets(opened):
+                for packet in _packets(clip, opened):
                     shown = first + _frame(packet.pts, packet, rate)
                     packet.stream, packet.time_base = stream, 1 / rate
                     packet.pts, packet.dts, packet.duration = shown, first + held - delay, 1
@@ -128,14 +128,16 @@ def join_videos(
 def _delay(clip: Path, rate: Fraction) -> int:
     """Frames by which a clip is decoded before it is shown."""
     with _opened(clip) as opened:
-        return max((-_frame(packet.dts, packet, rate) for packet in islice(_packets(opened), 1)), default=0)
+        return max(
+            (-_frame(packet.dts, packet, rate) for packet in islice(_packets(clip, opened), 1)), default=0
+        )
 
 
 def _opened(clip: Path) -> Any:
     try:
         return av.open(str(clip))
     except (av.FFmpegError, OSError) as error:
-        raise ImageError(f"{clip} is missing or damaged ({error}); delete it to make it again") from error
+        raise _damaged(clip, error) from error
 
 
 def _copied(container: Any, template: Any) -> Any:
@@ -146,9 +148,22 @@ def _copied(container: Any, template: Any) -> Any:
     return stream
 
 
-def _packets(opened: Any) -> Iterator[Any]:
+def _packets(clip: Path, opened: Any) -> Iterator[Any]:
     """Of the picture; the last one that FFmpeg gives is empty."""
-    return (packet for packet in opened.demux(video=0) if packet.size)
+    packets = opened.demux(video=0)
+    while True:
+        try:
+            packet = next(packets)
+        except StopIteration:
+            return
+        except av.FFmpegError as error:
+            raise _damaged(clip, error) from error
+        if packet.size:
+            yield packet
+
+
+def _damaged(clip: Path, error: Exception) -> ImageError:
+    return ImageError(f"{clip} is missing or damaged ({error}); delete it to make it again")
 
 
 def _frame(time: int, packet: Any, rate: Fraction) -> int:

@@ -38,6 +38,8 @@ PATIENCE_S = 1.0  # before the process is killed
 class FencedSequence:
     """What :func:`~enfilade.video.open_sequence` opens, decoded by a process of its own.
 
+    The process ends with the thread that made it.
+
     Parameters
     ----------
     source
@@ -65,9 +67,10 @@ class FencedSequence:
         module = "enfilade.video.child"
         with there:
             child = subprocess.Popen(  # noqa: S603
-                [sys.executable, "-m", module, *map(str, options)],
+                [sys.executable, "-P", "-m", module, *map(str, options)],  # -P: no modules from here
                 pass_fds=[there.fileno()],
                 stdin=subprocess.DEVNULL,
+                process_group=0,  # ^C is for the command, which closes the line
                 stdout=subprocess.DEVNULL,
             )
         self._child = child
@@ -82,7 +85,7 @@ class FencedSequence:
         return self._count
 
     def __iter__(self) -> Iterator[F32]:
-        """Frames as (H, W, 3) float32 linear Rec.709, in order; a second iteration begins anew."""
+        """Frames as (H, W, 3) float32 linear Rec.709, in order; a second iteration ends the first."""
         self._ask("rewind")
         while frames := self._ask("next")[1]:
             yield frames["frame"]
@@ -105,7 +108,7 @@ class FencedSequence:
         try:
             send(self._line, [what, value], {})
             answer, pixels = receive(self._line, most_bytes=self._limits.trial_mb * MB)
-        except (OSError, EOFError, ValueError) as error:
+        except (OSError, EOFError, ValueError, TypeError, RecursionError) as error:
             raise ImageError(self._ended()) from error
         if "error" in answer:
             raise REFUSALS.get(answer["error"], ImageError)(answer["text"])
@@ -150,7 +153,7 @@ def receive(line: socket.socket, *, most_bytes: int) -> tuple[Any, dict[str, Any
     Raises
     ------
     ValueError
-        It is none, or announces an array of more than so many bytes.
+        It is none, or announces arrays of more than so many bytes.
     OSError, EOFError
         The other side is gone.
     """
@@ -161,7 +164,8 @@ def receive(line: socket.socket, *, most_bytes: int) -> tuple[Any, dict[str, Any
     pixels = {}
     for name, dtype, shape in shapes:
         size = math.prod(shape) * np.dtype(dtype).itemsize if dtype in DTYPES else -1
-        if not 0 <= size <= most_bytes:
+        most_bytes -= size
+        if size < 0 or most_bytes < 0:
             raise ValueError(f"{name} of {dtype} {shape}")
         pixels[name] = np.frombuffer(_exactly(line, size), dtype).reshape(shape)
     return head, pixels
