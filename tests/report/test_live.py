@@ -75,9 +75,17 @@ def test_it_follows_the_run(copied, monkeypatch):
 
 def test_the_command_serves_until_it_is_interrupted(copied):
     line = [sys.executable, "-m", "enfilade", "report", str(copied), "--serve", "--no-metric"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as process:  # noqa: S603
-        assert process.stdout is not None
-        address = process.stdout.readline().split()[1]
-        assert "iframe" in get(address)[0]
-        process.send_signal(signal.SIGINT)
-        assert process.wait(20) == 0
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True, preexec_fn=_heed_interrupts) as process:  # noqa: S603, PLW1509
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().split()[1]
+            assert "iframe" in get(address)[0]
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+
+
+def _heed_interrupts():
+    """Commands that a shell has put in the background ignore ^C, and hand that on."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
