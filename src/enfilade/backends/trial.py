@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 from pathlib import Path
 
+from enfilade.confined import limit_memory
 from enfilade.errors import SceneError
 from enfilade.settings import LimitSettings, TraceSettings
 
 __all__ = ["try_scene"]
 
-MB = 1 << 20
 REFUSED = 3  # exit code of a trial whose renderer said no
 
 
@@ -58,10 +57,7 @@ def _load(scene: str, megabytes: int, variant: str) -> int:
     from enfilade.backends.mitsuba3 import MitsubaRenderer
 
     if not is_gpu:  # CUDA maps all of the GPU's memory
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        most = megabytes * MB if hard == resource.RLIM_INFINITY else min(megabytes * MB, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        limit_memory(megabytes)
     try:
         MitsubaRenderer(Path(scene), TraceSettings())
     except SceneError as error:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
-import os
 import signal
 import socket
 import sys
 import traceback
 from typing import Any
 
+from enfilade.confined import die_with
 from enfilade.executors.executor import Failure, Recipe, Worker
-
-PR_SET_PDEATHSIG = 1  # prctl(2): a signal for this process when its parent dies
 
 
 def main() -> None:
     """Serve the supervisor at the other end of the socket whose number is the first argument."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # ^C is for the supervisor, who decides
-    _die_with(parent=int(sys.argv[2]))
+    die_with(int(sys.argv[2]))
     with socket.socket(fileno=int(sys.argv[1])) as line, line.makefile("rb") as told:
         recipe = Recipe(**json.loads(told.readline()))
         server = _Server(recipe, line)
@@ -48,12 +45,6 @@ class _Server:
 
     def _tell(self, what: str, value: Any) -> None:
         self._line.sendall(json.dumps([what, value]).encode() + b"\n")
-
-
-def _die_with(*, parent: int) -> None:
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before
-        sys.exit(1)
 
 
 if __name__ == "__main__":

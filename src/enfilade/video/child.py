@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
-import os
-import resource
 import signal
 import socket
 import sys
 from collections.abc import Iterator
 from typing import Any
 
+from enfilade.confined import die_with, limit_memory
 from enfilade.errors import InputError
 from enfilade.records import F32
-from enfilade.video.fence import MB, receive, send
+from enfilade.video.fence import receive, send
 from enfilade.video.sequence import Sequence, open_sequence
-
-PR_SET_PDEATHSIG = 1  # prctl(2): a signal for this process when its parent dies
 
 
 class _Decoder:
@@ -84,14 +80,8 @@ def _is_out_of_memory(error: BaseException | None) -> bool:
 
 
 def _main(handle: int, parent: int, megabytes: int, seconds: float) -> None:
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before
-        sys.exit(1)
-    most = megabytes * MB
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    die_with(parent)
+    limit_memory(megabytes)
     with socket.socket(fileno=handle) as line:
         _serve(line, seconds)
 

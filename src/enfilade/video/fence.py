@@ -25,7 +25,7 @@ from enfilade.errors import ImageError, InputError, RunFolderError
 from enfilade.records import F32
 from enfilade.settings import LimitSettings
 
-__all__ = ["MB", "FencedSequence", "receive", "send"]
+__all__ = ["FencedSequence", "receive", "send"]
 
 MB = 1 << 20
 SIZE_BYTES = 8  # of the number that says how long a message is
