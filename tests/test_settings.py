@@ -103,6 +103,7 @@ def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
         ({"antialias": {"separate_items": 1}}, "expected bool"),
         ({"keyframes": {"placement": "best"}}, "'best': choose one of adapted, uniform, equal-flow"),
         ({"keyframes": {"placement": 3}}, "choose one of"),
+        ({"light": {"lobe_samples": 1}}, "lobe_samples = 1: of one ray the noise can't be told"),
         ({"video": {"codec": "divx"}}, "'divx': choose one of h264, ffv1, av1, prores"),
         ({"video": {"codec": ["h264"]}}, "expected str"),
     ],

@@ -222,6 +222,14 @@ class LightSettings(Section):
         choices=("none", "fast", "balanced", "high"),
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.lobe_samples == 1:
+            raise SettingsError(
+                "[light] lobe_samples = 1: of one ray the noise can't be told; give 2 or more, or 0 for as "
+                "many as the quality asks for"
+            )
+
 
 @dataclass(frozen=True)
 class VideoSettings(Section):

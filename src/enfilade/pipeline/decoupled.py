@@ -175,9 +175,7 @@ def _scattered(
         is_stratified=True,
     )
     light = settings.light
-    scattered.add(
-        max(light.lobe_samples, 2) if light.lobe_samples else _between(LOBE_SAMPLES, math.sqrt(light.quality))
-    )
+    scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
     flags = where.reshape(path.height, path.width)
     return smoothed(shown, scattered.shading.spread(flags)), scattered.paths
 

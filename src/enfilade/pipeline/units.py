@@ -244,7 +244,7 @@ class Blueprint:
         spans = clips_of(self._job)
         for span in spans:
             needs = tuple(f"frame {self._numbers[f]}" for f in span)
-            facts = {"frame": span.start}
+            facts = {"frame": span.start, "end": span.stop}
             yield Unit(clip_name(self._job, span), "clip", facts, needs, (CLIPS, span.start))
         yield Unit(
             "video", "video", needs=tuple(clip_name(self._job, span) for span in spans), order=(VIDEO,)

@@ -62,7 +62,7 @@ class Worker:
             case "survey":
                 self._survey()
             case "clip":
-                span = next(s for s in clips_of(self._job) if s.start == facts["frame"])
+                span = range(facts["frame"], facts["end"])
                 write_clip(self._workshop, clip_name(self._job, span), span)
             case "video":
                 write_video(self._workshop, clips_of(self._job))
