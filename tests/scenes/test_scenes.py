@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from scene_views import View, folder_bytes, read_path
 
-from enfilade.errors import InputError
+from enfilade.errors import InputError, SettingsError
+from enfilade.path import load_path
 from enfilade.scenes import PRESETS, SCENES, SceneFiles, write_scene
 from enfilade.scenes.atrium import walk as atrium_walk
 from enfilade.scenes.presets import PRESETS as SIZES
@@ -34,6 +35,16 @@ def test_import_loads_nothing_heavy() -> None:
 def test_same_call_writes_same_bytes(name: str, small: dict[str, SceneFiles], tmp_path: Path) -> None:
     again = write_scene(name, tmp_path / "again", preset="small")
     assert folder_bytes(again.scene.parent) == folder_bytes(small[name].scene.parent)
+
+
+def test_another_size_shows_more_to_the_sides(small: dict[str, SceneFiles], tmp_path: Path) -> None:
+    wide = write_scene("room", tmp_path / "wide", preset="small", size=(64, 36))
+    path, usual = load_path(wide.path), load_path(small["room"].path)
+    assert (path.width, path.height) == (64, 36)
+    assert path.cameras[0].fov_deg == usual.cameras[0].fov_deg
+    film = ET.parse(wide.scene).getroot().find("sensor/film")  # noqa: S314
+    assert film is not None
+    assert [e.get("value") for e in film.iter("integer")] == ["64", "36"]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -132,6 +143,11 @@ def test_camera_keeps_clear_and_indoors(name: str, look: Look) -> None:
         distance = look(name, frame).distance
         assert distance.min() > 0.3
         assert np.isfinite(distance).all()  # no ray leaves through a gap
+
+
+def test_a_size_without_pixels_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="no image of 0x9 pixels"):
+        write_scene("room", tmp_path, size=(0, 9))
 
 
 @pytest.mark.parametrize(("name", "preset"), [("cellar", "full"), ("room", "huge")])

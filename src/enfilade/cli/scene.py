@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.inputs import json_option
+from enfilade.cli.inputs import Size, json_option
 from enfilade.scenes import PRESETS, SCENES
 
 
@@ -29,13 +29,18 @@ from enfilade.scenes import PRESETS, SCENES
     show_default=True,
     help="The whole walk at 640x480, or a short one at 320x240.",
 )
+@click.option(
+    "--size",
+    type=Size(),
+    help="Width and height of the frames, pixels, of any aspect.  [default: the preset's]",
+)
 @json_option
 @debug_option
-def command(*, name: str, folder: Path, preset: str, as_json: bool) -> None:
+def command(*, name: str, folder: Path, preset: str, size: tuple[int, int] | None, as_json: bool) -> None:
     """Write a generated scene and its camera path: room (diffuse) or atrium (mirrors, glass, gloss)."""
     from enfilade.scenes import write_scene
 
-    files = write_scene(name, folder, preset=preset)
+    files = write_scene(name, folder, preset=preset, size=size)
     if as_json:
         click.echo(json.dumps({"scene": str(files.scene), "path": str(files.path)}, indent=2))
         return

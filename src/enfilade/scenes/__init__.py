@@ -30,7 +30,9 @@ class SceneFiles:
     path: Path
 
 
-def write_scene(name: str, folder: Path, *, preset: str = "full") -> SceneFiles:
+def write_scene(
+    name: str, folder: Path, *, preset: str = "full", size: tuple[int, int] | None = None
+) -> SceneFiles:
     """Write a generated scene and its camera path. The same call writes the same bytes.
 
     Parameters
@@ -42,13 +44,15 @@ def write_scene(name: str, folder: Path, *, preset: str = "full") -> SceneFiles:
         Made if absent; files of the same names are replaced.
     preset
         `full` (640 x 480) or `small` (320 x 240, fewer frames, coarser shapes).
+    size
+        Width and height of the frames, pixels, in place of the preset's. The vertical angle of view stays.
 
     Raises
     ------
     SceneError
         No scene has this name.
     SettingsError
-        No preset has this name.
+        No preset has this name, or no image this size.
     """
     if name not in SCENES:
         known = ", ".join(SCENES)
@@ -56,9 +60,11 @@ def write_scene(name: str, folder: Path, *, preset: str = "full") -> SceneFiles:
     if preset not in PRESETS:
         known = ", ".join(PRESETS)
         raise SettingsError(f"there is no preset {preset!r}; the known ones are {known}")
+    if size is not None and min(size) < 1:
+        raise SettingsError(f"there is no image of {size[0]}x{size[1]} pixels")
     from enfilade.scenes.build import build_scene
 
-    scene, path = build_scene(name, Path(folder), preset)
+    scene, path = build_scene(name, Path(folder), preset, size)
     return SceneFiles(scene=scene, path=path)
 
 

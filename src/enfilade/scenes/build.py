@@ -10,15 +10,16 @@ from enfilade.scenes.walk import write_path
 from enfilade.scenes.writer import SceneWriter
 
 
-def build_scene(name: str, folder: Path, preset_name: str) -> tuple[Path, Path]:
+def build_scene(name: str, folder: Path, preset_name: str, size: tuple[int, int] | None) -> tuple[Path, Path]:
     """Write `scene.xml` and `camera_path.json` of a known scene and preset; return both paths."""
     design = {"room": room, "atrium": atrium}[name]
     preset = PRESETS[preset_name]
+    size = size or preset.size
     writer = SceneWriter(folder)
     design.furnish(writer, preset)
     walk, frames = design.walk(preset)
     poses = walk.poses(frames)
-    scene = writer.write(camera_to_world=poses[0], fov_deg=walk.fov_deg, size=preset.size)
+    scene = writer.write(camera_to_world=poses[0], fov_deg=walk.fov_deg, size=size)
     path = folder / "camera_path.json"
-    write_path(path, poses, fov_deg=walk.fov_deg, size=preset.size)
+    write_path(path, poses, fov_deg=walk.fov_deg, size=size)
     return scene, path
