@@ -6,7 +6,15 @@ import pytest
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.geometry import find_geometry, positions
-from enfilade.irradiance import LightCache, Shader, VirtualImages, open_cache, open_page, over_time
+from enfilade.irradiance import (
+    LightCache,
+    Shader,
+    VirtualImages,
+    open_cache,
+    open_page,
+    open_scattered,
+    over_time,
+)
 from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.records import LightPage, Shading
@@ -236,14 +244,15 @@ def test_what_moves_along_is_averaged(diffuse):
         size = geometry.item.shape
         color = rng.normal(1.0, 0.1, (*size, 3)).astype(np.float32)
         frames.append((geometry, Shading(color, np.full(size, 0.01, np.float32)), geometry.is_hit))
-    averaged = over_time(frames[0], frames[1:], [1.0, 1.0])
+    pages = [open_scattered(*frame) for frame in frames]
+    averaged = over_time(frames[0][0], pages[0], pages[1:], [1.0, 1.0])
     where = frames[0][2]
     assert averaged[where].std() < 0.75 * frames[0][1].color[where].std()
     assert abs(averaged[where].mean() - 1.0) < 0.01
     assert not averaged[~where].any()
     # What is far from the frame's own value is no noise.
-    brighter = [(g, Shading(s.color + 5.0, s.variance), w) for g, s, w in frames[1:]]
-    kept = over_time(frames[0], brighter, [1.0, 1.0])
+    brighter = [open_scattered(g, Shading(s.color + 5.0, s.variance), w) for g, s, w in frames[1:]]
+    kept = over_time(frames[0][0], pages[0], brighter, [1.0, 1.0])
     np.testing.assert_allclose(kept[where], frames[0][1].color[where], atol=1e-2)
 
 

@@ -25,7 +25,6 @@ __all__ = [
 ]
 
 F16 = npt.NDArray[np.float16]
-HALF_MAX = 65504.0  # largest finite half float, IEEE 754
 
 
 def write_shading(file: Path, shading: Shading) -> None:
@@ -147,8 +146,9 @@ def read_parts(file: Path) -> tuple[F32, Shading, U8]:
 
 
 def _parts(seen: Array, color: Array, variance: Array, *, dropped: int) -> tuple[F32, Shading]:
-    wide = [values.astype(np.float32) for values in (seen, color, variance)]
-    return wide[0], Shading(wide[1], wide[2], dropped)
+    from enfilade.arrays import widened  # here, not above: who only reads pictures needs no Dr.Jit
+
+    return widened(seen), Shading(widened(color), widened(variance), dropped)
 
 
 def _dropped(file: Path) -> int:
@@ -232,7 +232,9 @@ def write_result(
 
 
 def _half(values: F32) -> F16:
-    return np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16)
+    from enfilade.arrays import halves  # here, not above: who only reads pictures needs no Dr.Jit
+
+    return halves(values)
 
 
 def _required(file: Path, kinds: Mapping[str, type]) -> dict[str, Array]:

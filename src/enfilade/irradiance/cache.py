@@ -132,11 +132,23 @@ def smoothed(geometry: Geometry, shading: Shading) -> Shading:
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
 
 
-def over_time(
-    here: tuple[Geometry, Shading, Mask],
-    others: Sequence[tuple[Geometry, Shading, Mask]],
-    shares: Sequence[float],
-) -> F32:
+def open_scattered(geometry: Geometry, scattered: Shading, where: Mask) -> Page:
+    """Make what lobes scatter ready for :func:`over_time`.
+
+    Parameters
+    ----------
+    geometry
+        Of the frame, with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`).
+    scattered : Shading
+        Smoothed, with the noise that is left, (H, W).
+    where : (H, W) bool
+        Pixels that have it.
+    """
+    layers = [(lanes(scattered.color), lanes(scattered.variance))]
+    return _page(geometry, lanes(where), layers, has_normals=False)
+
+
+def over_time(geometry: Geometry, here: Page, others: Sequence[Page], shares: Sequence[float]) -> F32:
     """Average what surfaces scatter with what frames around saw of it, each along its own motion.
 
     A virtual image is looked up where it seemed to be. What differs from the frame's own value by more than
@@ -144,26 +156,24 @@ def over_time(
 
     Parameters
     ----------
+    geometry
+        Of the frame, with virtual images.
     here, others
-        Geometry with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`), smoothed colours
-        with the noise that is left, and the pixels that have them: of the frame, and of frames around it.
+        Pages of :func:`open_scattered`: the frame's own, and those of frames around it.
     shares
         How much each of the others counts; the frame itself counts one.
 
     Returns
     -------
     (H, W, 3) float32
+        0 where the frame has none.
     """
-    geometry, own, where = here
-    color, variance = lanes(own.color), lanes(own.variance)
-    position, normal, item = _points(geometry), _fronts(geometry), lanes(geometry.item)
+    (color,), (variance,) = here.values, here.variances
+    position, normal = _points(geometry, here.depths), _fronts(geometry, here)
     total, weight = Array3f(color), Float(1)
     luminance = dr.dot(color, Array3f(*LUMINANCE))
-    for (around, shading, known), share in zip(others, shares, strict=True):
-        page = _page(
-            around, lanes(known), [(lanes(shading.color), lanes(shading.variance))], has_normals=False
-        )
-        found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+    for page, share in zip(others, shares, strict=True):
+        found = lookup(position, normal, here.items, page, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
         apart = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)
@@ -171,15 +181,13 @@ def over_time(
         counts = dr.select(found.weight > KNOWN, opaque(share) * counts, 0.0)
         total += counts * value
         weight += counts
-    mean = image(total / weight, *where.shape)
-    averaged: F32 = np.where(where[..., None], mean, np.float32(0))
-    return averaged
+    return image(total / weight, here.height, here.width)
 
 
-def _fronts(geometry: Geometry) -> Any:
+def _fronts(geometry: Geometry, page: Page) -> Any:
     """Normals; of virtual images, those of planes that face the eye."""
-    is_real = lanes(geometry.item) < BEHIND
-    toward = vector3(geometry.camera.eye) - _points(geometry)
+    is_real = page.items < BEHIND
+    toward = vector3(geometry.camera.eye) - _points(geometry, page.depths)
     return dr.select(is_real, lanes(geometry.normal), toward)
 
 
@@ -224,7 +232,11 @@ def _gathered(
     geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]
 ) -> tuple[list[tuple[Any, Any]], Any]:
     """Light at what the pixels' centres of a view see, with its variance, by layer; and where it is known."""
-    position, normal, item = _points(geometry), lanes(geometry.normal), lanes(geometry.item)
+    position, normal, item = (
+        _points(geometry, lanes(geometry.depth)),
+        lanes(geometry.normal),
+        lanes(geometry.item),
+    )
     own = footprint(position, normal, vector3(geometry.camera.eye))
     layers = range(len(pages[0].values))
     totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
@@ -244,13 +256,14 @@ def _gathered(
     return list(zip(light, variance, strict=True)), is_known
 
 
-def _points(geometry: Geometry) -> Any:
+def _points(geometry: Geometry, depths: Any) -> Any:
+    """Where pixels' centres meet surfaces at some depths, in the world."""
     camera = geometry.camera
     _, column, row = pixel_grid(camera.height, camera.width)
     direction = pinhole_directions(
         Float(column) + 0.5, Float(row) + 0.5, direction_from_pixel=matrix3(camera.direction_from_pixel)
     )
-    return vector3(camera.eye) + lanes(geometry.depth) * direction
+    return vector3(camera.eye) + depths * direction
 
 
 def _page(

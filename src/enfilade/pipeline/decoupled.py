@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation
 
 from enfilade.codec import read_parts, write_parts
-from enfilade.irradiance import LightCache, over_time, smoothed
+from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
+from enfilade.pixels.lookup import Page
 from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
@@ -70,10 +70,10 @@ class DecoupledFrames:
         color = here.seen
         if np.any(here.source == Source.SPECULAR):
             with workshop.costs.of("over time"):
-                color = color + over_time(here.lobes, [parts[f].lobes for f in others], shares)
+                around = [parts[f].scattered for f in others]
+                color = color + over_time(here.shown, here.scattered, around, shares)
         made = Frame(color, here.source)
-        dropped = here.scattered.dropped
-        write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, dropped)
+        write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, here.dropped)
 
     def _shaded(self, table: LightTable, frame: int) -> _Parts:
         workshop = self._workshop
@@ -93,13 +93,16 @@ class DecoupledFrames:
         rays = {"camera": estimate.paths, "lobes": lobe_rays}
         number = workshop.number(frame)
         workshop.finish(raw_unit(workshop, frame), [file], frame=number, dropped=dropped, rays=rays)
-        return _Parts(view, seen, scattered, source, shown)
+        return _parts(workshop, view, shown, seen, scattered, source)
 
     def _read(self, table: LightTable, frame: int) -> _Parts:
         file = self._workshop.run.file("raw", self._workshop.number(frame))
         self._workshop.run.check(file)
         view = self._workshop.views[frame]
-        return _Parts(view, *read_parts(file), table.virtual_images.of(view.geometry))
+        shown = table.virtual_images.of(view.geometry)
+        with self._workshop.costs.of("files"):
+            seen, scattered, source = read_parts(file)
+        return _parts(self._workshop, view, shown, seen, scattered, source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,17 +110,19 @@ class _Parts:
     """A frame shaded by itself; ``shown`` is its geometry with virtual images."""
 
     view: View
-    seen: F32
-    scattered: Shading
-    source: U8
     shown: Geometry
+    seen: F32
+    scattered: Page
+    source: U8
+    dropped: int
 
-    @property
-    def lobes(self) -> tuple[Geometry, Shading, Mask]:
-        """What :func:`over_time` takes."""
-        width = self.source.shape[1]
-        where = _grown((self.source == Source.SPECULAR).ravel(), width).reshape(-1, width)
-        return self.shown, self.scattered, where
+
+def _parts(
+    workshop: Workshop, view: View, shown: Geometry, seen: F32, scattered: Shading, source: U8
+) -> _Parts:
+    with workshop.costs.of("over time"):
+        page = open_scattered(shown, scattered, _grown(source == Source.SPECULAR))
+    return _Parts(view, shown, seen, page, source, scattered.dropped)
 
 
 def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:
@@ -137,7 +142,7 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
     if most > least:
         shading = seen.shading
         is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * quality * _luminance(shading)
-        seen.add(most - least, _grown(is_edge, path.width))
+        seen.add(most - least, _grown(is_edge.reshape(path.height, path.width)).ravel())
     return seen
 
 
@@ -161,7 +166,7 @@ def _scattered(
     half as many more for all do.
     """
     path, settings = workshop.job.path, workshop.job.settings
-    where = _grown(seen.is_marked, path.width)
+    where = _grown(seen.is_marked.reshape(path.height, path.width))
     if not where.any():
         size = path.height, path.width
         return Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)), 0
@@ -176,8 +181,7 @@ def _scattered(
     )
     light = settings.light
     scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
-    flags = where.reshape(path.height, path.width)
-    return smoothed(shown, scattered.shading.spread(flags)), scattered.paths
+    return smoothed(shown, scattered.shading.spread(where)), scattered.paths
 
 
 def _between(samples: tuple[float, int, int], quality: float) -> int:
@@ -190,7 +194,9 @@ def _luminance(shading: Shading) -> npt.NDArray[np.float32]:
     return mean
 
 
-def _grown(chosen: npt.NDArray[np.bool_], width: int) -> npt.NDArray[np.bool_]:
-    """Pixels of a flat image, and those around them."""
-    grown: npt.NDArray[np.bool_] = binary_dilation(chosen.reshape(-1, width), np.ones((3, 3), bool)).ravel()
+def _grown(chosen: Mask) -> Mask:
+    """Pixels, and the eight around each."""
+    padded = np.pad(chosen, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    grown: Mask = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
     return grown
