@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from enfilade.errors import SettingsError
 from enfilade.settings import (
+    LAYERS,
     KeyframeSettings,
+    OutputSettings,
     Placement,
     SampleFilter,
     Settings,
@@ -104,6 +106,8 @@ def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
         ({"keyframes": {"placement": "best"}}, "'best': choose one of adapted, uniform, equal-flow"),
         ({"keyframes": {"placement": 3}}, "choose one of"),
         ({"light": {"lobe_samples": 1}}, "lobe_samples = 1: of one ray the noise can't be told"),
+        ({"output": {"layers": "Z,z"}}, "no layer 'z'; write all, none, or some of Z,P,N,albedo,item,"),
+        ({"output": {"layers": ""}}, "no layer ''"),
         ({"video": {"codec": "divx"}}, "'divx': choose one of h264, ffv1, av1, prores"),
         ({"video": {"codec": ["h264"]}}, "expected str"),
     ],
@@ -111,6 +115,13 @@ def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
 def test_wrong_settings_are_named(tables, problem):
     with pytest.raises(SettingsError, match=problem):
         Settings.from_tables(tables)
+
+
+@pytest.mark.parametrize(
+    ("layers", "chosen"), [("all", LAYERS), ("none", ()), ("source, Z", ("Z", "source")), ("N", ("N",))]
+)
+def test_layers_by_name(layers, chosen):
+    assert OutputSettings(layers).chosen == frozenset(chosen)
 
 
 def test_sections_check_themselves_when_made():

@@ -241,6 +241,34 @@ class VideoSettings(Section):
     view: str = option("", "The view of that configuration.")
 
 
+LAYERS = ("Z", "P", "N", "albedo", "item", "forward", "backward", "source")  # of delivered frames
+
+
+@dataclass(frozen=True)
+class OutputSettings(Section):
+    """Files of delivered frames."""
+
+    layers: str = option(
+        "forward,backward,source",
+        f"Layers beside the colours: some of {','.join(LAYERS)}; or all, or none. Depth, position, normal, "
+        "albedo, number of the item, image flow, and why a pixel has its value.",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if unknown := sorted(self.chosen.difference(LAYERS)):
+            raise SettingsError(
+                f"[output] layers = {self.layers!r}: there is no layer {unknown[0]!r}; write all, none, or "
+                f"some of {','.join(LAYERS)}"
+            )
+
+    @property
+    def chosen(self) -> frozenset[str]:
+        """The layers' names."""
+        groups = {"all": LAYERS, "none": ()}
+        return frozenset(groups.get(self.layers, [name.strip() for name in self.layers.split(",")]))
+
+
 @dataclass(frozen=True)
 class LimitSettings(Section):
     """What scenes and images may ask for before they are read; no result depends on it."""
@@ -275,6 +303,7 @@ class Settings:
     antialias: AntialiasSettings = field(default_factory=AntialiasSettings)
     light: LightSettings = field(default_factory=LightSettings)
     video: VideoSettings = field(default_factory=VideoSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
     limits: LimitSettings = field(default_factory=LimitSettings)
 
     @classmethod

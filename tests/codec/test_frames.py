@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from enfilade.camera import Camera
 from enfilade.codec import (
     read_exr,
     read_frame,
@@ -24,7 +23,7 @@ from enfilade.codec import (
     write_shading,
 )
 from enfilade.errors import ImageError
-from enfilade.records import Flow, Frame, Geometry, Shading
+from enfilade.records import Frame, Shading
 
 sizes = st.tuples(st.integers(1, 24), st.integers(1, 24))
 RELAXED = settings(
@@ -103,19 +102,18 @@ def test_the_delivered_frame(tmp_path):
     height, width = 6, 9
     three, two = rng.random((height, width, 3), np.float32), rng.random((height, width, 2), np.float32)
     item = rng.integers(0, 2**32, (height, width), dtype=np.uint32)
-    surface = np.ones((height, width), np.uint8)
-    camera = Camera(np.eye(4), 50.0, width, height)
-    geometry = Geometry(camera, three[..., 0].copy(), three, three, item, surface)
+    source = np.ones((height, width), np.uint32)
     color = three.copy()
     color[0, 0] = (1e9, -1e9, 65504)
-    flow = Flow(two, -two, has_backward=True, has_forward=True)
-    write_result(tmp_path / "a.exr", color, surface, geometry, flow, position=three, attributes={"frame": 12})
+    put = {"Z": three[..., 0].copy(), "P": three, "N": three, "albedo": three, "item": item}
+    put |= {"forward": -two, "backward": two, "source": source}
+    write_result(tmp_path / "a.exr", color, put, attributes={"frame": 12})
     layers = read_exr(tmp_path / "a.exr")
     np.testing.assert_array_equal(layers["RGB"][0, 0], (65504, -65504, 65504))
     np.testing.assert_array_equal(layers["RGB"][1:], color[1:].astype(np.float16))
-    for name, array in {"item": item, "source": surface}.items():
+    for name, array in {"item": item, "source": source}.items():
         np.testing.assert_array_equal(layers[name], array)
-    rounded = {"Z": geometry.depth, "P": three, "forward": -two, "backward": two}
+    rounded = {"Z": put["Z"], "P": three, "forward": -two, "backward": two}
     for name, array in rounded.items():
         np.testing.assert_allclose(layers[name], array, rtol=2.0**-16)
     assert {name: str(a.dtype) for name, a in layers.items()} == {

@@ -36,7 +36,8 @@ FOREIGN = {  # flags that say nothing to a method, and what does
     },
 }
 JOB_SECTIONS = (
-    "trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video", "limits",
+    "trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video", "output",
+    "limits",
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from enfilade.codec.exr import Array, read_attributes, read_exr, write_exr
 from enfilade.errors import ImageError
-from enfilade.records import F32, U8, Flow, Frame, Geometry, Mask, Shading
+from enfilade.records import F32, U8, Frame, Mask, Shading
 
 __all__ = [
     "read_frame",
@@ -25,6 +25,7 @@ __all__ = [
 ]
 
 F16 = npt.NDArray[np.float16]
+HALVES = frozenset({"N", "albedo"})  # layers for which eleven bits do
 
 
 def write_shading(file: Path, shading: Shading) -> None:
@@ -184,51 +185,32 @@ def read_frame(file: Path) -> Frame:
 def write_result(
     file: Path,
     color: F32,
-    source: U8,
-    geometry: Geometry,
-    flow: Flow,
+    layers: Mapping[str, Array],
     *,
-    position: F32,
     attributes: Mapping[str, str | float | int] | None = None,
 ) -> None:
     """Write a delivered frame, in formats that other programs read.
 
-    ``R G B``, ``N`` and ``albedo`` are half floats, ``Z``, ``P``, ``forward.u/v`` and ``backward.u/v``
-    floats, ``item`` and ``source`` unsigned integers. Floats are rounded to 16 significant bits: a point 10 m
-    away to 0.2 mm; keep a scene near its origin.
+    ``R G B``, ``N`` and ``albedo`` are half floats, other floats are rounded to 16 significant bits: a point
+    10 m away to 0.2 mm; keep a scene near its origin. Integers are kept.
 
     Parameters
     ----------
     file
     color : (H, W, 3) float32
         Linear Rec.709. Values beyond the range of a half float become its ends.
-    source : (H, W) uint8
-        ``records.Source``.
-    geometry
-    flow
-        Pixels per frame, x right, y down.
-    position : (H, W, 3) float32
-        In the world.
+    layers
+        Those that go with it, by names of ``settings.LAYERS``; see :func:`~enfilade.codec.exr.write_exr`.
     attributes
-        Of the header, see :func:`~enfilade.codec.exr.write_exr`.
+        Of the header.
 
     Raises
     ------
     RunFolderError
         The file can't be written.
     """
-    layers: dict[str, Array] = {
-        "RGB": _half(color),
-        "Z": geometry.depth,
-        "P": position,
-        "N": _half(geometry.normal),
-        "albedo": _half(geometry.albedo),
-        "item": geometry.item,
-        "forward": flow.forward,
-        "backward": flow.backward,
-        "source": source.astype(np.uint32),
-    }
-    write_exr(file, layers, attributes=attributes, is_exact=False)
+    written = {name: _half(array) if name in HALVES else array for name, array in layers.items()}
+    write_exr(file, {"RGB": _half(color), **written}, attributes=attributes, is_exact=False)
 
 
 def _half(values: F32) -> F16:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -142,16 +143,14 @@ def _filtered(workshop: Workshop, frame: int, window: dict[int, _Raw]) -> F32:
 def write_frame_result(
     workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made: Frame, dropped: int
 ) -> None:
-    """Write a delivered frame with all its layers, and record it."""
+    """Write a delivered frame with the layers asked for, and record it."""
+    chosen = workshop.job.settings.output.chosen
     file = workshop.run.file("frames", workshop.number(frame))
     with workshop.costs.of("files"):
         write_result(
             file,
             made.color,
-            made.source,
-            geometry,
-            flow,
-            position=positions(geometry),
+            delivered_layers(chosen, geometry, flow, made.source),
             attributes={"framesPerSecond": float(workshop.job.path.fps)},
         )
     workshop.finish(
@@ -161,6 +160,25 @@ def write_frame_result(
         sources=made.counts,
         dropped=dropped,
     )
+
+
+def delivered_layers(chosen: Container[str], geometry: Geometry, flow: Flow, source: U8) -> dict[str, Any]:
+    """Layers of a delivered frame, those of ``settings.LAYERS`` that are chosen.
+
+    ``Z`` and ``P`` are in scene units, in the world; ``forward`` and ``backward`` in pixels per frame, x
+    right, y down; ``item`` and ``source`` (``records.Source``) are unsigned integers.
+    """
+    layers: dict[str, Callable[[], Any]] = {
+        "Z": lambda: geometry.depth,
+        "P": lambda: positions(geometry),
+        "N": lambda: geometry.normal,
+        "albedo": lambda: geometry.albedo,
+        "item": lambda: geometry.item,
+        "forward": lambda: flow.forward,
+        "backward": lambda: flow.backward,
+        "source": lambda: source.astype(np.uint32),
+    }
+    return {name: layer() for name, layer in layers.items() if name in chosen}
 
 
 def _finished(workshop: Workshop, span: range) -> Iterator[F32]:

@@ -17,15 +17,17 @@ import numpy as np
 from enfilade import __version__
 from enfilade.codec import read_exr, write_exr, write_result
 from enfilade.denoise import denoise, denoiser_name
-from enfilade.geometry import find_geometry, image_flow, positions
+from enfilade.geometry import find_geometry, image_flow
 from enfilade.monitor import Monitor, Silence
 from enfilade.pipeline.cost import Costs
+from enfilade.pipeline.finish import delivered_layers
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import initial_segments, survey_path
 from enfilade.pipeline.views import Views
 from enfilade.pixels.estimate import PASS
 from enfilade.records import F32, CameraPath, Source
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.settings import LAYERS
 from enfilade.store import Run
 from enfilade.studies.bench.guides import guides
 from enfilade.video import exact_fps
@@ -123,7 +125,7 @@ class EveryFrame:
         geometry = find_geometry(renderer, path.cameras[frame])
         flow = image_flow(geometry, *path.neighbours(frame))
         source = np.full(geometry.item.shape, Source.KEYFRAME, np.uint8)
-        write_result(file, color, source, geometry, flow, position=positions(geometry))
+        write_result(file, color, delivered_layers(LAYERS, geometry, flow, source))
 
     def _identity(self, renderer: Renderer) -> dict[str, Any]:
         facts = {
