@@ -1,5 +1,5 @@
 # make demo    set up, render a small walkthrough into runs/demo, and a page that shows it
-# make test    set up, run the tests; Chromium, which tests the page, by apt where it is missing
+# make test    set up, run the tests, two files at a time (JOBS=4: four); Chromium, which tests the page, by apt where it is missing
 # make validate-metric   set up, judge the metric by what people saw
 # make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
 # make case-studies   set up, run the paper's experiments again, write docs/case-studies.md; PRESET=small is quick
@@ -36,7 +36,7 @@ browser:
 	@sh setup/browser.sh
 
 test: setup browser
-	$(BIN)/python -m pytest $(TESTS)
+	$(BIN)/python -m pytest -n $(or $(JOBS),2) --dist loadfile $(TESTS)
 
 validate-metric: setup
 	$(BIN)/enfilade validate $(VALIDATE)

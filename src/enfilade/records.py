@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -125,11 +126,15 @@ class CameraPath:
 
     def original(self, frame: int) -> int:
         """First frame of the run of equal views to which a frame belongs: itself where it moves."""
-        while frame > 0 and frame not in self.cuts:
-            if not self.cameras[frame].is_same_view(self.cameras[frame - 1]):
-                break
-            frame -= 1
-        return frame
+        return self._originals[frame]
+
+    @cached_property
+    def _originals(self) -> list[int]:
+        found: list[int] = []
+        for frame, camera in enumerate(self.cameras):
+            rests = frame > 0 and frame not in self.cuts and camera.is_same_view(self.cameras[frame - 1])
+            found.append(found[-1] if rests else frame)
+        return found
 
     def middle(self, segment: Segment) -> int | None:
         """The in-between that stands for a segment (§4.3): the middle one of those that move."""

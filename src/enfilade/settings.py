@@ -202,7 +202,7 @@ class LightSettings(Section):
     )
     spacing: int = option(8, "Uniform spacing of the keyframes of light, frames.", least=2)
     keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
-    least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=1, most=4096)
+    least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=2, most=4096)
     samples: int = option(
         0,
         "Camera rays of a pixel that shows an edge; 0: as many as the quality asks for.",
@@ -224,10 +224,16 @@ class LightSettings(Section):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.lobe_samples == 1:
+        for name in ("paths", "lobe_samples"):
+            if getattr(self, name) == 1:
+                raise SettingsError(
+                    f"[light] {name} = 1: of one ray the noise can't be told; give 2 or more, or 0 for as "
+                    "many as the quality asks for"
+                )
+        if 0 < self.samples < self.least_samples:
             raise SettingsError(
-                "[light] lobe_samples = 1: of one ray the noise can't be told; give 2 or more, or 0 for as "
-                "many as the quality asks for"
+                f"[light] samples = {self.samples}: every pixel has {self.least_samples} (least_samples); "
+                "give as many or more, or 0 for as many as the quality asks for"
             )
 
 

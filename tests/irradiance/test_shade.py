@@ -231,6 +231,8 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     # The floor, y = 0, goes on behind an upright mirror.
     np.testing.assert_allclose(points[:, 1], 0.0, atol=2e-3)
     assert points[:, 2].max() < -1.4
+    last = np.flatnonzero(seen.item == names.index("mirror") + 1)[-1]  # also where lanes fill up a kernel
+    assert is_floor.ravel()[last]
     is_same = shown.item == seen.item
     np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
 
@@ -272,6 +274,13 @@ def test_a_scene_opened_earlier_is_no_hindrance(tmp_path):
     renderer = _opened(tmp_path, balls)
     for opened in (renderer, earlier, renderer):
         assert (_shaded(opened, LightCache(), camera, spp=4).color == alone.color).all()
+
+
+def test_paths_go_on_alike_whatever_the_chunks(tmp_path):
+    renderer, camera = _opened(tmp_path, MATERIALS), _camera()
+    # Of the last paths of a chunk, too, whose lanes fill up what a kernel takes.
+    one, many = (_shaded(renderer, LightCache(), camera, 4, chunk=chunk) for chunk in (1 << 20, 256))
+    np.testing.assert_array_equal(one.color, many.color)
 
 
 def test_same_seed_same_bytes_whatever_the_chunks(diffuse):

@@ -124,6 +124,20 @@ def test_a_renderer_without_light_is_refused(tmp_path):
         rendered(tmp_path, job_of(tmp_path, wall(), slide(3), method="decoupled"))
 
 
+@pytest.mark.parametrize("views", [(0, 1, 2, 2, 2), (2, 2, 2)])
+def test_a_camera_that_comes_to_rest(decoupled, tmp_path, views):
+    job, _, _ = decoupled
+    cameras = tuple(job.path.cameras[view] for view in views)
+    path = replace(job.path, cameras=cameras, numbers=tuple(range(1, len(views) + 1)))
+    summary = render(replace(job, path=path), tmp_path / "run", Silence())
+    assert summary["table1"]["keyframes"] > 0.0
+    frames = [read_exr(tmp_path / "run" / "frames" / f"{n:04d}.exr")["RGB"] for n in path.numbers]
+    assert all(np.isfinite(frame).all() for frame in frames)
+    # What rests is the same view, sampled afresh.
+    assert abs(frames[-1].astype(float).mean() / frames[-2].astype(float).mean() - 1.0) < 0.03
+    assert plan(replace(job, path=path), Silence()).forecast["seconds"] > 0.0
+
+
 def test_shares_of_every_step_make_the_same_run(decoupled, tmp_path):
     job, whole, _ = decoupled
     folder = tmp_path / "run"

@@ -31,6 +31,15 @@ def test_in_betweens_and_antialiasing_add_up_and_keyframes_do_not_count():
     assert of("paper", lines).left_s == pytest.approx(7 * 3.0 + 9 * 0.5)
 
 
+def test_shading_counts_and_so_does_the_average_over_time():
+    lines = [line(f"raw {number}", 2.0) for number in range(1, 5)]
+    found = of("decoupled", [line("light 1-10", 9.0), *lines, line("frame 1", 0.5)])
+    assert found.left_s == pytest.approx(6 * 2.0 + 9 * 0.5)
+    assert found.text == "at the pace of the last 4 shaded frames"
+    assert "the average over time left out" in of("decoupled", lines).text
+    assert {step.name: step.total for step in found.steps}["frames shaded"] == 10
+
+
 def test_only_antialiasing_is_left():
     lines = [raw(i, 3.0) for i in range(1, 11)]
     assert of("paper", lines).left_s is None

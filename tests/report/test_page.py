@@ -132,7 +132,7 @@ def test_a_running_run_is_shown_as_far_as_it_has_come(copied, tmp_path):
     assert re.search(r"About \d+ s left, at the pace of the last 8 frames", text)
     assert [frame["number"] for frame in data["frames"]] == list(range(1, FRAMES + 1))
     assert [frame["number"] for frame in data["frames"] if frame["isRaw"]] == [9, 10]
-    assert "2 frames are shown before antialiasing, which the run has still to do" in notes
+    assert "2 frames are shown before they are filtered over time, which the run has still to do" in notes
     assert "velocity" not in data["frames"][-1]["layers"]
     assert not any("damaged" in note for note in notes)
     unchanged = {file: data for file, data in before.items() if file.name != "run.lock"}

@@ -1,4 +1,4 @@
-"""``enfilade plan``: everything that can be known of a walkthrough without shading a pixel."""
+"""``enfilade plan``: what can be known of a walkthrough before it is rendered."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
 
 
-@click.command("plan", cls=SettingsCommand, short_help="What rendering would take, without shading a pixel.")
+@click.command("plan", cls=SettingsCommand, short_help="What rendering would take, before it begins.")
 @job_options
 @click.option(
     "--plot",

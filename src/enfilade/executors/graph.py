@@ -19,9 +19,6 @@ class Graph:
         self._waiting: dict[str, list[str]] = {}  # unit -> who needs it
         self._ready: dict[str, list[tuple[tuple[int, ...], str]]] = {}  # group -> heap
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._units
-
     def add(self, unit: Unit) -> None:
         """Take up a unit. What it needs may be taken up later.
 
@@ -86,12 +83,9 @@ class Graph:
 
     def unfinished(self) -> list[Unit]:
         """Units that are neither finished nor given up, in order."""
-        left = [u for name, u in self._units.items() if name not in self._finished | self._aside]
-        return sorted((u for u in left if not u.is_gate), key=lambda u: u.order)
-
-    def is_finished(self, name: str) -> bool:
-        """Whether a unit is finished."""
-        return name in self._finished
+        gone = self._finished | self._aside
+        left = [u for name, u in self._units.items() if name not in gone and not u.is_gate]
+        return sorted(left, key=lambda u: u.order)
 
     def _offer(self, unit: Unit) -> None:
         if unit.name in self._finished:

@@ -23,6 +23,7 @@ STEPS = 22  # of the binary search: up to 4 million cells
 COORDINATE_BITS = 14  # of a cell's place along an axis, which wraps around
 LEVEL_BITS = 6
 ITEM_BITS = 13
+QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 fit into the 53 bits of a float64
 
 
 @dataclass(frozen=True)
@@ -134,9 +135,13 @@ class Estimates:
 
     @staticmethod
     def of(keys: npt.NDArray[np.uint64], light: npt.NDArray[np.floating[Any]]) -> Estimates:
-        """Sum up estimates, of which many may fall into one cell; those that are not finite are left out."""
+        """Sum up estimates, of which many may fall into one cell; those that are not finite are left out.
+
+        They are rounded to a :data:`QUANTUM`, so that sums are exact, and the same in whatever order.
+        """
         is_finite = np.isfinite(light).all(axis=1)
-        return Estimates._summed(keys[is_finite], light[is_finite], np.ones(int(is_finite.sum()), np.int64))
+        rounded = np.rint(light[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
+        return Estimates._summed(keys[is_finite], rounded, np.ones(int(is_finite.sum()), np.int64))
 
     @staticmethod
     def joined(parts: Sequence[Estimates]) -> Estimates:

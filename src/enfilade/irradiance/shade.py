@@ -261,7 +261,8 @@ class Shader:
         if heard:
             _tell(heard, keys, light, dr.width(missing))
         # The paths go on with other random numbers than the estimates were made with.
-        dr.scatter(path.rng.state, rng.state, padded(missing)[0])
+        lanes, is_real = padded(missing)
+        dr.scatter(path.rng.state, rng.state, lanes, is_real)
 
     def _meet_kernel(self, cache: LightCache, path: Path) -> _Step:
         emitted, step = self._met(cache, path)

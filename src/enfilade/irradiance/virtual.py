@@ -50,14 +50,17 @@ class VirtualImages:
         way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
         first = geometry.depth.ravel() * _lengths(geometry.camera)
         item[pixels], normal[pixels] = BEHIND, 0.0
+        count = len(pixels)  # of paths; what is added to have enough of them comes after
         for _ in range(LAYERS):
             path, found, turned, distance, is_sharp = self._look_on(path)
-            lane = pixels[np.array(path.lane)]
-            item[lane], normal[lane] = np.array(found) + BEHIND, rows(turned)
-            way[lane] = np.minimum(way[lane] + np.array(distance) / first[lane], ENDLESS)
-            path = chosen(path, dr.compress(is_sharp))
-            if not dr.width(path.lane):
+            lane = pixels[np.array(path.lane)[:count]]
+            item[lane], normal[lane] = np.array(found)[:count] + BEHIND, rows(turned)[:count]
+            way[lane] = np.minimum(way[lane] + np.array(distance)[:count] / first[lane], ENDLESS)
+            going: Any = dr.compress(is_sharp)
+            count = dr.width(going)
+            if not count:
                 break
+            path = chosen(path, going)
         size = geometry.item.shape
         return replace(
             geometry,

@@ -7,7 +7,7 @@ import re
 import shutil
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,20 +91,18 @@ def carry_out(
     EnfiladeError
         What the stages raise.
     """
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        for _ in range(REPAIRS):
-            shift = _Shift(job, run, monitor, is_wanted or _everything)
-            if not shift.left:
-                return []
-            if executor is None:
-                executor = _open(job, run, crew, monitor)
-                stack.callback(executor.close)
+    for _ in range(REPAIRS):
+        shift = _Shift(job, run, monitor, is_wanted or _everything)
+        if not shift.left:
+            return []
+        # Workers of their own for each shift: those of the last have what was damaged in memory, and would
+        # not write it again.
+        with closing(_open(job, run, crew, monitor)) as executor:
             damaged = shift.work(executor)
-            if damaged is None:
-                return shift.left
-            run.forget(damaged)
-            monitor.say(f"{damaged} is missing or damaged: what made it is done again")
+        if damaged is None:
+            return shift.left
+        run.forget(damaged)
+        monitor.say(f"{damaged} is missing or damaged: what made it is done again")
     raise EnfiladeError(f"more than {REPAIRS} files of {run.folder} were damaged while it was worked on")
 
 

@@ -56,14 +56,14 @@ class DecoupledFrames:
         if not self._workshop.run.done(raw_unit(self._workshop, frame)):
             self._kept.made(frame, lambda: self._shaded(table, frame))
 
-    def make(self, table: LightTable, frame: int) -> None:
+    def make(self, frame: int) -> None:
         """Deliver a frame, once those around it are shaded."""
         workshop = self._workshop
         if workshop.run.done(result_unit(workshop, frame)):
             return
         shot = next(shot for shot in workshop.job.path.shots() if frame in shot)
         span = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
-        parts = {f: self._kept.made(f, lambda f=f: self._read(table, f)) for f in span}  # type: ignore[misc]
+        parts = {f: self._kept.made(f, lambda f=f: self._read(f)) for f in span}  # type: ignore[misc]
         here = parts[frame]
         others = [f for f in span if f != frame]
         shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
@@ -73,7 +73,7 @@ class DecoupledFrames:
                 around = [parts[f].scattered for f in others]
                 color = color + over_time(here.shown, here.scattered, around, shares)
         made = Frame(color, here.source)
-        write_frame_result(workshop, frame, here.view.geometry, here.view.flow, made, here.dropped)
+        write_frame_result(workshop, frame, here.view, made)
 
     def _shaded(self, table: LightTable, frame: int) -> _Parts:
         workshop = self._workshop
@@ -82,7 +82,7 @@ class DecoupledFrames:
             near, cache = table.around(frame)
             estimate = _seen(workshop, table, frame, near, cache)
         with workshop.costs.of("scatter"):
-            shown = table.virtual_images.of(view.geometry)
+            shown = workshop.virtual_images.of(view.geometry)
             scattered, lobe_rays = _scattered(workshop, table, shown, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
@@ -95,14 +95,14 @@ class DecoupledFrames:
         workshop.finish(raw_unit(workshop, frame), [file], frame=number, dropped=dropped, rays=rays)
         return _parts(workshop, view, shown, seen, scattered, source)
 
-    def _read(self, table: LightTable, frame: int) -> _Parts:
-        file = self._workshop.run.file("raw", self._workshop.number(frame))
-        self._workshop.run.check(file)
-        view = self._workshop.views[frame]
-        shown = table.virtual_images.of(view.geometry)
-        with self._workshop.costs.of("files"):
+    def _read(self, frame: int) -> _Parts:
+        workshop = self._workshop
+        file, view = workshop.run.file("raw", workshop.number(frame)), workshop.views[frame]
+        workshop.run.check(file)
+        shown = workshop.virtual_images.of(view.geometry)
+        with workshop.costs.of("files"):
             seen, scattered, source = read_parts(file)
-        return _parts(self._workshop, view, shown, seen, scattered, source)
+        return _parts(workshop, view, shown, seen, scattered, source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,6 @@ class _Parts:
     seen: F32
     scattered: Page
     source: U8
-    dropped: int
 
 
 def _parts(
@@ -122,7 +121,7 @@ def _parts(
 ) -> _Parts:
     with workshop.costs.of("over time"):
         page = open_scattered(shown, scattered, _grown(source == Source.SPECULAR))
-    return _Parts(view, shown, seen, page, source, scattered.dropped)
+    return _Parts(view, shown, seen, page, source)
 
 
 def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:

@@ -20,7 +20,7 @@ from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.pixels.lookup import Page
 from enfilade.records import LightPage
-from enfilade.renderer import LightRenderer, PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose
 
 COARSER = 2  # times fewer pixels across than a frame has
 PATHS = 4  # of a draft's pixel
@@ -37,16 +37,13 @@ class Drafts:
     Parameters
     ----------
     workshop
-    renderer, shader
+    shader
     keyframes
         Frames.
     """
 
-    def __init__(
-        self, workshop: Workshop, renderer: LightRenderer, shader: Shader, keyframes: list[int]
-    ) -> None:
+    def __init__(self, workshop: Workshop, shader: Shader, keyframes: list[int]) -> None:
         self._workshop = workshop
-        self._renderer = renderer
         self._shader = shader
         self._keyframes = keyframes
         self._traced: Kept[LightPage] = Kept(2 * POOL + 1)
@@ -61,7 +58,7 @@ class Drafts:
 
     def cells(self, frame: int) -> Cells | None:
         """What is known of surfaces that no draft near a frame sees."""
-        near = nearest(self._keyframes, frame, SCOUTS)
+        near = sorted(nearest(self._keyframes, frame, SCOUTS))
         if self._cells[0] != near:
             self._cells = near, Estimates.joined([self.scout(k) for k in near]).opened()
         return self._cells[1]
@@ -92,7 +89,7 @@ class Drafts:
         return self._opened.made(frame, lambda: open_page(self.trace(frame)))
 
     def _read_or_trace(self, frame: int) -> LightPage:
-        workshop, renderer = self._workshop, self._renderer
+        workshop, renderer = self._workshop, self._workshop.light_renderer
         number = workshop.number(frame)
         unit, file = f"draft {number}", workshop.run.file("drafts", number)
         with workshop.costs.of("draft"):

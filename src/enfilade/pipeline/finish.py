@@ -18,8 +18,9 @@ from enfilade.antialias import (
 from enfilade.codec import read_exr, write_result
 from enfilade.geometry import positions
 from enfilade.pipeline.inbetween import read_raw
+from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import F32, U8, Flow, Frame, Geometry, Source
+from enfilade.records import F32, U8, Frame, Source
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.video import encode_video, join_videos, video_suffix
 
@@ -56,7 +57,7 @@ class Antialiasing:
         color = _filtered(workshop, frame, self._window)
         here = self._window[frame]
         made = Frame(color, here.source)
-        write_frame_result(workshop, frame, here.slice.geometry, here.slice.flow, made, dropped=0)
+        write_frame_result(workshop, frame, workshop.views[frame], made)
 
 
 def trace_reference(workshop: Workshop, frame: int) -> None:
@@ -69,7 +70,7 @@ def trace_reference(workshop: Workshop, frame: int) -> None:
     shading = workshop.trace(frame, everything, Purpose.REFERENCE, pixel_filter)
     source = np.full(everything.shape, Source.KEYFRAME, np.uint8)
     made = Frame(shading.color.reshape(*everything.shape, 3), source)
-    write_frame_result(workshop, frame, view.geometry, view.flow, made, shading.dropped)
+    write_frame_result(workshop, frame, view, made, shading.dropped)
 
 
 def write_clip(workshop: Workshop, name: str, span: range) -> None:
@@ -140,17 +141,26 @@ def _filtered(workshop: Workshop, frame: int, window: dict[int, _Raw]) -> F32:
         )
 
 
-def write_frame_result(
-    workshop: Workshop, frame: int, geometry: Geometry, flow: Flow, made: Frame, dropped: int
-) -> None:
-    """Write a delivered frame with the layers asked for, and record it."""
+def write_frame_result(workshop: Workshop, frame: int, view: View, made: Frame, dropped: int = 0) -> None:
+    """Write a delivered frame with the layers asked for, and record it.
+
+    Parameters
+    ----------
+    workshop
+    frame
+    view
+        Of the frame.
+    made
+    dropped
+        Samples left out of it that no other line of the ledger tells of.
+    """
     chosen = workshop.job.settings.output.chosen
     file = workshop.run.file("frames", workshop.number(frame))
     with workshop.costs.of("files"):
         write_result(
             file,
             made.color,
-            delivered_layers(chosen, geometry, flow, made.source),
+            delivered_layers(chosen, view, made.source),
             attributes={"framesPerSecond": float(workshop.job.path.fps)},
         )
     workshop.finish(
@@ -162,20 +172,21 @@ def write_frame_result(
     )
 
 
-def delivered_layers(chosen: Container[str], geometry: Geometry, flow: Flow, source: U8) -> dict[str, Any]:
+def delivered_layers(chosen: Container[str], view: View, source: U8) -> dict[str, Any]:
     """Layers of a delivered frame, those of ``settings.LAYERS`` that are chosen.
 
     ``Z`` and ``P`` are in scene units, in the world; ``forward`` and ``backward`` in pixels per frame, x
     right, y down; ``item`` and ``source`` (``records.Source``) are unsigned integers.
     """
+    geometry = view.geometry
     layers: dict[str, Callable[[], Any]] = {
         "Z": lambda: geometry.depth,
         "P": lambda: positions(geometry),
         "N": lambda: geometry.normal,
         "albedo": lambda: geometry.albedo,
         "item": lambda: geometry.item,
-        "forward": lambda: flow.forward,
-        "backward": lambda: flow.backward,
+        "forward": lambda: view.flow.forward,
+        "backward": lambda: view.flow.backward,
         "source": lambda: source.astype(np.uint32),
     }
     return {name: layer() for name, layer in layers.items() if name in chosen}

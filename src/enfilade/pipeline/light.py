@@ -10,11 +10,9 @@ import numpy as np
 
 from enfilade.codec import read_light, write_light
 from enfilade.denoise import denoise
-from enfilade.errors import SettingsError
+from enfilade.errors import DamagedFileError
 from enfilade.irradiance import (
     LightCache,
-    Shader,
-    VirtualImages,
     known,
     light_of,
     open_cache,
@@ -28,7 +26,7 @@ from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate
 from enfilade.pixels.lookup import Page
 from enfilade.records import F32, Geometry, LightPage, Mask, Segment, Shading
-from enfilade.renderer import LightRenderer, PixelFilter, Purpose
+from enfilade.renderer import PixelFilter, Purpose
 
 REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
 LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
@@ -57,18 +55,12 @@ class LightTable:
     """
 
     def __init__(self, workshop: Workshop, segments: list[Segment]) -> None:
-        if not isinstance(workshop.renderer, LightRenderer):
-            name = workshop.renderer.describe().renderer
-            raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
-        self.renderer: LightRenderer = workshop.renderer
         first = workshop.job.path.cameras[segments[0].first]
-        self.shader = Shader(self.renderer, pixel_angle=1.0 / first.focal_px)
-        self.virtual_images = VirtualImages(self.renderer)
+        self.shader = workshop.shader(1.0 / first.focal_px)
         self._workshop = workshop
         self.segments = segments
         self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
-        self._fills: dict[Segment, list[int]] = {}
-        self.drafts = Drafts(workshop, self.renderer, self.shader, self.keyframes)
+        self.drafts = Drafts(workshop, self.shader, self.keyframes)
         settings = workshop.job.settings.light
         self._quality = settings.denoiser
         self._traced: Kept[LightPage] = Kept(TRACED)
@@ -78,16 +70,12 @@ class LightTable:
     def prepare(self, segment: Segment) -> None:
         """Trace the light of a segment's keyframes, and of what they leave open between them."""
         workshop = self._workshop
-        first, last = workshop.number(segment.first), workshop.number(segment.last)
-        unit = f"light {first}-{last}"
+        unit = self._unit(segment)
         line = workshop.run.done(unit)
         if line and all(workshop.run.done(f"keyframe {number}") for number in line["fills"]):
-            fills = [self._frame(number) for number in line["fills"]]
-        else:
-            fills = self._filled(segment.first, segment.last, [])
-            numbers = [workshop.number(frame) for frame in fills]
-            workshop.finish(unit, [], fills=numbers)
-        self._fills[segment] = fills
+            return
+        fills = self._filled(segment.first, segment.last, [])
+        workshop.finish(unit, [], fills=[workshop.number(frame) for frame in fills])
 
     def trace(self, keyframe: int) -> LightPage:
         """The light of a keyframe: from memory, from the run folder, or traced now."""
@@ -111,8 +99,20 @@ class LightTable:
 
     def _fills_at(self, frame: int) -> list[int]:
         """Pages that fill the holes of a frame's own segment: others see other holes."""
-        segment = next(s for s in self.segments if s.first <= frame <= s.last)
-        return self._fills.get(segment, [])
+        # The last segment ends where the camera comes to rest: what follows shows the same.
+        segment = next((s for s in self.segments if frame <= s.last), self.segments[-1])
+        return self._fills[segment]
+
+    @cached_property
+    def _fills(self) -> dict[Segment, list[int]]:
+        """Frames whose pages fill holes, by segment, once all of them are prepared."""
+        lines = {segment: self._workshop.run.done(self._unit(segment)) for segment in self.segments}
+        if missing := [self._unit(segment) for segment, line in lines.items() if line is None]:
+            raise ValueError(f"unit {missing[0]!r} is not finished")
+        return {s: [self._frame(n) for n in line["fills"]] for s, line in lines.items() if line}
+
+    def _unit(self, segment: Segment) -> str:
+        return f"light {self._workshop.number(segment.first)}-{self._workshop.number(segment.last)}"
 
     @property
     def _spacing(self) -> float:
@@ -172,6 +172,9 @@ class LightTable:
         if workshop.run.done(unit):
             workshop.run.check(file)
             return LightPage(frame, geometry, *read_light(file))
+        if holes is None and frame not in self.keyframes:
+            # It knew holes alone; which ones, only what prepares its segment can tell.
+            raise DamagedFileError(f"{file} is missing", str(file.relative_to(workshop.run.folder)))
         where = geometry.has_light if holes is None else holes
         paths = self.paths
         with workshop.costs.of("trace"):
@@ -207,10 +210,7 @@ class LightTable:
         if line := workshop.run.done(unit):
             return int(line["paths"])
         jnd = self._pilot_jnd(frame)
-        # Half of the squared difference is either's own; pages that are pooled share what is left.
-        share = max(min(len(self.keyframes), 2 * POOL + 1) / 2.0, 1.0)
-        wanted = PILOT_PATHS * (jnd / settings.quality) ** 2 / (2.0 * share)
-        paths = int(np.clip(4 * math.ceil(wanted / 4), *PATHS))
+        paths = paths_for(jnd, settings.quality, len(self.keyframes))
         rays = 2 * PILOT_PATHS * int(workshop.views[frame].geometry.has_light.sum())
         workshop.finish(unit, [], frame=workshop.number(frame), jnd=jnd, paths=paths, rays={"drafts": rays})
         return paths
@@ -231,6 +231,24 @@ class LightTable:
                 page = LightPage(frame, geometry, direct, indirect, where)
                 shown.append(workshop.shown(geometry.albedo * light_of(pooled(page, [open_page(page)]))))
             return workshop.judge.compare(*shown, valid=where).score
+
+
+def paths_for(jnd: float, quality: float, keyframes: int) -> int:
+    """Paths of a keyframe's pixel that a quality asks for.
+
+    Parameters
+    ----------
+    jnd
+        Visible difference between two estimates by :data:`PILOT_PATHS` each.
+    quality
+        JND.
+    keyframes
+        Of the shot.
+    """
+    # Half of the squared difference is either's own; pages that are pooled share what is left.
+    share = max(min(keyframes, 2 * POOL + 1) / 2.0, 1.0)
+    wanted = PILOT_PATHS * (jnd / quality) ** 2 / (2.0 * share)
+    return int(np.clip(4 * math.ceil(wanted / 4), *PATHS))
 
 
 def _layers(light: Estimate, where: Mask) -> tuple[Shading, Shading]:

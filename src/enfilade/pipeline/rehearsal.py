@@ -12,6 +12,7 @@ from typing import Any
 
 from enfilade.monitor import Monitor, Silence
 from enfilade.pipeline.job import Job
+from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.walkthrough import render
 from enfilade.records import CameraPath, Segment
 from enfilade.store import Run, tally
@@ -55,7 +56,9 @@ def forecast_decoupled(job: Job, segments: list[Segment], monitor: Monitor) -> d
         of a keyframe's pixel. ``rehearsed_frames``, ``rehearsed_size``.
     """
     segment = max(segments, key=lambda s: (s.last - s.first, -abs(s.first + s.last - len(job.path))))
-    small = replace(job, path=excerpt_of(job.path, segment))
+    # Its frames may have an odd number of lines, which not every codec takes.
+    settings = replace(job.settings, video=replace(job.settings.video, codec="ffv1"))
+    small = replace(job, path=excerpt_of(job.path, segment), settings=settings)
     count = len(small.path)
     monitor.stage("rehearsal", count)
     with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
@@ -66,19 +69,20 @@ def forecast_decoupled(job: Job, segments: list[Segment], monitor: Monitor) -> d
         figures = tally(run.identity, lines, None)
     monitor.advance(count)
     keyframes = {s.first for s in segments} | {s.last for s in segments}
-    spent = _multiplied(lines, keyframes=len(keyframes), segments=len(segments), frames=len(job.path))
+    paths, more = _paths(lines, job, len(keyframes))
+    spent = _multiplied(
+        lines, keyframes=len(keyframes), segments=len(segments), frames=len(job.path), more=more
+    )
     larger = job.path.width * job.path.height / (small.path.width * small.path.height)
-    own = len({segment.first, segment.last})  # keyframes of the excerpt
+    own = sum(line["unit"].startswith("draft ") for line in lines)  # keyframes of the excerpt
     denser = (len(keyframes) / len(job.path)) / (own / count)  # keyframes, by frame, than in the excerpt
-    rays = {
-        kind: sent * (denser if kind in ("light", "drafts") else 1.0)
-        for kind, sent in figures["rays"].items()
-    }
+    times = {"light": more * denser, "drafts": denser}
+    rays = {kind: sent * times.get(kind, 1.0) for kind, sent in figures["rays"].items()}
     return {
         "rays": rays,
         "seconds": larger * spent.wall_s,
         "cpu_seconds": larger * spent.cpu_s,
-        "paths": next((line["paths"] for line in lines if "paths" in line), job.settings.light.paths),
+        "paths": paths,
         "rehearsed_frames": count,
         "rehearsed_size": [small.path.width, small.path.height],
     }
@@ -93,8 +97,19 @@ def excerpt_of(path: CameraPath, segment: Segment) -> CameraPath:
     return CameraPath(cameras, path.numbers[span], path.fps, frozenset())
 
 
-def _multiplied(lines: Iterable[Mapping[str, Any]], *, keyframes: int, segments: int, frames: int) -> _Spent:
-    """What a whole path takes, by the ledger of one segment.
+def _paths(lines: Iterable[Mapping[str, Any]], job: Job, keyframes: int) -> tuple[int, float]:
+    """Paths of a keyframe's pixel, and how many times as many as in the excerpt, where fewer are pooled."""
+    pilot = next((line for line in lines if "jnd" in line), None)
+    if pilot is None:
+        return job.settings.light.paths, 1.0
+    paths = paths_for(pilot["jnd"], job.settings.light.quality, keyframes)
+    return paths, paths / pilot["paths"]
+
+
+def _multiplied(
+    lines: Iterable[Mapping[str, Any]], *, keyframes: int, segments: int, frames: int, more: float
+) -> _Spent:
+    """What a whole path takes, by the ledger of one segment, whose keyframes have fewer paths by ``more``.
 
     Of units of a kind the one in the middle counts, so that kernels that were compiled for the first do not.
     """
@@ -112,7 +127,7 @@ def _multiplied(lines: Iterable[Mapping[str, Any]], *, keyframes: int, segments:
         if kind in FRAMES:
             total.add(middle, frames)
         elif kind in KEYFRAMES:
-            total.add(middle, keyframes)
+            total.add(middle, keyframes * (more if kind == "keyframe" else 1.0))
         elif kind == "light":
             total.add(middle, segments)
         else:  # survey and video, once and by frame; and the pilot, once

@@ -87,12 +87,13 @@ def render(
 KEPT: dict[str, dict[str, str]] = {
     "paper": {
         "video": "everything but the video",
+        "output": "everything but the layers of the frames",
         "antialias": "the keyframes",
         "warp": "the keyframes",
         "metric": "the keyframes",
     },
-    "decoupled": {"video": "everything but the video"},
-    "reference": {"video": "everything but the video"},
+    "decoupled": {"video": "everything but the video", "output": "everything but the layers of the frames"},
+    "reference": {"video": "everything but the video", "output": "everything but the layers of the frames"},
 }
 
 

@@ -40,8 +40,7 @@ class Worker:
         self._job = job
         self._run = run
         self._monitor = monitor
-        self._tables: dict[int, LightTable] = {}
-        self._complete: set[int] = set()
+        self._table: tuple[int, LightTable] | None = None  # of the shot that was last worked on
         self._kind = ""
 
     def do(self, kind: str, facts: Mapping[str, Any]) -> None:
@@ -74,6 +73,8 @@ class Worker:
                 self._workshop.keyframe(facts["frame"])
             case "antialias":
                 self._antialiasing.make(facts["frame"])
+            case "decoupled":
+                self._frames.make(facts["frame"])
             case "reference":
                 trace_reference(self._workshop, facts["frame"])
             case _:
@@ -117,7 +118,7 @@ class Worker:
         return Verdict.from_dict(self._line(unit)["verdict"])
 
     def _light(self, kind: str, facts: Mapping[str, Any]) -> None:
-        table = self._table(facts["shot"])
+        table = self._light_of(facts["shot"])
         match kind:
             case "draft":
                 table.drafts.trace(facts["frame"])
@@ -129,21 +130,17 @@ class Worker:
                 table.trace(facts["frame"])
             case "light":
                 table.prepare(Segment(*facts["segment"]))
-            case "shade" | "decoupled":
-                if facts["shot"] not in self._complete:
-                    for segment in table.segments:
-                        table.prepare(segment)
-                    self._complete.add(facts["shot"])
-                do = self._frames.shade if kind == "shade" else self._frames.make
-                do(table, facts["frame"])
+            case "shade":
+                self._frames.shade(table, facts["frame"])
             case _:
                 raise ValueError(f"there is no unit of kind {kind!r}")
 
-    def _table(self, shot: int) -> LightTable:
-        if shot not in self._tables:
+    def _light_of(self, shot: int) -> LightTable:
+        if self._table is None or self._table[0] != shot:
+            self._table = None  # first, so that there is never memory for two
             segments = segments_of(self._job, Survey.from_dict(self._line("survey")["survey"]))
-            self._tables[shot] = LightTable(self._workshop, segments[shot])
-        return self._tables[shot]
+            self._table = shot, LightTable(self._workshop, segments[shot])
+        return self._table[1]
 
     def _line(self, unit: str) -> dict[str, Any]:
         line = self._run.done(unit)

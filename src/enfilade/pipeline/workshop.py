@@ -10,6 +10,8 @@ import numpy as np
 
 from enfilade.antialias import spatial_support_px
 from enfilade.codec import read_shading, write_shading
+from enfilade.errors import SettingsError
+from enfilade.irradiance import Shader, VirtualImages
 from enfilade.masks import slow_pixels
 from enfilade.metric import Aqm, MetricOptions
 from enfilade.monitor import Monitor
@@ -18,7 +20,7 @@ from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
 from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Keyframe, Mask, Shading
-from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.store import Run
 
 KEPT = 3  # keyframes kept in memory
@@ -43,6 +45,32 @@ class Workshop:
         self.costs = Costs()
         self.views = Views(renderer, job.path, job.viewing, self.costs)
         self._keyframes: OrderedDict[int, Keyframe] = OrderedDict()
+        self._shaders: dict[float, Shader] = {}
+
+    @cached_property
+    def light_renderer(self) -> LightRenderer:
+        """The renderer, which must be one that can be asked for light.
+
+        Raises
+        ------
+        SettingsError
+            It can't.
+        """
+        if not isinstance(self.renderer, LightRenderer):
+            name = self.renderer.describe().renderer
+            raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
+        return self.renderer
+
+    def shader(self, pixel_angle: float) -> Shader:
+        """The shader for a camera, whose kernels all shots share that have this angle."""
+        if pixel_angle not in self._shaders:
+            self._shaders[pixel_angle] = Shader(self.light_renderer, pixel_angle)
+        return self._shaders[pixel_angle]
+
+    @cached_property
+    def virtual_images(self) -> VirtualImages:
+        """What is seen in mirrors and through glass."""
+        return VirtualImages(self.light_renderer)
 
     @cached_property
     def aqm(self) -> Aqm:

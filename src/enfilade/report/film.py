@@ -110,7 +110,9 @@ def encode_film(
                 }
             )
     if raw := sum(frame["is_raw"] for frame in film.frames):
-        film.notes.append(f"{raw} frames are shown before antialiasing, which the run has still to do")
+        film.notes.append(
+            f"{raw} frames are shown before they are filtered over time, which the run has still to do"
+        )
     is_thinned = step > 1
     while len(film.frames) > 1 and _bytes(film.frames) > room_bytes:
         film.frames, is_thinned = film.frames[::2], True

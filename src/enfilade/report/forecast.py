@@ -9,6 +9,10 @@ from typing import Any
 __all__ = ["Forecast", "Step", "forecast"]
 
 RECENT = 20  # units from which the pace is taken: scenes are not equally dear everywhere
+TWICE = {  # methods that make each frame in two goes: what the first makes, and what the second does
+    "paper": ("in-between", "antialiasing"),
+    "decoupled": ("shaded frame", "the average over time"),
+}
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ class _Work:
             totals |= {"raw": ("frames before antialiasing", count)}
         if self._method == "decoupled":
             totals |= {"keyframe": ("keyframes", None), "light": ("segments lit", None)}
+            totals |= {"raw": ("frames shaded", count)}
         last = {"frame": ("frames", count), "clip": ("clips of the video", None), "video": ("video", 1)}
         extra = {name: (name, None) for name in self._units if name not in totals and name not in last}
         ordered = [*totals.items(), *extra.items(), *last.items()]
@@ -95,23 +100,22 @@ class _Work:
         frames = self._left_of("frame")
         if frames == 0.0:
             return 0.0, "all frames are finished"
-        if self._method != "paper":
+        if self._method not in TWICE:
             if frames is None:
                 return None, "the time left is known once the first frame is finished"
             return frames, f"at the pace of the last {min(RECENT, self._done('frame'))} frames"
+        first, second = TWICE[self._method]
         raw, share = self._left_of("raw"), self._judged_share()
         if raw is None:
+            unknown = f"the time left is known once the first {first} is finished"
             if share == 0.0:
-                return None, "the time left is known once the first in-between is finished"
+                return None, unknown
             spent = self._spent("keyframe") + self._spent("segment")
-            return None, (
-                f"{100.0 * share:.0f} % of the path is judged, which took {spent:.0f} s; "
-                "the time left is known once the first in-between is finished"
-            )
+            return None, f"{100.0 * share:.0f} % of the path is judged, which took {spent:.0f} s; {unknown}"
         if frames is None and raw == 0.0:
-            return None, "only antialiasing is left; its time is known once the first frame is finished"
-        rest = "" if frames is not None else ", antialiasing left out: no frame tells yet what it costs"
-        kind, noun = ("raw", "in-betweens") if raw > 0.0 else ("frame", "frames")
+            return None, f"only {second} is left; its time is known once the first frame is finished"
+        rest = "" if frames is not None else f", {second} left out: no frame tells yet what it costs"
+        kind, noun = ("raw", f"{first}s") if raw > 0.0 else ("frame", "frames")
         basis = f"at the pace of the last {min(RECENT, self._done(kind))} {noun}"
         return raw + (frames or 0.0), basis + rest
 
@@ -142,5 +146,5 @@ def _wall(line: Mapping[str, Any]) -> float:
 
 
 def _is_keyframe(line: Mapping[str, Any]) -> bool:
-    # A keyframe becomes a frame at no cost: it says nothing about the in-betweens that are left.
-    return line["unit"].startswith("raw ") and bool(line["sources"]["keyframe"])
+    # A keyframe of `paper` becomes a frame at no cost: it says nothing about the in-betweens that are left.
+    return line["unit"].startswith("raw ") and bool(line.get("sources", {}).get("keyframe"))

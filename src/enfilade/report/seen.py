@@ -165,13 +165,16 @@ class SeenRun:
         color = layers.get("RGB")
         if color is None or color.shape != (*size, 3):
             raise ImageError(f"{file} holds no image of {size[1]}x{size[0]} pixels")
+        color = color.astype(np.float32)
+        if is_raw and "scattered" in layers:  # what mirrors, glass and gloss show is kept apart until the end
+            color += layers["scattered"]
         if not np.isfinite(color).all():
             raise ImageError(f"{file} holds pixels that are NaN or infinite")
         source = layers.get("source")
         return SeenFrame(
             index,
             self.numbers[index],
-            color.astype(np.float32),
+            color,
             None if source is None else source.astype(np.uint8),
             self._flow(index, layers),
             is_raw,

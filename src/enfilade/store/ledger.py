@@ -20,7 +20,7 @@ __all__ = ["Ledger", "covered", "head_of"]
 HEAD = "identity"  # key of the first line
 SUM = "sum"  # last key of each line
 SUM_LETTERS = 16  # of SHA-256
-VOLATILE = ("cost", "tries")  # wall times, and how often a unit was begun: outside the checksum of a run
+VOLATILE = ("cost",)  # wall times: outside the checksum of a run
 
 
 class Ledger:
@@ -221,7 +221,7 @@ class Ledger:
 
 
 def covered(line: Mapping[str, Any]) -> str:
-    """What the checksum of a run covers of a line: all but times and tries."""
+    """What the checksum of a run covers of a line: all but times."""
     kept = {key: value for key, value in line.items() if key not in VOLATILE}
     return json.dumps(kept, sort_keys=True, ensure_ascii=False)
 

@@ -302,7 +302,7 @@ class Run:
             raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
 
     def digest(self) -> str:
-        """Checksum of the run: of all that the ledger says but times and tries, whatever the order.
+        """Checksum of the run: of all that the ledger says but times, whatever the order.
 
         Two runs of the same work have the same one, however often they were stopped and whoever did what.
         """

@@ -17,7 +17,6 @@ import numpy as np
 from enfilade import __version__
 from enfilade.codec import read_exr, write_exr, write_result
 from enfilade.denoise import denoise, denoiser_name
-from enfilade.geometry import find_geometry, image_flow
 from enfilade.monitor import Monitor, Silence
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.finish import delivered_layers
@@ -122,10 +121,9 @@ class EveryFrame:
             _write_color(file, color)
             return
         path = self.job.path
-        geometry = find_geometry(renderer, path.cameras[frame])
-        flow = image_flow(geometry, *path.neighbours(frame))
-        source = np.full(geometry.item.shape, Source.KEYFRAME, np.uint8)
-        write_result(file, color, delivered_layers(LAYERS, geometry, flow, source))
+        view = Views(renderer, path, self.job.viewing, Costs())[frame]
+        source = np.full(color.shape[:2], Source.KEYFRAME, np.uint8)
+        write_result(file, color, delivered_layers(LAYERS, view, source))
 
     def _identity(self, renderer: Renderer) -> dict[str, Any]:
         facts = {
