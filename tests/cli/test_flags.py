@@ -10,6 +10,8 @@ from enfilade.cli.flags import SettingOption
 from enfilade.cli.inputs import JOB_SECTIONS
 from enfilade.settings import Metering, Placement, Settings, sections
 
+PAPER = ("--method", "paper")
+
 
 @pytest.fixture
 def settings(run, jobs, camera_path):
@@ -30,7 +32,7 @@ def test_no_flags_give_the_defaults(settings):
 def test_flags_beat_the_file_and_the_file_beats_the_default(settings, tmp_path):
     file = tmp_path / "look.toml"
     file.write_text("[keyframes]\nspacing = 30\nadaptation = 0\n[trace]\nspp = 8\n")
-    made = settings("--settings", file, "--keyframes-spacing", "40", "--seed", "7")
+    made = settings("--settings", file, "--keyframes-spacing", "40", "--seed", "7", *PAPER)
     assert (made.keyframes.spacing, made.keyframes.adaptation) == (40, 0.0)
     assert (made.trace.spp, made.trace.seed) == (8, 7)
     assert made.masks == Settings().masks
@@ -39,7 +41,7 @@ def test_flags_beat_the_file_and_the_file_beats_the_default(settings, tmp_path):
 def test_a_flag_that_repeats_the_default_still_beats_the_file(settings, tmp_path):
     file = tmp_path / "look.toml"
     file.write_text("[keyframes]\nspacing = 30\n")
-    assert settings("--settings", file, "--keyframes-spacing", "25").keyframes.spacing == 25
+    assert settings("--settings", file, "--keyframes-spacing", "25", *PAPER).keyframes.spacing == 25
 
 
 def test_choices_switches_and_short_forms(settings):
@@ -52,7 +54,7 @@ def test_choices_switches_and_short_forms(settings):
     assert made.antialias.separate_items
     assert (made.video.codec, made.video.ocio, made.video.view) == ("ffv1", "studio.ocio", "Film")
     assert made.trace.spp == 3
-    assert not settings("--antialias-no-separate-items").antialias.separate_items
+    assert not settings("--antialias-no-separate-items", *PAPER).antialias.separate_items
 
 
 def test_a_flag_that_says_nothing_to_the_method_is_refused(run, camera_path):
@@ -61,6 +63,10 @@ def test_a_flag_that_says_nothing_to_the_method_is_refused(run, camera_path):
         (("--spp", "3"), "--quality"),
         (("--quality", "5", "--method", "paper"), "--spp"),
         (("--light-quality", "5", "--method", "reference"), "--spp"),
+        (("--keyframes-spacing", "20"), "--light-spacing"),
+        (("--antialias-frames", "3"), "--antialias-frames says nothing to --method decoupled; leave it out"),
+        (("--light-spacing", "3", "--method", "paper"), "--light-spacing says nothing to --method paper"),
+        (("--masks-specular-jnd", "1", "--method", "reference"), "--method reference"),
     ):
         result = run(*line, *flags)
         assert result.exit_code == 2

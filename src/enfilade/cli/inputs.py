@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from enfilade.cli.flags import flags_given, settings_of
+from enfilade.cli.flags import SHORT, flags_given, settings_of
 from enfilade.device import Choice, activate
 from enfilade.errors import SettingsError
 
@@ -20,20 +20,16 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 METHODS = ("decoupled", "paper", "reference")
-FOREIGN = {  # flags that say nothing to a method, and what does
-    "decoupled": {
-        (
-            "trace",
-            "spp",
-        ): "--spp counts the paths of --method paper and --method reference; decoupled traces "
-        "as many as --quality asks for"
-    },
-    "paper": {
-        ("light", "quality"): "--quality is that of --method decoupled; --method paper traces --spp paths"
-    },
-    "reference": {
-        ("light", "quality"): "--quality is that of --method decoupled; --method reference traces --spp paths"
-    },
+IDLE: dict[str, tuple[str, ...]] = {  # settings that say nothing to a method, by section or by name
+    "decoupled": ("trace.spp", "trace.pixel_filter", "keyframes.spacing", "warp", "antialias"),
+    "paper": ("trace.pixel_filter", "light"),
+    "reference": ("keyframes", "warp", "masks", "antialias", "light"),
+}
+INSTEAD = {  # ... and which do
+    ("decoupled", "trace.spp"): "decoupled traces as many paths as --quality asks for",
+    ("decoupled", "keyframes.spacing"): "its keyframes are --light-spacing frames apart",
+    ("paper", "light.quality"): "paper traces --spp paths",
+    ("reference", "light.quality"): "reference traces --spp paths",
 }
 JOB_SECTIONS = (
     "trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias", "light", "video", "output",
@@ -179,8 +175,13 @@ def job_of(
         The device is not there.
     """
     settings = settings_of(ctx)
-    for flag in flags_given(ctx) & FOREIGN[method].keys():
-        raise SettingsError(f"{FOREIGN[method][flag]}; leave it out, or choose another method")
+    for section, name in sorted(flags_given(ctx)):
+        if {section, setting := f"{section}.{name}"}.intersection(IDLE[method]):
+            flag = SHORT.get((section, name), f"--{section}-{name}".replace("_", "-"))
+            instead = f": {INSTEAD[method, setting]}" if (method, setting) in INSTEAD else ""
+            raise SettingsError(
+                f"{flag} says nothing to --method {method}{instead}; leave it out, or choose another method"
+            )
     activate(device)
     from enfilade.path import load_path, parse_frames
     from enfilade.pipeline.job import Job
