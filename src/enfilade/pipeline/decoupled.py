@@ -27,7 +27,7 @@ from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
-EDGE_SAMPLES = 256.0, 8, 32  # camera rays of such a pixel at a quality of one JND; fewest and most
+EDGE_SAMPLES = 256.0, 8, 64  # camera rays of such a pixel at a quality of one JND; fewest and most
 LOBE_SAMPLES = 34.0, 2, 34  # lobe rays of a pixel, likewise, but by the root of the quality
 REACH = 3  # frames to each side over which what lobes scatter is averaged
 
