@@ -85,8 +85,9 @@ class _Work:
             totals |= {"keyframe": ("keyframes", None), "segment": ("segments judged", None)}
             totals |= {"raw": ("frames before antialiasing", count)}
         if self._method == "decoupled":
-            totals |= {"keyframe": ("keyframes", None), "light": ("segments lit", None)}
-            totals |= {"raw": ("frames shaded", count)}
+            totals |= {"draft": ("drafts of keyframes", None), "cells": ("cells beside the drafts", None)}
+            totals |= {"pilot": ("pilots", None), "keyframe": ("keyframes", None)}
+            totals |= {"light": ("segments lit", None), "raw": ("frames shaded", count)}
         last = {"frame": ("frames", count), "clip": ("clips of the video", None), "video": ("video", 1)}
         extra = {name: (name, None) for name in self._units if name not in totals and name not in last}
         ordered = [*totals.items(), *extra.items(), *last.items()]
