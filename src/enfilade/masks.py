@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.ndimage
 
 from enfilade.records import F32, U8, U32, Geometry, Mask, Source
 from enfilade.settings import MaskSettings
@@ -33,6 +32,8 @@ def visible_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskS
     geometry
         Of the frame itself.
     """
+    import scipy.ndimage
+
     is_candidate = geometry.is_specular & is_judged
     selected: set[int] = set()
     for item in np.unique(geometry.item[is_candidate]).tolist():
@@ -63,6 +64,8 @@ def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
 
 
 def _is_seen(jnd: F32, region: Mask, settings: MaskSettings) -> bool:
+    import scipy.ndimage
+
     box = scipy.ndimage.find_objects(region.astype(np.uint8))[0]
     region, jnd = region[box], jnd[box]
     if (region & (jnd > 1.0)).sum() * 100.0 > settings.specular_percent * region.sum():

@@ -19,6 +19,7 @@ from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept
 from enfilade.pipeline.light import LightTable
+from enfilade.pipeline.units import REACH
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
@@ -29,7 +30,6 @@ from enfilade.renderer import PixelFilter, Purpose
 EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
 EDGE_SAMPLES = 256.0, 8, 64  # camera rays of such a pixel at a quality of one JND; fewest and most
 LOBE_SAMPLES = 34.0, 2, 34  # lobe rays of a pixel, likewise, but by the root of the quality
-REACH = 3  # frames to each side over which what lobes scatter is averaged
 
 
 def raw_unit(workshop: Workshop, frame: int) -> str:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from enfilade.executors import Unit
-from enfilade.pipeline.decoupled import REACH
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import Survey, initial_segments
 from enfilade.records import Segment
@@ -33,6 +32,7 @@ class Step:
 
 
 BLOCK = 16  # frames that one worker does in a row where it can: they share what is in memory
+REACH = 3  # frames to each side over which what lobes scatter is averaged, by `decoupled`
 CLIP = 240  # frames that are encoded in one go; x264 begins anew after 250
 # Stages, in the order in which their units are begun.
 SURVEY, DRAFTS, CELLS, PILOT, KEYFRAMES, LIGHT, INBETWEENS, FRAMES, CLIPS, VIDEO = range(10)
