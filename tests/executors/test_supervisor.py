@@ -82,7 +82,7 @@ def test_a_worker_that_dies_costs_its_unit_alone(work, kind):
     assert done(work) == ["a", "b", "c", "k"]
     assert failures == [("k", FailureKind.DIED, 1), ("k", FailureKind.DIED, 2)]
     tries = [line.split() for line in (work.folder / "k.tries").read_text().splitlines()]
-    assert [share for share, _ in tries] == ["1", "4", "16"]  # the kernel kills who takes too much memory
+    assert [share for share, _ in tries] == ["1", "1", "4"]  # twice, and it may have been for its memory
     assert len({pid for _, pid in tries}) == 3
     assert all(len((work.folder / f"{c}.tries").read_text().splitlines()) == 1 for c in "abc")
 

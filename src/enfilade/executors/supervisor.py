@@ -113,8 +113,10 @@ class _Loop:
         return max(self._delayed[0][0] - time.monotonic(), IDLE_S) if self._delayed else None
 
     def _share(self, unit: Unit) -> int:
-        scarce = (FailureKind.MEMORY, FailureKind.DIED)  # the kernel kills who takes too much
-        return int(SMALLER ** sum(f.kind in scarce for f in self._failures.get(unit.name, [])))
+        kinds = [failure.kind for failure in self._failures.get(unit.name, [])]
+        # The kernel kills who takes too much memory; but a worker that is killed once may have been unlucky.
+        scarce = kinds.count(FailureKind.MEMORY) + max(kinds.count(FailureKind.DIED) - 1, 0)
+        return int(SMALLER**scarce)
 
     def _end(self, event: Event) -> None:
         unit = self._in_hand.pop(event.slot)

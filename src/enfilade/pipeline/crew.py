@@ -187,7 +187,8 @@ class _Shift:
 
     def _failed(self, unit: Unit, failure: Failure, attempt: int) -> None:
         after = "it is set aside" if attempt >= ATTEMPTS or failure.is_final else "it is tried again"
-        if failure.kind in (FailureKind.MEMORY, FailureKind.DIED) and attempt < ATTEMPTS:
+        is_scarce = failure.kind is FailureKind.MEMORY or (failure.kind is FailureKind.DIED and attempt > 1)
+        if is_scarce and attempt < ATTEMPTS:
             after += " with fewer paths in flight"
         self._monitor.say(f"{unit.name}: {failure.text}; {after}")
 
