@@ -65,6 +65,7 @@ def test_a_flag_that_says_nothing_to_the_method_is_refused(run, camera_path):
         (("--light-quality", "5", "--method", "reference"), "--spp"),
         (("--keyframes-spacing", "20"), "--light-spacing"),
         (("--antialias-frames", "3"), "--antialias-frames says nothing to --method decoupled; leave it out"),
+        (("--masks-specular-jnd", "1"), "--masks-specular-jnd says nothing to --method decoupled"),
         (("--light-spacing", "3", "--method", "paper"), "--light-spacing says nothing to --method paper"),
         (("--masks-specular-jnd", "1", "--method", "reference"), "--method reference"),
     ):

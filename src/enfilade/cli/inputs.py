@@ -21,10 +21,13 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 METHODS = ("decoupled", "paper", "reference")
 IDLE: dict[str, tuple[str, ...]] = {  # settings that say nothing to a method, by section or by name
-    "decoupled": ("trace.spp", "trace.pixel_filter", "keyframes.spacing", "warp", "antialias"),
+    "decoupled": (
+        "trace.spp", "trace.pixel_filter", "keyframes.spacing", "warp", "antialias", "metric.mask_slope",
+        "masks.specular_jnd", "masks.specular_percent", "masks.split_percent",
+    ),
     "paper": ("trace.pixel_filter", "light"),
-    "reference": ("keyframes", "warp", "masks", "antialias", "light"),
-}
+    "reference": ("keyframes", "warp", "masks", "antialias", "light", "metric.mask_slope"),
+}  # fmt: skip
 INSTEAD = {  # ... and which do
     ("decoupled", "trace.spp"): "decoupled traces as many paths as --quality asks for",
     ("decoupled", "keyframes.spacing"): "its keyframes are --light-spacing frames apart",

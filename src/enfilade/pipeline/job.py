@@ -61,7 +61,8 @@ class Job:
     def identity(self, renderer: Renderer | None = None) -> dict[str, Any]:
         """What makes the results what they are: a run folder holds one such identity.
 
-        The number of paths in flight is left out, and what a scene may ask for: they change no result.
+        What a scene may ask for is left out, and the number of paths in flight, which changes rare paths
+        alone: a run that lacks memory must be able to go on with fewer.
 
         Parameters
         ----------

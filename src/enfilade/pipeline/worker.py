@@ -150,7 +150,7 @@ class Worker:
 
 
 def smaller(job: Job, share: int) -> Job:
-    """The same job with fewer paths in flight, which changes no result."""
+    """The same job with fewer paths in flight: the same result but for rare paths (docs/decoupled.md)."""
     trace = job.settings.trace
     chunk = max(trace.chunk // share, min(LEAST_CHUNK, trace.chunk))
     return replace(job, settings=replace(job.settings, trace=replace(trace, chunk=chunk)))

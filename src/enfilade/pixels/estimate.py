@@ -51,7 +51,7 @@ class Estimate:
         What arrives along rays (:class:`Rays`, any length of direction), given a random number
         generator for each: an Array3f or :class:`Samples`. Called once a chunk.
     chunk
-        Paths in flight at once; changes no result.
+        Paths in flight at once. It changes no random number; what a renderer makes of them is its own.
     pixel_filter
         Where in the image the paths begin.
     random
