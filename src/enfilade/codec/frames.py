@@ -210,7 +210,7 @@ def write_result(
         The file can't be written.
     """
     written = {name: _half(array) if name in HALVES else array for name, array in layers.items()}
-    write_exr(file, {"RGB": _half(color), **written}, attributes=attributes, is_exact=False)
+    write_exr(file, {"RGB": _half(color), **written}, attributes=attributes, is_portable=True)
 
 
 def _half(values: F32) -> F16:

@@ -226,7 +226,7 @@ def _between(keyframes: Mapping[int, F32], shot: range, fps: Any) -> Iterator[tu
 
 
 def _write_color(file: Path, color: F32) -> None:
-    write_exr(file, {"RGB": np.clip(color, -HALF_MAX, HALF_MAX).astype(np.float16)})
+    write_exr(file, {"RGB": np.clip(color, -HALF_MAX, HALF_MAX).astype(np.float16)}, is_portable=True)
 
 
 def _identity(job: Job, renderer: Renderer, facts: Mapping[str, Any]) -> dict[str, Any]:
