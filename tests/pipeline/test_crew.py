@@ -158,6 +158,22 @@ def test_what_is_damaged_is_found_when_it_is_used_and_made_again(whole, tmp_path
         assert any(name in text for text in monitor.said), name
 
 
+def test_what_is_damaged_while_others_have_it_in_memory_is_written_again(whole, tmp_path):
+    file = tmp_path / "run" / "keyframes" / "0013.exr"
+
+    class Damaging(Watcher):
+        def advance(self, count=1):
+            if self.left == 0 and file.exists():  # just recorded, and read by nobody yet
+                flip(file)
+                self.left = -1
+
+    monitor = Damaging()
+    render(make_job(tmp_path), tmp_path / "run", monitor, Crew("processes", 2))
+    assert any("keyframes/0013.exr is missing or damaged" in text for text in monitor.said)
+    assert Run.existing(tmp_path / "run").damaged() == []
+    assert digest(tmp_path / "run") == digest(whole)
+
+
 def test_verified_finds_what_is_not_used(whole, tmp_path):
     job = make_job(tmp_path)
     render(job, tmp_path / "run", Silence())
