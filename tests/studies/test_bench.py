@@ -11,7 +11,8 @@ from enfilade.denoise import why_no_denoiser
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.judges import JUDGES, why_missing
 from enfilade.monitor import Silence
-from enfilade.report.bench import plot_bench, plot_crops, write_differences
+from enfilade.report.bench import plot_bench
+from enfilade.report.bench_pictures import plot_crops, plot_slices, write_differences
 from enfilade.report.bench_tables import bench_tables
 from enfilade.report.tables import as_text
 from enfilade.studies.bench import bench as module
@@ -146,6 +147,7 @@ def test_the_pictures_and_tables(held, tmp_path):
     for file in (
         plot_bench(found, tmp_path / "bench.png"),
         plot_crops(found, folder, tmp_path / "crops.png"),
+        plot_slices(found, folder, tmp_path / "slices.png"),
     ):
         assert file.read_bytes().startswith(b"\x89PNG")
     videos = [open_sequence(file) for file in write_differences(found, folder)]

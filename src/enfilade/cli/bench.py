@@ -203,10 +203,13 @@ def _lineup(
 
 
 def _drawn(found: dict[str, Any], folder: Path, *, differences: bool) -> list[Path]:
-    from enfilade.report.bench import plot_bench, plot_crops, write_differences
+    from enfilade.report.bench import plot_bench
+    from enfilade.report.bench_pictures import plot_crops, plot_slices, write_differences
 
     videos = write_differences(found, folder) if differences else []
-    return [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png"), *videos]
+    chart = plot_bench(found, folder / "bench.png")
+    crops = plot_crops(found, folder, folder / "crops.png")
+    return [chart, crops, plot_slices(found, folder, folder / "slices.png"), *videos]
 
 
 def _show(found: dict[str, Any]) -> None:
