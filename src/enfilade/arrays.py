@@ -23,6 +23,7 @@ from drjit.auto.ad import (
     Bool,
     Float,
     Float16,
+    Float64,
     Int,
     Matrix3f,
     UInt,
@@ -36,6 +37,7 @@ __all__ = [
     "Array4f",
     "Bool",
     "Float",
+    "Float64",
     "Int",
     "Matrix3f",
     "UInt",
@@ -47,6 +49,7 @@ __all__ = [
     "opaque",
     "pixel_grid",
     "release_memory",
+    "rows",
     "vector3",
     "widened",
 ]

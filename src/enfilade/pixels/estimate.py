@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array2f, Array3f, Float, Float64, UInt, lanes, matrix3, opaque, rows, vector3
 from enfilade.camera import Camera
 from enfilade.pixels.random import stratified, stratified4, streams
 from enfilade.pixels.rays import box_offsets, gaussian_offsets, pinhole_directions
@@ -85,7 +85,8 @@ class Estimate:
         self._asked = 0
         self._layers = layers
         self._is_stratified = is_stratified
-        self._sums = np.zeros((2 + 4 * layers, len(pixels)))  # paths that are finite, and marked; see _summed
+        size = max(len(pixels), 1)  # Dr.Jit can't compare no lanes with a number
+        self._sums = [dr.zeros(Float64, size) for _ in range(2 + 4 * layers)]  # as _summed gives them
 
     def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
         """Trace more paths, for all pixels of the list or for some of them.
@@ -96,7 +97,8 @@ class Estimate:
             Paths a pixel.
         where : (N,) bool
         """
-        chosen = np.arange(len(self._pixels)) if where is None else np.flatnonzero(where)
+        everyone = np.ones(len(self._pixels), bool) if where is None else where
+        chosen = np.flatnonzero(everyone).astype(np.uint32)
         for first in range(self._next, self._next + spp, PASS):
             width = min(PASS, self._next + spp - first)
             step = max(self._chunk // width, 1)
@@ -106,7 +108,9 @@ class Estimate:
                 rng = streams(pixel, path, self._random)
                 more = (stratified4(pixel, path, self._random),) if self._is_stratified else ()
                 found = self._radiance(self._rays(pixel, path), rng, *more)
-                self._sums[:, part] += _summed(found, width)
+                for total, value in zip(self._sums, _summed(found, width), strict=True):
+                    dr.scatter_add(total, Float64(value), lanes(part), mode=dr.ReduceMode.NoConflicts)
+                dr.eval(self._sums)
         self._next += spp
         self._asked += spp * len(chosen)
 
@@ -123,22 +127,23 @@ class Estimate:
     @property
     def shadings(self) -> list[Shading]:
         """The same of every layer."""
-        count = np.maximum(self._sums[0], 1.0)
-        dropped = int(self._asked - self._sums[0].sum())
-        shadings = []
-        for sums in np.split(self._sums[2:], self._layers):
-            mean = sums[:3] / count
-            spread = np.maximum(sums[3] / count - np.dot(LUMINANCE, mean) ** 2, 0.0)
-            variance = np.where(count > 1.0, spread / np.maximum(count - 1.0, 1.0), 0.0)
-            color = np.ascontiguousarray(mean.T, np.float32)
-            shadings.append(Shading(color, variance.astype(np.float32), dropped))
-        return shadings
+        count = dr.maximum(self._sums[0], 1.0)
+        dropped = self._asked - round(dr.sum(self._sums[0])[0])
+        found = []
+        for first in range(2, len(self._sums), 4):
+            *mean, square = (total / count for total in self._sums[first : first + 4])
+            luminance = sum(share * channel for share, channel in zip(LUMINANCE, mean, strict=True))
+            spread = dr.maximum(square - luminance * luminance, 0.0)
+            variance = dr.select(count > 1.0, spread / dr.maximum(count - 1.0, 1.0), 0.0)
+            found.append((Array3f(*map(Float, mean)), Float(variance)))
+        dr.eval(found)
+        n = len(self._pixels)
+        return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
 
     @property
     def is_marked(self) -> npt.NDArray[np.bool_]:
         """Pixels that have a marked path, (N,)."""
-        marked: npt.NDArray[np.bool_] = self._sums[1] > 0.0
-        return marked
+        return np.array(self._sums[1] > 0.0)[: len(self._pixels)]
 
     def _rays(self, pixel: Any, path: Any) -> Rays:
         camera = self._camera
@@ -183,8 +188,8 @@ def _numbered(pixels: npt.NDArray[np.uint32], first: int, width: int) -> tuple[A
     return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(width) + opaque(first)
 
 
-def _summed(answer: Any, width: int) -> npt.NDArray[np.float32]:
-    """Sums over the paths of each pixel: finite, marked, then r, g, b, squared luminance a layer."""
+def _summed(answer: Any, width: int) -> list[Any]:
+    """Sums over the paths of each pixel, lanes: finite, marked, then r, g, b, squared luminance a layer."""
     samples = answer if isinstance(answer, Samples) else Samples((answer,))
     values = []
     for layer in samples.layers:
@@ -198,6 +203,6 @@ def _summed(answer: Any, width: int) -> npt.NDArray[np.float32]:
         values.append(dr.select(samples.is_marked, Float(1), 0))
     # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
     dr.eval(values)
-    count, *sums = (np.array(dr.block_sum(v, width)) for v in values)
-    marked = sums.pop() if samples.is_marked is not None else np.zeros_like(count)
-    return np.stack([count, marked, *sums])
+    count, *sums = (dr.block_sum(v, width) for v in values)
+    marked = sums.pop() if samples.is_marked is not None else dr.zeros(Float, dr.width(count))
+    return [count, marked, *sums]
