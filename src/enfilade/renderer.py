@@ -247,7 +247,9 @@ class LightRenderer(Renderer, Protocol):
         """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
         ...
 
-    def lit(self, rays: Rays, bounce: Bounce | None = None, active: Any = True) -> Lit:
+    def lit(
+        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, is_whole: bool = False
+    ) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
         Parameters
@@ -257,6 +259,9 @@ class LightRenderer(Renderer, Protocol):
             Where the rays come from; None for camera rays.
         active : Bool
             Rays that are traced; others hit nothing.
+        is_whole
+            Take surfaces for wholly there or not at all, as :meth:`surfaces` does: for camera rays whose
+            light belongs to a G-buffer. Otherwise what is let through a surface is a lobe of it.
         """
         ...
 

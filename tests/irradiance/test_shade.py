@@ -125,6 +125,22 @@ def test_without_a_cache_every_material_keeps_its_energy(tmp_path):
     assert {name: miss for name, miss in misses.items() if abs(miss) > 4.0} == {}
 
 
+@pytest.mark.parametrize("opacity", [0.3, 0.7])
+def test_without_a_cache_veils_keep_their_energy(tmp_path, opacity):
+    def veil(share):
+        black = '<bsdf type="diffuse"><rgb name="reflectance" value="0.02"/></bsdf>'
+        return f'<bsdf type="mask"><float name="opacity" value="{share}"/>{black}</bsdf>'
+
+    where = find_geometry(_opened(tmp_path, {"veil": veil(1.0)}), _camera()).item.ravel() == 1
+    renderer, camera = _opened(tmp_path, {"veil": veil(opacity)}), _camera()
+    ours, reference = _shaded(renderer, LightCache(), camera, 1024), _traced(renderer, camera, 1024)
+    difference = ((ours.color - reference.color) @ LUMINANCE)[where]
+    deviation = np.sqrt((ours.variance + reference.variance)[where].sum())
+    assert where.sum() > 20
+    assert abs(difference.sum()) < 4.0 * deviation
+    assert deviation < 0.05 * (reference.color @ LUMINANCE)[where].sum()
+
+
 @pytest.fixture(scope="module")
 def diffuse(tmp_path_factory):
     """Diffuse balls, with the light of two pages."""

@@ -308,7 +308,7 @@ class Shader:
     def _gather_kernel(self, cache: LightCache, path: Path, square: Any) -> tuple[Any, _Step]:
         """Scatter off the diffuse lobe that the rays meet, and meet the next surface."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
         lobe = self._renderer.scatter_diffuse(lit, Leading(square, rng))
         ahead = Path(
             lane=path.lane,

@@ -72,7 +72,7 @@ class VirtualImages:
     def _look_on_kernel(self, path: Path) -> tuple[Path, Any, Any, Any, Any]:
         """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
+        lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
         scattered = self._renderer.scatter(lit, rng, Float(THROUGH))
         ahead = replace(path, rays=scattered.rays, bounce=scattered.bounce, rng=rng)
         surfaces = self._renderer.lit(ahead.rays, ahead.bounce).surfaces

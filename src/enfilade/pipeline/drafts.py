@@ -105,7 +105,7 @@ class Drafts:
             light = Estimate(
                 camera,
                 np.flatnonzero(where).astype(np.uint32),
-                lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng, edges=2)),
+                lambda rays, rng: Samples(renderer.light(renderer.lit(rays, is_whole=True), rng, edges=2)),
                 chunk=workshop.job.settings.trace.chunk,
                 pixel_filter=PixelFilter.CENTRE,
                 random=workshop.random(frame, Purpose.DRAFT),

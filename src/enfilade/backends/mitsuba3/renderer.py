@@ -41,6 +41,8 @@ from enfilade.settings import TraceSettings
 
 UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
+PASSED_WHOLE = 0.5  # of the light that a surface lets through, above which a G-buffer passes it by
+PASSED = 0.999  # ... above which a path does
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
 
 
@@ -113,13 +115,16 @@ class MitsubaRenderer:
         own = self._scene, self._integrator, self._onward, items.number, items.is_passable, items.materials
         return own, self._light.state
 
-    def lit(self, rays: Rays, bounce: Bounce | None = None, active: Any = True) -> Lit:
+    def lit(
+        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, is_whole: bool = False
+    ) -> Lit:
         """Find the first surface along rays, and the light it emits.
 
-        Camera rays look through masks as :meth:`surfaces` does; scattered ones meet them as Mitsuba's own
-        paths do.
+        Camera rays look through what lets all pass, and, for a G-buffer, through what :meth:`surfaces` looks
+        through; scattered ones meet masks as Mitsuba's own paths do.
         """
-        surfaces, seen = self._find(rays, active, from_camera=bounce is None)
+        passed = None if bounce is not None else PASSED_WHOLE if is_whole else PASSED
+        surfaces, seen = self._find(rays, active, passed)
         return Lit(
             surfaces=surfaces,
             position=Array3f(seen.p),
@@ -144,12 +149,15 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
         return self._light.scatter(lit, rng, choice)
 
-    def _find(self, rays: Rays, active: Any = True, *, from_camera: bool = True) -> tuple[Surfaces, Any]:
+    def _find(
+        self, rays: Rays, active: Any = True, passed: float | None = PASSED_WHOLE
+    ) -> tuple[Surfaces, Any]:
+        """The first surfaces, past those that let through more than a share of the light, if any may."""
         direction = mi.Vector3f(rays.direction)
         length = dr.norm(direction)
         ray = mi.Ray3f(mi.Point3f(rays.origin), direction / length)
-        if from_camera:
-            seen, distance = self._visible(ray, Bool(active))
+        if passed is not None:
+            seen, distance = self._visible(ray, Bool(active), passed)
         else:
             seen = self._scene.ray_intersect(ray, Bool(active))
             distance = seen.t
@@ -204,8 +212,8 @@ class MitsubaRenderer:
         self._sampler.rng = None
         return radiance
 
-    def _visible(self, ray: Any, active: Any) -> tuple[Any, Any]:
-        """First interaction of camera rays whose surface does not let the ray pass, and its distance."""
+    def _visible(self, ray: Any, active: Any, passed: float) -> tuple[Any, Any]:
+        """First interaction of camera rays whose surface does not let that share pass, and its distance."""
         seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
         distance = Float(seen.t)
         if not self._items.any_passable:
@@ -217,22 +225,22 @@ class MitsubaRenderer:
             )
             distance = dr.select(passing, distance + behind.t, distance)
             seen = dr.select(passing, behind, seen)
-            return seen, distance, passing & self._lets_pass(seen), layer + 1
+            return seen, distance, passing & self._lets_pass(seen, passed), layer + 1
 
         seen, distance, _, _ = dr.while_loop(
-            (seen, distance, self._lets_pass(seen), UInt(0)),
+            (seen, distance, self._lets_pass(seen, passed), UInt(0)),
             lambda _seen, _distance, passing, layer: passing & (layer < LAYERS),
             look_behind,
             labels=("seen", "distance", "passing", "layer"),
         )
         return seen, distance
 
-    def _lets_pass(self, seen: Any) -> Any:
+    def _lets_pass(self, seen: Any, passed: float) -> Any:
         material = seen.bsdf()
         number: Any = dr.reinterpret_array(mi.UInt32, material)
         is_passable = dr.gather(Bool, self._items.is_passable, number, seen.is_valid())
         through = material.eval_null_transmission(seen, is_passable)
-        return is_passable & (mi.luminance(through) > 0.5)
+        return is_passable & (mi.luminance(through) > passed)
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
     rays, rng = dr.gather(Rays, rays, lane), dr.gather(PCG32, rng, lane)
     throughput = dr.full(Array3f, 1, len(lane))
     for bounce in range(BOUNCES):
-        lit = renderer.lit(rays)
+        lit = renderer.lit(rays, is_whole=True)
         scattered = renderer.scatter(lit, rng)
         throughput = dr.select(scattered.is_alive, throughput * scattered.throughput, 0)
 
