@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from enfilade.backends.scenecheck import check_scene
+from enfilade.backends.scenefile import fingerprint
 from enfilade.backends.trial import try_scene
 from enfilade.codec import write_exr
 from enfilade.errors import SceneError
@@ -102,6 +103,56 @@ def test_includes_are_read_too(scene):
     refused(file, "more than 16 deep")
     part.unlink()
     refused(file, "can't read the scene")
+
+
+@pytest.fixture
+def elsewhere(scene, tmp_path, monkeypatch):
+    """Files that Mitsuba finds in other folders than beside what names them; who names each, and the file."""
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    folder = scene("").parent
+    for name in ("alt/a", "alt/both", "both", "shared", "spectrum", "../work/here", "kept"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(name)
+    (folder / "sub").mkdir()
+    (folder / "sub" / "part.xml").write_text(f'<scene version="3.0.0">{texture("shared")}</scene>')
+    return folder
+
+
+NAMED = {
+    '<path value="alt"/>' + texture("a"): "alt/a",
+    texture("a") + '<path value="alt"/>': "alt/a",
+    '<path value="alt"/>' + texture("both"): "alt/both",
+    '<path value="alt"/>' + texture("kept"): "kept",
+    '<include filename="sub/part.xml"/>': "shared",
+    '<default name="which" value="kept"/>' + texture("$which"): "kept",
+    '<spectrum name="x" filename="spectrum"/>': "spectrum",
+    texture("here"): "../work/here",
+}
+
+
+@pytest.mark.parametrize(("body", "file"), NAMED.items())
+def test_files_are_looked_for_as_mitsuba_does(scene, elsewhere, body, file):
+    written, file = scene(body), (elsewhere / file).resolve()
+    before = fingerprint(written)
+    if file.is_relative_to(elsewhere):
+        assert file in check_scene(written, LimitSettings())
+    else:
+        refused(written, "outside the scene's folder")
+    file.write_text("other")
+    changed = fingerprint(written)
+    file.unlink()
+    assert len({before, changed, fingerprint(written)}) == 3
+
+
+def test_links_in_other_folders_are_followed(scene, elsewhere):
+    (elsewhere / "alt" / "out").symlink_to("/etc/hostname")
+    refused(scene('<path value="alt"/>' + texture("out")), "outside the scene's folder")
+
+
+def test_folders_that_an_included_file_gives_are_refused(scene, elsewhere):
+    (elsewhere / "sub" / "part.xml").write_text('<scene version="3.0.0"><path value="alt"/></scene>')
+    refused(scene('<include filename="sub/part.xml"/>'), "does not look in the <path> of an included file")
 
 
 @pytest.mark.parametrize("name", ["pipe", "device"])

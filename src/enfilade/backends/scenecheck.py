@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element
 
-from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import parse
-
+from enfilade.backends.scenefile import MB, SceneFile
 from enfilade.codec.pictures import PICTURES, picture_pixels
 from enfilade.errors import ImageError, SceneError
 from enfilade.settings import LimitSettings
@@ -23,13 +20,10 @@ from enfilade.settings import LimitSettings
 __all__ = ["check_scene"]
 
 PLUGIN = re.compile(r"[a-z0-9_]+")
-PARAMETER = re.compile(r"\$(\w+)")
 FILM = ("width", "height", "crop_width", "crop_height")
-MB, MILLION = 1_000_000, 1_000_000
-XML_MB = 256  # of a scene file itself: meshes stand in files of their own
+MILLION = 1_000_000
 MESH_HEADER = 1 << 16  # bytes in which the header of a PLY mesh must end
 FACE_BYTES, VERTEX_BYTES = 4, 6  # least that one takes in a binary file
-DEEPEST = 16  # includes within includes
 
 
 def check_scene(scene: Path, limits: LimitSettings) -> list[Path]:
@@ -54,37 +48,29 @@ def check_scene(scene: Path, limits: LimitSettings) -> list[Path]:
         and the setting.
     """
     roots = [scene.resolve().parent, *(Path(p).resolve() for p in limits.allow.split(os.pathsep) if p)]
-    reader = _Reader(scene, roots, limits)
-    reader.read(scene, depth=0)
-    return list(reader.files)
+    inspector = _Inspector(SceneFile(scene), roots, limits)
+    inspector.inspect()
+    return list(inspector.files)
 
 
 @dataclass(eq=False)
-class _Reader:
-    scene: Path
+class _Inspector:
+    scene: SceneFile
     roots: list[Path]
     limits: LimitSettings
     files: dict[Path, None] = field(default_factory=dict)
-    parameters: dict[str, str] = field(default_factory=dict)
 
-    def read(self, file: Path, depth: int) -> None:
-        """Check a scene file and all that it names."""
-        root = _parsed(file)
-        for element in root.iter("default"):
-            self.parameters.setdefault(element.get("name", ""), element.get("value", ""))
-        for element in root.iter():
+    def inspect(self) -> None:
+        """Check the scene file and all that it names; what it includes, before that is read."""
+        for file, element in self.scene.elements():
             self._check_plugin(file, element)
             self._check_film(file, element)
-            for name in self._names(file, element):
+            for name in self.scene.names(file, element):
                 self._check_file(file, name)
-            if element.tag == "include":
-                if depth == DEEPEST:
-                    raise SceneError(f"{file} includes files that include files, more than {DEEPEST} deep")
-                self.read(self._place(file, element.get("filename", "")), depth + 1)
 
     def _check_plugin(self, file: Path, element: Element) -> None:
         kind = element.get("type")
-        if kind is not None and not PLUGIN.fullmatch(self._filled(file, kind)):
+        if kind is not None and not PLUGIN.fullmatch(self.scene.filled(file, kind)):
             raise SceneError(f"{file}: <{element.tag} type={kind!r}> is no name of a plugin")
 
     def _check_film(self, file: Path, element: Element) -> None:
@@ -93,7 +79,7 @@ class _Reader:
         sides = [1, 1]
         for child in element.iter("integer"):
             if child.get("name") in FILM:
-                text = self._filled(file, child.get("value", ""))
+                text = self.scene.filled(file, child.get("value", ""))
                 if not re.fullmatch(r"\s*[0-9]{1,9}\s*", text):
                     raise SceneError(
                         f"{file}: a film's {child.get('name')} is {text!r}, not a number of pixels"
@@ -102,25 +88,10 @@ class _Reader:
                 sides[side] = max(sides[side], int(text))
         self._bound(sides[0] * sides[1] / MILLION, "megapixels", f"{file}: a film", "million pixels")
 
-    def _names(self, file: Path, element: Element) -> Iterator[str]:
-        """Names of files in an element; of its other strings, those that lead to a file that is there."""
-        for key, value in element.attrib.items():
-            is_string = element.tag == "string" and key == "value"
-            is_name = key == "filename" or (element.tag == "path" and key == "value")
-            is_named = is_string and (element.get("name") == "filename" or self._is_there(file, value))
-            if is_name or is_named:
-                yield value
-
-    def _is_there(self, file: Path, name: str) -> bool:
-        try:
-            return self._place(file, name).exists()
-        except (OSError, ValueError):  # too long, or a NUL: no file's name
-            return False
-
     def _check_file(self, file: Path, name: str) -> None:
         try:
-            place = self._place(file, name).resolve()
-        except (OSError, ValueError, RuntimeError) as error:
+            place = self.scene.place(file, name).resolve()
+        except (OSError, ValueError, RuntimeError) as error:  # links in a circle, a NUL
             raise SceneError(f"{file} names a file that can't be looked for: {name!r} ({error})") from error
         if not any(place.is_relative_to(root) for root in self.roots):
             raise SceneError(
@@ -133,19 +104,6 @@ class _Reader:
                 self._check_size(place)
         elif place.exists() and not place.is_dir():
             raise SceneError(f"{file} names {name!r}, which is no ordinary file")
-
-    def _place(self, file: Path, name: str) -> Path:
-        return self.scene.parent / self._filled(file, name)
-
-    def _filled(self, file: Path, text: str) -> str:
-        """Text with the defaults of its parameters, as Mitsuba fills them in."""
-        for _ in range(DEEPEST):
-            if "$" not in text:
-                return text
-            text = PARAMETER.sub(lambda found: self.parameters.get(found[1], "\0"), text)
-            if "\0" in text:
-                break
-        raise SceneError(f"{file}: a parameter of {text!r} has no <default>")
 
     def _check_size(self, file: Path) -> None:
         size = file.stat().st_size
@@ -179,20 +137,3 @@ class _Reader:
         if value > most:
             flag = f"--limits-{setting.replace('_', '-')}"
             raise SceneError(f"{what} has {value:.6g} {unit}; at most {most} are taken: raise {flag}")
-
-
-def _parsed(file: Path) -> Element:
-    try:
-        size = file.stat().st_size
-        if size > XML_MB * MB:
-            raise SceneError(f"{file} has {size / MB:.0f} MB; a scene file may have {XML_MB}")
-        root: Element = parse(file, forbid_dtd=True).getroot()
-    except OSError as error:
-        raise SceneError(f"can't read the scene {file}: {error.strerror}") from error
-    except ParseError as error:
-        raise SceneError(f"{file} is not well-formed XML: {error}") from error
-    except DefusedXmlException as error:
-        raise SceneError(f"{file} has a document type or entities, which scenes have no need of") from error
-    except (ValueError, LookupError) as error:  # an encoding that nobody knows
-        raise SceneError(f"{file} can't be read as XML: {error}") from error
-    return root
