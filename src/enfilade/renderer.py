@@ -243,6 +243,11 @@ class LightRenderer(Renderer, Protocol):
     """
 
     @property
+    def why_no_light(self) -> str:
+        """Why this scene's light can't be told from its surfaces after all; empty where it can."""
+        ...
+
+    @property
     def state(self) -> Any:
         """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
         ...

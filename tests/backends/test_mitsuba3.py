@@ -383,6 +383,54 @@ def test_the_longest_path_is_the_setting(corner):
     assert direct < traced(renderer, camera, spp=64).color.mean()
 
 
+HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
+FOG = '<medium type="homogeneous" name="interior"/>'
+
+
+def of_integrator(folder, integrator, inside=DIFFUSE):
+    file = folder / "scene.xml"
+    file.write_text(
+        f'<scene version="3.0.0">{integrator}{placed("sphere", "ball", (0, 0, 0), inside)}'
+        f'<emitter type="constant"/></scene>'
+    )
+    return file
+
+
+@pytest.mark.parametrize(
+    ("integrator", "inside", "words"),
+    [
+        ('<integrator type="path"/>', DIFFUSE, ""),
+        ('<integrator type="volpath"/>', DIFFUSE, ""),
+        ("", DIFFUSE, ""),
+        ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
+        (HIDDEN.format("path"), DIFFUSE, "hides"),
+        ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "media"),
+    ],
+)  # fmt: skip
+def test_what_has_no_light_of_its_own_says_why(tmp_path, integrator, inside, words):
+    why = opened(of_integrator(tmp_path, integrator, inside)).why_no_light
+    assert (words in why) if words else (why == "")
+
+
+def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):
+    unknown = (
+        '<integrator type="direct"><integer name="a" value="8"/><integer name="b" value="9"/></integrator>'
+    )
+    with pytest.raises(SceneError, match=r'2 unreferenced .* type "direct": integer "a": 8, integer "b": 9$'):
+        opened(of_integrator(tmp_path, unknown))
+
+
+def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
+    integrator = opened(of_integrator(tmp_path, HIDDEN.format("volpath")), max_depth=7)._integrator
+    assert (integrator.class_name(), integrator.hide_emitters) == ("VolumetricPathIntegrator", True)
+    assert "max_depth = 7" in str(integrator)
+    direct = of_integrator(tmp_path, '<integrator type="direct"/>')
+    with pytest.raises(SceneError, match="DirectIntegrator, has no longest path: leave --trace"):
+        opened(direct, max_depth=7)
+    with pytest.raises(SceneError, match="can't be asked for single pixels"):
+        opened(of_integrator(tmp_path, '<integrator type="ptracer"/>'))
+
+
 def compiled_since():
     return [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT and not k["cache_hit"]]
 

@@ -124,6 +124,18 @@ def test_a_renderer_without_light_is_refused(tmp_path):
         rendered(tmp_path, job_of(tmp_path, wall(), slide(3), method="decoupled"))
 
 
+def test_a_scene_whose_light_can_not_be_told_apart_is_refused_at_once(tmp_path):
+    job = _job(tmp_path, "decoupled", 32)
+    integrator = '<integrator type="path">'
+    hidden = f'{integrator}<boolean name="hide_emitters" value="true"/>'
+    text = job.scene.read_text()
+    assert integrator in text
+    job.scene.write_text(text.replace(integrator, hidden))
+    with pytest.raises(SettingsError, match="hides the emitters; take --method paper"):
+        render(job, tmp_path / "run", Silence())
+    assert list(Run.existing(tmp_path / "run").lines()) == []
+
+
 @pytest.mark.parametrize("views", [(0, 1, 2, 2, 2), (2, 2, 2)])
 def test_a_camera_that_comes_to_rest(decoupled, tmp_path, views):
     job, _, _ = decoupled

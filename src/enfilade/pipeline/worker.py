@@ -95,6 +95,8 @@ class Worker:
 
     def _survey(self) -> None:
         workshop, job = self._workshop, self._job
+        if job.method == "decoupled":
+            _ = workshop.light_renderer  # before any work: what it can't do is an error
         survey = survey_path(workshop.views, job.path, job.settings, self._monitor)
         items = len(workshop.renderer.describe().items)
         workshop.finish("survey", [], survey=survey.to_dict(), items=items)

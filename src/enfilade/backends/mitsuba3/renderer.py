@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, UInt
+from enfilade.backends.mitsuba3.integrators import scene_integrator, shortened, why_undivided
 from enfilade.backends.mitsuba3.light import Light
 from enfilade.backends.mitsuba3.lobes import diffuse_reflectance, has_lobe
 from enfilade.backends.scenefile import fingerprint
@@ -39,7 +40,6 @@ from enfilade.renderer import (
 )
 from enfilade.settings import TraceSettings
 
-UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 PASSED_WHOLE = 0.5  # of the light that a surface lets through, above which a G-buffer passes it by
 PASSED = 0.999  # ... above which a path does
@@ -79,8 +79,8 @@ class MitsubaRenderer:
             raise SceneError(f"{file} has no shapes: there is nothing to render")
         self._scene = scene
         self._chunk = settings.chunk
-        self._integrator = _integrator(scene, settings.max_depth)
-        self._onward = [_shortened(self._integrator, edges) for edges in range(1, MOST_EDGES + 1)]
+        self._integrator = scene_integrator(scene, settings.max_depth)
+        self._onward = [shortened(self._integrator, edges) for edges in range(1, MOST_EDGES + 1)]
         self._sampler = _lane_sampler()
         self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
@@ -107,6 +107,11 @@ class MitsubaRenderer:
         """
         found: Surfaces = self._surfaces(rays)
         return found
+
+    @property
+    def why_no_light(self) -> str:
+        """See :meth:`enfilade.renderer.LightRenderer.why_no_light`."""
+        return why_undivided(self._scene, self._integrator)
 
     @property
     def state(self) -> Any:
@@ -301,26 +306,6 @@ def _surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
     return dr.select(is_hit, surface, UInt(SurfaceClass.NONE))
 
 
-def _integrator(scene: Any, max_depth: int) -> Any:
-    """The scene's own integrator where it computes radiance along a ray, else ``path``."""
-    own = scene.integrator()
-    if max_depth:
-        return mi.load_dict({"type": "path", "max_depth": max_depth})
-    return own if isinstance(own, mi.SamplingIntegrator) else mi.load_dict({"type": "path"})
-
-
-def _shortened(integrator: Any, edges: int) -> Any:
-    """The path tracer for paths that have edges behind them; itself where its paths have no limit."""
-    described = re.search(r"max_depth = (\d+),\s*rr_depth = (\d+)", str(integrator))
-    if integrator.class_name() != "PathIntegrator" or not described:
-        return integrator
-    longest, roulette = (int(number) for number in described.groups())
-    if longest >= UNLIMITED:
-        return integrator
-    longest, roulette = max(longest - edges, 0), max(roulette - edges, 1)
-    return mi.load_dict({"type": "path", "max_depth": longest, "rr_depth": roulette})
-
-
 def _lane_sampler() -> Any:
     """A Mitsuba sampler that draws from generators of ours, one a lane."""
 
@@ -339,5 +324,8 @@ def _lane_sampler() -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """Mitsuba's message without the places in its own code where it was raised."""
-    return re.sub(r"\[\w+\.(?:cpp|h):\d+\] ", "", str(error).strip().splitlines()[-1]).strip()
+    """Mitsuba's last sentence and the list below it, without the places in its code where it was raised."""
+    lines = [line.strip() for line in str(error).strip().splitlines()]
+    first = max((i for i, line in enumerate(lines) if not line.startswith("- ")), default=0)
+    items = ", ".join(line.removeprefix("- ") for line in lines[first + 1 :])
+    return re.sub(r"\[\w+\.(?:cpp|h):\d+\] ", "", f"{lines[first]} {items}").strip()
