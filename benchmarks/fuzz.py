@@ -78,7 +78,9 @@ def read_batch(first: int, last: int) -> None:
     readers = all_readers()
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         folder = Path(name)
-        samples = {kind: make(folder) for kind, (make, _) in readers.items()}
+        for kind in readers:
+            (folder / kind).mkdir()
+        samples = {kind: make(folder / kind) for kind, (make, _) in readers.items()}
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         signal.signal(signal.SIGALRM, signal.SIG_DFL)  # which ends the process
         for seed in range(first, last):
@@ -132,6 +134,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
 
     return {
         "exr": (make_exr, read_exr),
+        "exr of a run": (lambda folder: make_exr(folder, is_portable=False), read_exr),
         "exr header": (make_exr, picture_pixels),
         "path": (make_path, load_path),
         "analytic": (make_analytic, read_scene),
@@ -142,7 +145,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     }
 
 
-def make_exr(folder: Path) -> Path:
+def make_exr(folder: Path, *, is_portable: bool = True) -> Path:
     """An image of a few layers."""
     import numpy as np
 
@@ -152,7 +155,7 @@ def make_exr(folder: Path) -> Path:
         "RGB": np.ones((24, 32, 3), np.float16),
         "Z": np.random.default_rng(1).random((24, 32), np.float32),
     }
-    write_exr(folder / "image.exr", layers, attributes={"note": "x"})
+    write_exr(folder / "image.exr", layers, attributes={"note": "x"}, is_portable=is_portable)
     return folder / "image.exr"
 
 
