@@ -13,6 +13,7 @@ from pathlib import Path
 
 from enfilade.cli.progress import watch
 from enfilade.device import activate
+from enfilade.errors import RunFolderError
 
 HERE = Path(__file__).resolve().parent
 DOCUMENT = HERE.parent / "docs" / "case-studies.md"
@@ -39,8 +40,12 @@ def main() -> int:
     minutes = forecast_s(arguments.scenes, TERMS[arguments.preset], cores) / 60.0
     print(f"{' and '.join(arguments.scenes)}: about {minutes:.0f} minutes on {cores} cores when begun anew;")
     print("interrupted, the same command goes on.", flush=True)
-    with watch(quiet=False) as monitor:
-        found = measure(arguments.scenes, arguments.items, TERMS[arguments.preset], folder, monitor)
+    try:
+        with watch(quiet=False) as monitor:
+            found = measure(arguments.scenes, arguments.items, TERMS[arguments.preset], folder, monitor)
+    except RunFolderError as error:
+        print(error, file=sys.stderr)
+        return 2
     for file in write_document(found, TERMS[arguments.preset], folder, DOCUMENT, target):
         print(file)
     return 0

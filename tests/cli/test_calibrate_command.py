@@ -70,6 +70,28 @@ def test_other_frames_in_the_folder_are_refused(run, inputs, tmp_path):
     assert "another run" in other.output
 
 
+def test_too_few_paths_to_know_their_noise_are_refused(run, inputs):
+    result = run("calibrate", "threshold", *inputs, "--spp", "1", "--device", "cpu")
+    assert result.exit_code == 2
+    assert "--light traced needs --spp 2 or more" in result.stderr
+
+
+def test_a_scene_that_reaches_for_other_files_is_refused(run, inputs, tmp_path):
+    scene = tmp_path / "scene.xml"
+    mesh = '<shape type="ply"><string name="filename" value="/elsewhere/mesh.ply"/></shape>'
+    scene.write_text(f'<scene version="3.0.0">{mesh}</scene>')
+    result = run("calibrate", "threshold", scene, *inputs[1:], "--device", "cpu")
+    assert result.exit_code == 2
+    assert "--allow /elsewhere" in result.stderr
+
+
+@pytest.mark.parametrize("flag", ["--metric-metering", "--masks-slow-deg-s"])
+def test_flags_that_change_nothing_are_unknown(run, inputs, flag):
+    result = run("calibrate", "threshold", *inputs, flag, "0")
+    assert result.exit_code == 2
+    assert f"No such option '{flag}'" in result.stderr
+
+
 def test_no_threshold_is_said(run, inputs):
     result = run(
         "calibrate", "threshold", *inputs, "--visible-percent", "0", "--light", "plain", "--device", "cpu"
@@ -80,5 +102,7 @@ def test_no_threshold_is_said(run, inputs):
 
 def test_help_says_what_is_calibrated(run):
     assert "threshold" in run("calibrate", "--help").output
-    assert "Fig. 9" in run("calibrate", "threshold", "--help").output
+    help_text = run("calibrate", "threshold", "--help").output
+    assert "Fig. 9" in help_text
+    assert all(flag in help_text for flag in ("--metric-mask-slope", "--allow"))
     assert "calibrate" in main.list_commands(None)

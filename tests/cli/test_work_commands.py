@@ -36,6 +36,9 @@ def begun(run, camera_path, tmp_path):
 
 def test_prepared_and_worked_on(run, begun, tmp_path):
     out = tmp_path / "run"
+    early = run("work", out, "--step", "keyframes", "--quiet")
+    assert early.exit_code == 1
+    assert "--step plan" in early.stderr
     plan = run("work", out, "--step", "plan", "--openjd")
     assert plan.exit_code == 0, plan.output
     assert plan.stdout.splitlines()[0] == "openjd_status: plan"

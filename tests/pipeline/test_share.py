@@ -4,11 +4,13 @@ import dataclasses
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
+from enfilade.errors import EnfiladeError, RunFolderError, SettingsError, UnfinishedError
 from enfilade.monitor import Silence
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.farm import submit, template, write_template
@@ -63,6 +65,13 @@ def test_shares_in_any_order_make_the_same_run(whole, begun, count):
     assert not list((begun / "parts").glob("*.jsonl"))
 
 
+@pytest.mark.parametrize("step", ["keyframes", "segments", "frames", "clips"])
+def test_a_step_before_the_plan_says_which_comes_first(begun, step):
+    with pytest.raises(UnfinishedError, match=rf"step '{step}' comes after step 'plan', .* --step plan"):
+        share(begun, step, 1, 2)
+    assert not list(Run.existing(begun).lines())
+
+
 def test_a_step_that_comes_too_early_says_what_it_waits_for(begun):
     share(begun, "plan")
     with pytest.raises(UnfinishedError, match=r"1 units of step 'segments' wait for .*: segment 8-13"):
@@ -113,6 +122,49 @@ def test_the_template_run_by_open_job_description_makes_the_same_run(whole, begu
     assert done.returncode == 0, done.stdout[-3000:]
     assert "openjd_progress: 100.0" in done.stdout
     assert Run.existing(begun).digest() == whole
+
+
+class Cluster:
+    """Stands for submitit: notes when each task is given to it and when it is waited for."""
+
+    def __init__(self, failing=""):
+        self.failing, self.events, self.parameters = failing, [], []
+        self.helpers = SimpleNamespace(CommandFunction=list)
+        self.core = SimpleNamespace(utils=SimpleNamespace(UncompletedJobError=TimeoutError))
+        self.AutoExecutor = lambda **_: SimpleNamespace(
+            update_parameters=lambda **given: self.parameters.append(given),
+            batch=nullcontext,
+            submit=self._submit,
+        )
+
+    def _submit(self, line):
+        number = str(sum(what == "given" for what, _ in self.events))
+        self.events.append(("given", number))
+        return SimpleNamespace(job_id=number, exception=lambda: self._ended(number, line))
+
+    def _ended(self, number, line):
+        self.events.append(("ended", number))
+        return RuntimeError("no memory") if self.failing in line else None
+
+
+def test_tasks_on_this_machine_come_one_after_the_other(begun, monkeypatch):
+    cluster = Cluster()
+    monkeypatch.setitem(sys.modules, "submitit", cluster)
+    jobs = submit(begun, "local", 3, {})
+    assert jobs == [str(n) for n in range(1 + 3 * 3 + 1 + 1)]
+    assert cluster.events == [(what, job) for job in jobs for what in ("given", "ended")]
+    monkeypatch.setitem(sys.modules, "submitit", Cluster(failing="segments"))
+    with pytest.raises(EnfiladeError, match="step 'segments' failed: no memory"):
+        submit(begun, "local", 3, {})
+
+
+def test_slurm_gets_all_tasks_of_a_step_at_once_and_holds_the_next_until_they_are_done(begun, monkeypatch):
+    cluster = Cluster()
+    monkeypatch.setitem(sys.modules, "submitit", cluster)
+    assert cluster.events == [("given", job) for job in submit(begun, "slurm", 2, {"timeout_min": 5})]
+    after = [given.get("slurm_additional_parameters") for given in cluster.parameters]
+    held = ["0", "1:2", "3:4", "5:6", "7"]  # plan, keyframes, segments, frames, the clip
+    assert after == [None, *({"dependency": f"afterok:{jobs}"} for jobs in held)]
 
 
 @pytest.mark.slow

@@ -1,11 +1,10 @@
-"""The case studies on small analytic scenes: what each item measures, and how results are kept."""
+"""The case studies on small analytic scenes: what each item measures."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from enfilade.codec import read_json
 from enfilade.geometry import find_geometry, image_flow
 from enfilade.keyframes import place_keyframes
 from enfilade.monitor import Silence
@@ -16,17 +15,14 @@ from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import Segment, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from enfilade.report.plots import walkthrough_figure
-from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement
+from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement, Settings
 from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
 from enfilade.studies.cases import times as table2
-from enfilade.studies.cases.case import Case, stretch_of
+from enfilade.studies.cases.case import stretch_of
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from enfilade.studies.cases.plain import PlainlyLit
-from enfilade.studies.cases.runner import ITEMS, measure
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
-from enfilade.studies.cases.terms import TERMS
 from enfilade.studies.cases.windows import Windows, probes_of
 from scenes_analytic import room, room_walk
 from small_runs import job_of
@@ -78,7 +74,7 @@ def test_plain_light_shows_what_mirrors_reflect(shiny):
     seen = mirrored(shiny.renderer, geometry)
     mirror = mirror_pixels(geometry)
     assert mirror.any()
-    assert (seen.item[mirror] >= VIRTUAL).all() or (seen.item[mirror] == 0).any()
+    assert ((seen.item[mirror] >= VIRTUAL) | (seen.item[mirror] == 0)).all()
     np.testing.assert_array_equal(seen.item[~mirror], geometry.item[~mirror])
     color = shiny.traced(5).color
     hit = mirror & (seen.item > VIRTUAL)
@@ -154,7 +150,7 @@ def test_scores_of_parts_of_a_map():
 
 
 def test_noise_that_is_declared_does_not_count(plain):
-    viewer = Viewer(plain.job.viewing, plain.job.settings.viewing)
+    viewer = Viewer(plain.job.viewing, plain.job.settings)
     reference = plain.traced(5).color
     noise = np.random.default_rng(1).normal(0.0, 0.05, reference.shape[:2]).astype(np.float32)
     test = np.maximum(reference + noise[..., None], 0.0)
@@ -162,6 +158,17 @@ def test_noise_that_is_declared_does_not_count(plain):
     told = viewer.paper(test, reference, None, noise=np.full(noise.shape, 0.05**2, np.float32))
     assert (blind > 1.0).mean() > 0.3
     assert (told > 1.0).mean() < 0.05
+
+
+def test_a_viewer_takes_the_slope_of_masking_from_the_settings(plain):
+    reference = plain.traced(5).color
+    noise = np.random.default_rng(1).normal(0.0, 0.05, reference.shape).astype(np.float32)
+
+    def seen(slope):
+        settings = Settings.from_tables({"metric": {"mask_slope": slope}})
+        return Viewer(plain.job.viewing, settings).paper(reference + noise, reference, None).mean()
+
+    assert seen(1.0) < 0.95 * seen(0.0)
 
 
 # --- 1: placement
@@ -319,7 +326,7 @@ def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them(tmp_path):
     assert found["example"] == most["frame"]
     assert 0.0 < most["ghosts"]["pixels"] < 20.0
     near = separation.outlines(plain.geometry(most["frame"] - 1).item)
-    viewer = Viewer(plain.job.viewing, plain.job.settings.viewing)
+    viewer = Viewer(plain.job.viewing, plain.job.settings)
     changed = separation.changed_pixels(viewer, example["together"], example["apart"])
     np.testing.assert_array_equal(example["ghost"] > 0.0, changed & ~near)
     assert most["outlines"]["pixels"] == pytest.approx(100.0 * (changed & near).mean())
@@ -359,83 +366,6 @@ def test_a_room_without_mirrors_has_no_frame_to_show_one(plain):
     assert reflections.most_mirrors(plain, 3) == []
 
 
-# --- results on disk, and the document
-
-
-def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):
-    calls = []
-
-    def make():
-        calls.append(1)
-        return {"value": len(calls)}
-
-    def stored(**other):
-        terms = dataclasses.replace(TERMS["small"], **other)
-        return Case("room", terms, tmp_path, Silence()).stored("item", make, ("spp", "size"))
-
-    assert stored() == {"value": 1}
-    assert stored() == {"value": 1}
-    assert stored(crops=7) == {"value": 1}  # on which it does not depend
-    assert stored(spp=99) == {"value": 2}
-    assert read_json(tmp_path / "item.json")["made_by"]["terms"] == {"spp": 99, "size": [160, 120]}
-
-
-@pytest.mark.parametrize("item", ITEMS.values(), ids=ITEMS)
-def test_items_depend_on_terms_that_exist(item):
-    assert set(item.fields) <= set(TERMS["small"].to_dict())
-    assert "preset" in item.fields
-
-
-def test_still_settings_are_the_paper_s():
-    assert threshold.PAPER_DEG_S == 0.5
-    assert (AntialiasSettings().frames, AntialiasSettings().slow_frames) == (11, 15)
-
-
-# --- from end to end
-
-
-class Told:
-    """A monitor that keeps the names of stages."""
-
-    def __init__(self):
-        self.stages = []
-
-    def stage(self, name, _total):
-        self.stages.append(name)
-
-    def advance(self, count=1):
-        pass
-
-    def extend(self, count):
-        pass
-
-    def say(self, text):
-        pass
-
-
-@pytest.mark.slow
-def test_a_scene_is_measured_once(tmp_path):
-    """The small ROOM at 32x24: its run, its predictions with and without noise, its shares."""
-    terms = dataclasses.replace(TERMS["small"], size=(32, 24), spp=2)
-    items = ("statistics", "shares")
-    told = Told()
-    found = measure(("room",), items, terms, tmp_path, told)["room"]
-    assert told.stages
-    summary = found["statistics"]["summary"]
-    assert len(walkthrough_figure(summary).axes) == 3
-    assert summary["frames"] == 60
-    initial = [s for s in summary["segments"] if s["depth"] == 0]
-    plain = [s for s in found["statistics"]["plain_segments"] if s["depth"] == 0]
-    assert [(s["first"], s["last"]) for s in initial] == [(s["first"], s["last"]) for s in plain]
-    assert found["statistics"]["plain"]["before"] > found["statistics"]["predictions"]["before"]
-    assert found["shares"]["table1"] == summary["table1"]
-    assert found["shares"]["specular_seen"] == 0.0
-
-    again = Told()
-    assert measure(("room",), items, terms, tmp_path, again)["room"] == found
-    assert again.stages == []
-
-
 def test_crops_are_cut_from_the_middle(tmp_path):
     job = job_of(tmp_path, room(), room_walk(4, size=(64, 48)))
     crop = table2.Crop.of(job, (10, 8))
@@ -444,3 +374,8 @@ def test_crops_are_cut_from_the_middle(tmp_path):
     np.testing.assert_array_equal(crop.cut(image).ravel(), crop.pixels(job))
     assert image[24, 32] in crop.cut(image)
     assert table2.Crop.of(job, (999, 999)).size == (48, 64)
+
+
+def test_still_settings_are_the_paper_s():
+    assert threshold.PAPER_DEG_S == 0.5
+    assert (AntialiasSettings().frames, AntialiasSettings().slow_frames) == (11, 15)

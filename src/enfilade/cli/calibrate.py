@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
     from enfilade.studies.cases.threshold import Calibration
 
-SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric", "masks", "antialias")
+SECTIONS = (
+    "trace", "viewing", "keyframes", "warp", "metric.mask_slope", "antialias",
+    "limits.allow", "limits.file_mb", "limits.megapixels", "limits.elements_m",
+)  # fmt: skip
 
 
 @click.group("calibrate", short_help="Settings that depend on the scene, found by the metric.")

@@ -27,7 +27,8 @@ from enfilade.cli.group import debug_option
     "--submit",
     "cluster",
     type=click.Choice(("slurm", "local")),
-    help="Give it to Slurm now, or to processes of this machine to try that, instead of writing a template.",
+    help="Write no template: give it to Slurm now, or, to try that, to processes of this machine, one after "
+    "the other.",
 )
 @click.option(
     "--slurm",

@@ -84,7 +84,7 @@ def submit(folder: Path, cluster: str, chunks: int | None, options: dict[str, An
     folder
         The run.
     cluster
-        ``slurm``, or ``local``: processes of this machine, waited for.
+        ``slurm``, or ``local``: processes of this machine, one after the other, waited for.
     chunks
         How many tasks share a step; None: one for each 16 frames.
     options
@@ -111,26 +111,27 @@ def submit(folder: Path, cluster: str, chunks: int | None, options: dict[str, An
     for step in template(folder, chunks)["steps"]:
         executor = submitit.AutoExecutor(folder=folder / "slurm", cluster=cluster)
         after = {"dependency": "afterok:" + ":".join(job.job_id for job in previous)} if previous else {}
-        more = {"slurm_additional_parameters": after} if cluster == "slurm" and after else {}
+        more = {"slurm_additional_parameters": after} if after else {}
         executor.update_parameters(**{"timeout_min": 60, **options, **more})
-        with executor.batch():
-            previous = [
-                executor.submit(submitit.helpers.CommandFunction(line)) for line in _lines(step, folder)
-            ]
-        made += previous
+        tasks = [submitit.helpers.CommandFunction(line) for line in _lines(step, folder)]
         if cluster == "local":
-            _wait(step["name"], previous, submitit.core.utils.UncompletedJobError)
+            for task in tasks:  # one by one: each takes all cores, and memory for a scene
+                made.append(executor.submit(task))
+                _wait(step["name"], made[-1], submitit.core.utils.UncompletedJobError)
+            continue
+        with executor.batch():
+            previous = [executor.submit(task) for task in tasks]
+        made += previous
     return [job.job_id for job in made]
 
 
-def _wait(step: str, jobs: list[Any], uncompleted: type[Exception]) -> None:
-    for job in jobs:
-        try:
-            error = job.exception()
-        except uncompleted as lost:
-            error = lost
-        if error is not None:
-            raise EnfiladeError(f"step {step!r} failed: {error}")
+def _wait(step: str, job: Any, uncompleted: type[Exception]) -> None:
+    try:
+        error = job.exception()
+    except uncompleted as lost:
+        error = lost
+    if error is not None:
+        raise EnfiladeError(f"step {step!r} failed: {error}")
 
 
 def _step(name: str, before: list[dict[str, Any]], count: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.errors import SettingsError
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
@@ -15,6 +16,7 @@ from enfilade.pipeline.rehearsal import forecast_decoupled
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
+from enfilade.pipeline.walkthrough import LEAST_SPP
 from enfilade.records import Keyframe, Segment, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.warp import composite, warp_keyframe
@@ -71,16 +73,24 @@ def plan(job: Job, monitor: Monitor) -> Plan:
     Raises
     ------
     SceneError
+    SettingsError
+        The method asks for more paths, or more of the scene than it has.
     DeviceError
     """
     job.check_scene()
+    if job.method == "paper" and job.settings.trace.spp < LEAST_SPP:
+        raise SettingsError(
+            f"--method paper needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "
+            "what is noise and what is a difference"
+        )
     renderer = open_renderer(job.scene, job.settings.trace)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
-    segments = [segment for shot in segments_of(job, survey) for segment in shot]
+    shots = segments_of(job, survey)
+    segments = [segment for shot in shots for segment in shot]
     holes: dict[int, float] = {}
     if job.method == "decoupled":
-        forecast = forecast_decoupled(job, segments, monitor)
+        forecast = forecast_decoupled(job, shots, monitor)
     elif job.method == "paper":
         holes = _expected_holes(job, views, segments, monitor)
         forecast = _forecast(job, _shares(job, survey, segments, holes), renderer)

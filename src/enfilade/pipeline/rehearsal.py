@@ -36,7 +36,7 @@ class _Spent:
         self.cpu_s += times * other.cpu_s
 
 
-def forecast_decoupled(job: Job, segments: list[Segment], monitor: Monitor) -> dict[str, Any]:
+def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -> dict[str, Any]:
     """Render one segment from the middle of a path, and multiply what it took.
 
     What is made smaller counts by its pixels, which is a little too much: part of the cost of a frame does
@@ -45,47 +45,68 @@ def forecast_decoupled(job: Job, segments: list[Segment], monitor: Monitor) -> d
     Parameters
     ----------
     job
-    segments
-        All that the method begins with.
+    shots
+        The segments with which the method begins, of each shot.
     monitor
 
     Returns
     -------
     dict
         ``rays``: per pixel and frame, by purpose. ``seconds``, ``cpu_seconds``: of the whole. ``paths``:
-        of a keyframe's pixel. ``rehearsed_frames``, ``rehearsed_size``.
+        of a keyframe's pixel, the mean over all keyframes. ``rehearsed_frames``, ``rehearsed_size``.
     """
+    segments = [segment for shot in shots for segment in shot]
     segment = max(segments, key=lambda s: (s.last - s.first, -abs(s.first + s.last - len(job.path))))
-    # Its frames may have an odd number of lines, which not every codec takes.
-    settings = replace(job.settings, video=replace(job.settings.video, codec="ffv1"))
-    small = replace(job, path=excerpt_of(job.path, segment), settings=settings)
+    small = _smaller(job, segment)
     count = len(small.path)
     monitor.stage("rehearsal", count)
-    with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
-        folder = Path(place) / "run"
-        render(small, folder, Silence())
-        run = Run.existing(folder)
-        lines = list(run.lines())
-        figures = tally(run.identity, lines, None)
+    identity, lines = _rehearsed(small)
     monitor.advance(count)
-    keyframes = {s.first for s in segments} | {s.last for s in segments}
-    paths, more = _paths(lines, job, len(keyframes))
-    spent = _multiplied(
-        lines, keyframes=len(keyframes), segments=len(segments), frames=len(job.path), more=more
-    )
+
+    pilot = next((line for line in lines if "jnd" in line), None)
+    keyframes = [len({s.first for s in shot} | {s.last for s in shot}) for shot in shots]
+    paths = float(job.settings.light.paths) if pilot is None else _paths(pilot["jnd"], job, keyframes)
+    more = 1.0 if pilot is None else paths / pilot["paths"]
+    frames, all_keyframes = len(job.path), sum(keyframes)
+    times = {
+        **dict.fromkeys(FRAMES, frames),
+        **dict.fromkeys(KEYFRAMES, all_keyframes),
+        "keyframe": all_keyframes * more,
+        "light": len(segments),
+        "pilot": len(shots),
+    }
+    spent = _multiplied(lines, times, frames / count)
     larger = job.path.width * job.path.height / (small.path.width * small.path.height)
+
+    rays = tally(identity, [line for line in lines if line is not pilot], None)["rays"]
     own = sum(line["unit"].startswith("draft ") for line in lines)  # keyframes of the excerpt
-    denser = (len(keyframes) / len(job.path)) / (own / count)  # keyframes, by frame, than in the excerpt
-    times = {"light": more * denser, "drafts": denser}
-    rays = {kind: sent * times.get(kind, 1.0) for kind, sent in figures["rays"].items()}
+    denser = (all_keyframes / frames) / (own / count)  # keyframes, by frame, than in the excerpt
+    rays |= {"light": rays["light"] * more * denser, "drafts": rays["drafts"] * denser}
+    for kind, sent in (pilot or {}).get("rays", {}).items():
+        rays[kind] += len(shots) * sent / (frames * small.path.width * small.path.height)
     return {
         "rays": rays,
         "seconds": larger * spent.wall_s,
         "cpu_seconds": larger * spent.cpu_s,
-        "paths": paths,
+        "paths": round(paths),
         "rehearsed_frames": count,
         "rehearsed_size": [small.path.width, small.path.height],
     }
+
+
+def _smaller(job: Job, segment: Segment) -> Job:
+    """A segment of a walkthrough. Its frames may have an odd number of lines, which not every codec takes."""
+    settings = replace(job.settings, video=replace(job.settings.video, codec="ffv1"))
+    return replace(job, path=excerpt_of(job.path, segment), settings=settings)
+
+
+def _rehearsed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Identity and ledger of a run that is rendered and thrown away."""
+    with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
+        folder = Path(place) / "run"
+        render(job, folder, Silence())
+        run = Run.existing(folder)
+        return run.identity, list(run.lines())
 
 
 def excerpt_of(path: CameraPath, segment: Segment) -> CameraPath:
@@ -97,39 +118,24 @@ def excerpt_of(path: CameraPath, segment: Segment) -> CameraPath:
     return CameraPath(cameras, path.numbers[span], path.fps, frozenset())
 
 
-def _paths(lines: Iterable[Mapping[str, Any]], job: Job, keyframes: int) -> tuple[int, float]:
-    """Paths of a keyframe's pixel, and how many times as many as in the excerpt, where fewer are pooled."""
-    pilot = next((line for line in lines if "jnd" in line), None)
-    if pilot is None:
-        return job.settings.light.paths, 1.0
-    paths = paths_for(pilot["jnd"], job.settings.light.quality, keyframes)
-    return paths, paths / pilot["paths"]
+def _paths(jnd: float, job: Job, keyframes: list[int]) -> float:
+    """Paths of a keyframe's pixel, the mean over all: the more a shot has to pool, the fewer each needs."""
+    paths = [paths_for(jnd, job.settings.light.quality, count) for count in keyframes]
+    return sum(n * count for n, count in zip(paths, keyframes, strict=True)) / sum(keyframes)
 
 
-def _multiplied(
-    lines: Iterable[Mapping[str, Any]], *, keyframes: int, segments: int, frames: int, more: float
-) -> _Spent:
-    """What a whole path takes, by the ledger of one segment, whose keyframes have fewer paths by ``more``.
+def _multiplied(lines: Iterable[Mapping[str, Any]], times: Mapping[str, float], other_times: float) -> _Spent:
+    """What a whole path takes, by the ledger of one segment, and how often the path has a unit of each kind.
 
     Of units of a kind the one in the middle counts, so that kernels that were compiled for the first do not.
     """
     by_kind: dict[str, list[_Spent]] = defaultdict(list)
-    count = 0
     for line in lines:
         costs = line.get("cost", {}).values()
         spent = _Spent(sum(c["wall_s"] for c in costs), sum(c["cpu_s"] for c in costs))
-        kind = line["unit"].split()[0]
-        by_kind[kind].append(spent)
-        count += kind == "frame"
+        by_kind[line["unit"].split()[0]].append(spent)
     total = _Spent()
     for kind, units in by_kind.items():
         middle = sorted(units, key=lambda spent: spent.cpu_s)[(len(units) - 1) // 2]
-        if kind in FRAMES:
-            total.add(middle, frames)
-        elif kind in KEYFRAMES:
-            total.add(middle, keyframes * (more if kind == "keyframe" else 1.0))
-        elif kind == "light":
-            total.add(middle, segments)
-        else:  # survey and video, once and by frame; and the pilot, once
-            total.add(middle, 1 if kind == "pilot" else frames / count)
+        total.add(middle, times.get(kind, other_times))  # the others, survey and video, are of all frames
     return total

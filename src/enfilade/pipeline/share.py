@@ -11,7 +11,7 @@ from enfilade.executors import Unit
 from enfilade.monitor import Monitor
 from enfilade.pipeline.crew import Crew, carry_out
 from enfilade.pipeline.job import Job, read_job
-from enfilade.pipeline.units import STEPS, Step, place_of
+from enfilade.pipeline.units import STEPS, Blueprint, Step, place_of
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
 
@@ -61,7 +61,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
     SettingsError
         There is no such step.
     UnfinishedError
-        Units of an earlier step are missing, or some failed again and again.
+        The path is not surveyed yet, units of an earlier step are missing, or some failed again and again.
     """
     job = read_job(folder)
     step = step_named(job, share.step)
@@ -74,6 +74,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
                 f"{folder}: the scene or this version of enfilade is not the one with which the run began; "
                 "`enfilade render` says what differs"
             )
+        _check_begun(run, job, step)
 
         def is_wanted(unit: Unit) -> bool:
             return unit.kind in step.kinds and _is_in(unit, share, len(job.path))
@@ -99,6 +100,19 @@ def step_named(job: Job, name: str) -> Step:
     if name not in steps:
         raise SettingsError(f"--method {job.method} has no step {name!r}; it has {', '.join(steps)}")
     return steps[name]
+
+
+def _check_begun(run: Run, job: Job, step: Step) -> None:
+    """Refuse a step whose units only the survey tells, where this host sees no survey."""
+    known = {unit.kind for unit in Blueprint(job, run).first()}
+    if known & step.kinds or run.done("survey"):
+        return
+    first = STEPS[job.method][0].name
+    raise UnfinishedError(
+        f"{run.folder}: step {step.name!r} comes after step {first!r}, which is not done, or this host does "
+        f"not see it yet; run `enfilade work {run.folder} --step {first}` first, or try again",
+        ("survey",),
+    )
 
 
 def _is_in(unit: Unit, share: Share, frames: int) -> bool:

@@ -77,6 +77,7 @@ class EveryFrame:
 
     def run(self, folder: Path, monitor: Monitor) -> None:
         """Make the frames that the folder does not hold."""
+        self.job.check_scene()
         renderer = open_renderer(self.job.scene, self.job.settings.trace)
         with Run.open(folder, self._identity(renderer)) as run:
             for note in run.notes:
@@ -153,6 +154,7 @@ class Interpolated:
     def run(self, folder: Path, monitor: Monitor) -> None:
         """Make the shots that the folder does not hold."""
         job = self.job
+        job.check_scene()
         renderer = open_renderer(job.scene, job.settings.trace)
         views = Views(renderer, job.path, job.viewing, Costs())
         shots = initial_segments(

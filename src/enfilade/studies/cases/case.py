@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,6 +13,7 @@ from typing import Any
 
 from enfilade import __version__
 from enfilade.codec import read_json, write_json
+from enfilade.errors import RunFolderError
 from enfilade.monitor import Monitor
 from enfilade.path import load_path
 from enfilade.pipeline.cost import Costs
@@ -19,7 +22,7 @@ from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
-from enfilade.scenes import write_scene
+from enfilade.scenes import SceneFiles, write_scene
 from enfilade.settings import Settings
 from enfilade.studies.cases.plain import PlainlyLit
 from enfilade.studies.cases.terms import PIXEL_M, Terms
@@ -28,6 +31,8 @@ from enfilade.studies.cases.windows import Windows
 __all__ = ["Case", "stretch_of"]
 
 PLAIN_SPP = 64  # rays a pixel of a reference without noise
+MADE_BY = "made_by.json"  # in the scene's folder, written last
+DIGITS = 12  # of a job's checksum, by which its frames are kept
 STRETCH_AT = 0.3  # of the path: where the stretch lies that the dearer contestants render
 
 
@@ -40,7 +45,7 @@ class Case:
     terms
     folder
         Of this scene; made if it is not there. It holds ``scene/``, a run folder for each walkthrough,
-        and the results as JSON.
+        traced frames of sequences in ``windows/``, and the results as JSON.
     monitor
 
     Attributes
@@ -85,7 +90,7 @@ class Case:
     def windows(self) -> Windows:
         """Short sequences under the scene's own light."""
         return Windows(
-            self.short, self.renderer, self.short_survey, self.folder / "windows", self.monitor,
+            self.short, self.renderer, self.short_survey, self.frames_of(self.short), self.monitor,
             self.views(self.short), self.terms.window_reference_spp,
         )  # fmt: skip
 
@@ -97,6 +102,11 @@ class Case:
             self.views(self.whole), PLAIN_SPP,
         )  # fmt: skip
 
+    def frames_of(self, job: Job) -> Path:
+        """Folder in which traced frames of a job are kept, and those of no other scene or settings."""
+        identity = json.dumps(job.identity(), sort_keys=True)
+        return self.folder / "windows" / hashlib.sha256(identity.encode()).hexdigest()[:DIGITS]
+
     def views(self, job: Job) -> Views:
         """What the cameras of a job see."""
         return Views(self.renderer, job.path, job.viewing, Costs())
@@ -106,12 +116,33 @@ class Case:
         """Frames that `decoupled` renders, of which some are judged."""
         return stretch_of(self.whole.path, self.terms.decoupled_frames)
 
+    def check(self) -> None:
+        """Refuse a folder with the scene of another preset or version: nothing in it would be of use.
+
+        Raises
+        ------
+        RunFolderError
+        """
+        file = self.folder / "scene" / MADE_BY
+        if file.is_file() and (there := read_json(file)) != self._scene_of:
+            was, now = json.dumps(there), json.dumps(self._scene_of)
+            raise RunFolderError(
+                f"{self.folder} holds other case studies: {was} there, {now} now. Choose another --out, or "
+                f"delete {self.folder} to begin anew"
+            )
+
     def rendered(self) -> dict[str, Any]:
-        """Render the whole walk by the paper's method, or go on with it: its summary."""
+        """Render the whole walk by the paper's method, or go on with it: its summary.
+
+        Raises
+        ------
+        RunFolderError
+            The folder holds a run of another scene, version or settings. It is not replaced: it took long.
+        """
         return self._rendered("paper", self.whole)
 
     def decoupled(self) -> dict[str, Any]:
-        """Render the stretch by `decoupled`: its summary."""
+        """Render the stretch by `decoupled`, or go on with it: its summary. Raises as :meth:`rendered`."""
         path, frames = self.whole.path, self.stretch
         part = CameraPath(
             path.cameras[frames.start : frames.stop], path.numbers[frames.start : frames.stop], path.fps
@@ -131,22 +162,36 @@ class Case:
         file = self.folder / f"{name}.json"
         terms = self.terms.to_dict()
         made_by = {"version": __version__, "terms": {field: terms[field] for field in fields}}
-        if file.is_file():
+        is_there = file.is_file()
+        if is_there:
             held = read_json(file)
             if held.get("made_by") == made_by:
                 return held["result"]
-            self.monitor.say(f"{file} was made on other terms; it is made anew")
         result = make()
         write_json(file, {"made_by": made_by, "result": result})
+        if is_there:
+            self.monitor.say(f"{file} was made on other terms, and was made anew")
         return read_json(file)["result"]  # as a later call will read it
 
     def _job(self, size: tuple[int, int], spp: int) -> Job:
-        file = self.folder / "scene" / "scene.xml"
-        path_file = file.with_name("camera_path.json")
-        if not path_file.is_file():  # which is written last
-            write_scene(self.name, file.parent, preset=self.terms.preset)
+        files = self._scene
         tables = {"viewing": {"diagonal_m": math.hypot(*size) * PIXEL_M}, "trace": {"spp": spp}}
-        return Job(file, load_path(path_file, size=size), Settings.from_tables(tables), "paper")
+        path = load_path(files.path, size=size)
+        return Job(files.scene, path, Settings.from_tables(tables), "paper")
+
+    @cached_property
+    def _scene(self) -> SceneFiles:
+        """The scene's files, written unless they are there."""
+        self.check()
+        folder = self.folder / "scene"
+        if not (folder / MADE_BY).is_file():
+            write_scene(self.name, folder, preset=self.terms.preset)
+            write_json(folder / MADE_BY, self._scene_of)
+        return SceneFiles(folder / "scene.xml", folder / "camera_path.json")
+
+    @property
+    def _scene_of(self) -> dict[str, str]:
+        return {"preset": self.terms.preset, "version": __version__}
 
     def _surveyed(self, job: Job) -> dict[str, Any]:
         return survey_path(self.views(job), job.path, job.settings, self.monitor).to_dict()
@@ -154,24 +199,7 @@ class Case:
     def _rendered(self, name: str, job: Job) -> dict[str, Any]:
         from enfilade.pipeline.walkthrough import render
 
-        folder = self.folder / name
-        summary = folder / "summary.json"  # which is written last
-        if summary.is_file():
-            found: dict[str, Any] = read_json(summary)
-            if _is_of(found, job):
-                return found
-        return render(job, folder, self.monitor)
-
-
-def _is_of(summary: dict[str, Any], job: Job) -> bool:
-    """Whether a finished run is one of this job, as far as its summary tells."""
-    asked = {
-        "method": job.method,
-        "frames": len(job.path),
-        "size": [job.path.width, job.path.height],
-        "spp": job.settings.trace.spp,
-    }
-    return all(summary[key] == value for key, value in asked.items())
+        return render(job, self.folder / name, self.monitor)
 
 
 def stretch_of(path: CameraPath, length: int) -> range:

@@ -128,10 +128,17 @@ def measure(
     -------
     dict
         By scene and item.
+
+    Raises
+    ------
+    RunFolderError
+        The folder holds scenes or walkthroughs made on other terms.
     """
+    cases = {scene: Case(scene, terms, folder / scene, monitor) for scene in scenes}
+    for case in cases.values():
+        case.check()
     found: dict[str, dict[str, Any]] = {}
-    for scene in scenes:
-        case = Case(scene, terms, folder / scene, monitor)
+    for scene, case in cases.items():
         asked = {name: ITEMS[name] for name in items}
         found[scene] = {
             name: case.stored(name, partial(item.measure, case), item.fields) for name, item in asked.items()

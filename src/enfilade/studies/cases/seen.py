@@ -11,7 +11,7 @@ from enfilade.metric import Aqm, MetricOptions, Pursuit
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Mask
-from enfilade.settings import ViewingSettings
+from enfilade.settings import Settings
 from enfilade.viewing import Viewing
 
 __all__ = ["Viewer", "score_in", "visible_percent"]
@@ -26,17 +26,17 @@ class Viewer:
     Attributes
     ----------
     viewing : Viewing
-    settings : ViewingSettings
-        Exposure.
+    settings : Settings
+        Exposure, and the slope of masking.
     """
 
     viewing: Viewing
-    settings: ViewingSettings
+    settings: Settings
 
     def shown(self, color: F32) -> F32:
         """Luminance of the screen for linear colours, (H, W) cd/m2."""
         of = self.viewing
-        exposure = self.settings.exposure_ev
+        exposure = self.settings.viewing.exposure_ev
         luminance: F32 = display_luminance(
             color, exposure_ev=exposure, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
         )
@@ -44,7 +44,7 @@ class Viewer:
 
     def shown_variance(self, variance: F32) -> F32:
         """Variance on the screen for that of linear luminances, (H, W) (cd/m2)^2, clipping left out."""
-        slope = 2.0**self.settings.exposure_ev * (self.viewing.peak_cd_m2 - self.viewing.black_cd_m2)
+        slope = 2.0**self.settings.viewing.exposure_ev * (self.viewing.peak_cd_m2 - self.viewing.black_cd_m2)
         scaled: F32 = (variance * slope**2).astype(np.float32)
         return scaled
 
@@ -88,7 +88,7 @@ class Viewer:
 
     @cached_property
     def _paper(self) -> Aqm:
-        return Aqm(self.viewing)
+        return Aqm(self.viewing, mask_slope=self.settings.metric.mask_slope)
 
     @cached_property
     def _modern(self) -> Aqm:

@@ -20,7 +20,7 @@ from enfilade.studies.cases.windows import Windows
 
 __all__ = ["Supports", "measure"]
 
-LEAST_PIXELS = 500  # of a velocity's class in one frame
+LEAST_PIXELS = 500  # of a velocity's class, over all probes: fewer say nothing
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def measure(windows: Windows, probes: list[int], terms: Supports) -> dict[str, A
         ``paper_score``: that of the paper's adaptive filter. ``spatial_px``, ``temporal``.
     """
     windows.monitor.stage("filter supports", len(probes) * len(terms.spatial_px))
-    viewer = Viewer(windows.job.viewing, windows.job.settings.viewing)
+    viewer = Viewer(windows.job.viewing, windows.job.settings)
     sums = _Sums(terms)
     for frame in probes:
         view = windows.view(frame)
@@ -127,7 +127,7 @@ class _Sums:
         self._pixels += [int(where.sum()) for where in places]
 
     def rows(self, pixels_per_degree: float) -> list[dict[str, Any]]:
-        """The classes that have pixels."""
+        """The classes that have enough pixels."""
         edges = self._terms.edges_deg_s
         plain = AntialiasSettings()
         found = []

@@ -16,12 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.errors import SettingsError
 from enfilade.masks import slow_pixels
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
+from enfilade.pipeline.walkthrough import LEAST_SPP
 from enfilade.records import F32, Mask
 from enfilade.renderer import Renderer
 from enfilade.settings import MaskSettings
@@ -93,7 +95,7 @@ def calibrate(windows: Windows, probes: list[int], terms: Calibration) -> dict[s
         I_ibr by velocity. ``probes``: numbers of the frames. ``paper_deg_s``.
     """
     windows.monitor.stage("velocity threshold", len(probes) * len(terms.thresholds_deg_s))
-    viewer = Viewer(windows.job.viewing, windows.job.settings.viewing)
+    viewer = Viewer(windows.job.viewing, windows.job.settings)
     counts = {v: _Count() for v in terms.thresholds_deg_s}
     classes = _Classes()
     for frame in probes:
@@ -138,10 +140,18 @@ def calibrate_job(
     Raises
     ------
     SceneError
+    SettingsError
+        Too few paths to tell noise from differences.
     DeviceError
     RunFolderError
         The folder holds frames of something else.
     """
+    job.check_scene()
+    if not is_plain and job.settings.trace.spp < LEAST_SPP:
+        raise SettingsError(
+            f"--light traced needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "
+            "what is noise and what is a difference"
+        )
     renderer = open_renderer(job.scene, job.settings.trace)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)

@@ -157,8 +157,9 @@ class _Judge:
         self._job = case.whole
         self.crop = Crop.of(case.whole, case.terms.crop)
         height, width = self.crop.size
-        self._viewer = Viewer(self._job.viewing.cropped(width, height), self._job.settings.viewing)
+        self._viewer = Viewer(self._job.viewing.cropped(width, height), self._job.settings)
         self._views = case.views(self._job)
+        self._folder = case.frames_of(self._job)
 
     def art(self, frame: int, spp: int) -> dict[str, float]:
         """Judge a frame that was traced by itself with many paths."""
@@ -192,8 +193,8 @@ class _Judge:
 
     def _file(self, frame: int) -> Path:
         terms = self._case.terms
-        name = f"crop-{terms.size[0]}-{terms.crop[0]}x{terms.crop[1]}-{terms.reference_spp}"
-        return self._case.folder / "windows" / name / f"{self._job.path.numbers[frame]:04d}.exr"
+        name = f"crop-{terms.crop[0]}x{terms.crop[1]}-{terms.reference_spp}"
+        return self._folder / name / f"{self._job.path.numbers[frame]:04d}.exr"
 
     def _traced(self, frame: int, spp: int, salt: int) -> Shading:
         path, seed = self._job.path, self._job.settings.trace.seed

@@ -66,7 +66,7 @@ class Windows:
     ) -> tuple[list[Row], list[Example]]:
         """Measure frames one by one, with progress: a row and images of each."""
         self.monitor.stage(stage, len(probes))
-        viewer = Viewer(self.job.viewing, self.job.settings.viewing)
+        viewer = Viewer(self.job.viewing, self.job.settings)
         found = []
         for frame in probes:
             found.append(measured(self, viewer, frame))

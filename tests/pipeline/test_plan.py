@@ -1,0 +1,70 @@
+"""Forecasts: what a plan refuses, and how a rehearsal is multiplied."""
+
+import pytest
+
+from enfilade.errors import SettingsError
+from enfilade.monitor import Silence
+from enfilade.pipeline import rehearsal
+from enfilade.pipeline.light import paths_for
+from enfilade.pipeline.plan import plan
+from enfilade.pipeline.rehearsal import forecast_decoupled
+from enfilade.records import Segment
+from enfilade.store import Run
+from scenes_analytic import room_walk, slide, wall
+from small_runs import job_of
+
+PIXELS = 8 * 6
+JND, QUALITY = 8.0, 1.0  # of the pilot; asked for
+
+
+def test_too_few_paths_to_know_their_noise_are_refused(tmp_path):
+    job = job_of(tmp_path, wall(), slide(3), trace={"spp": 1})
+    with pytest.raises(SettingsError, match="--method paper needs --spp 2 or more"):
+        plan(job, Silence())
+
+
+def rehearse(job, folder, _monitor):
+    """Stands for a render of five frames of a shot that begins and ends with a keyframe."""
+    assert len(job.path) == 5
+    paths = paths_for(JND, QUALITY, 2)
+    drafts, light = {"drafts": 3 * PIXELS}, {"light": paths * PIXELS}
+    units = [
+        ("survey", 5.0, {}),
+        *((f"draft {n}", 2.0, {"frame": n, "rays": drafts}) for n in (1, 5)),
+        *((f"cells {n}", 3.0, {}) for n in (1, 5)),
+        ("pilot 5", 7.0, {"frame": 5, "jnd": JND, "paths": paths, "rays": {"drafts": 8 * PIXELS}}),
+        *((f"keyframe {n}", 11.0, {"frame": n, "rays": light}) for n in (1, 5)),
+        ("light 1-5", 13.0, {}),
+        *((f"raw {n}", 17.0, {}) for n in range(1, 6)),
+        *((f"frame {n}", 19.0, {"rays": {"camera": 4 * PIXELS}, "frame": n}) for n in range(1, 6)),
+        ("video", 5.0, {}),
+    ]
+    with Run.open(folder, job.identity()) as run:
+        for name, cpu_s, facts in units:
+            cost = {"work": {"cpu_s": cpu_s, "wall_s": cpu_s / 2}}
+            run.finish(name, files=[], facts={"cost": cost, **facts})
+
+
+def test_a_rehearsed_segment_is_multiplied_shot_by_shot(tmp_path, monkeypatch):
+    """Two shots, of 2 and of 8 keyframes: each has a pilot, and the longer one pools the light of more."""
+    monkeypatch.setattr(rehearsal, "render", rehearse)
+    light = {"quality": QUALITY, "denoiser": "none"}
+    job = job_of(tmp_path, wall(), room_walk(20, size=(8, 6)), method="decoupled", light=light)
+    shots = [[Segment(0, 4)], [Segment(first, first + 2) for first in range(5, 19, 2)]]
+    found = forecast_decoupled(job, shots, Silence())
+    assert (paths_for(JND, QUALITY, 2), paths_for(JND, QUALITY, 8)) == (128, 32)
+    mean = (2 * 128 + 8 * 32) / 10
+    assert found["paths"] == round(mean)
+    cpu_s = {
+        "survey and video": 4 * (5.0 + 5.0),
+        "keyframes": 10 * (2.0 + 3.0 + 11.0 * mean / 128),
+        "pilots": 2 * 7.0,
+        "segments": 8 * 13.0,
+        "frames": 20 * (17.0 + 19.0),
+    }
+    assert found["cpu_seconds"] == pytest.approx(sum(cpu_s.values()))
+    assert found["seconds"] == pytest.approx(sum(cpu_s.values()) / 2)
+    drafts = (10 * 3 + 2 * 8) / 20
+    assert found["rays"] == pytest.approx(
+        {"camera": 4.0, "lobes": 0.0, "light": 10 * mean / 20, "drafts": drafts}
+    )
