@@ -22,6 +22,7 @@ ASKED_OF_TRACED_ELSEWHERE = 15.0
 ASKED_OF_DENOISED = 3.0  # geometric mean over the judges, at equal quality; by no judge slower
 OTHERS_SPP = 450  # paths a pixel of all contestants that trace every frame, roughly
 CPU_S_PER_PATH = 4e-6  # on one of two busy hyperthreads
+SIGNS = {"equal": "", "at least": "at least ", "at most": "at most ", None: "by bounds both ways "}
 KEPT = (
     "date",
     "machine",
@@ -31,6 +32,7 @@ KEPT = (
     "fps",
     "frames",
     "pixels_per_degree",
+    "exposure_ev",
     "reference",
     "judges",
 )
@@ -101,8 +103,9 @@ def judge(scene: str, found: dict) -> list[str]:
         missed.append("no denoised rival took part: pip install 'enfilade[denoise]'")
     else:
         mean = denoised["geometric_mean"]
-        if mean < ASKED_OF_DENOISED:
-            missed.append(f"{ASKED_OF_DENOISED:g} times less CPU time than denoised; found {mean:.2f}")
+        if mean < ASKED_OF_DENOISED or denoised["kind"] not in ("equal", "at least"):
+            sign = SIGNS[denoised["kind"]]
+            missed.append(f"{ASKED_OF_DENOISED:g} times less CPU time than denoised; found {sign}{mean:.2f}")
         missed += [
             f"no slower than denoised by any judge; by {name} {_text(ratio)}"
             for name, ratio in denoised["by_judge"].items()
@@ -123,8 +126,7 @@ def keep(found: dict, file: Path) -> None:
 def _text(ratio: dict | None) -> str:
     if ratio is None:
         return "none"
-    sign = {"equal": "", "at least": "at least ", "at most": "at most "}[ratio["kind"]]
-    return f"{sign}{ratio['times']:.2f} (least {ratio['least']:.2f})"
+    return f"{SIGNS[ratio['kind']]}{ratio['times']:.2f} (least {ratio['least']:.2f})"
 
 
 if __name__ == "__main__":

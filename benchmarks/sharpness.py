@@ -28,15 +28,21 @@ def main() -> None:
     contestants = {c["name"]: c for c in found["contestants"]}
     traced = max((c for c in contestants.values() if c["family"] == "traced"), key=lambda c: c["spp"])
     bench, every = arguments.bench, arguments.every
-    reference = spectra(bench / "references" / f"reference-{traced['pixel_filter']}", every)
-    whole = shared(spectra(folder_of(bench, traced), every), reference)
+    exposure_ev = exposure_of(found)
+    reference = spectra(bench / "references" / f"reference-{traced['pixel_filter']}", every, exposure_ev)
+    whole = shared(spectra(folder_of(bench, traced), every, exposure_ev), reference)
     edges = "".join(f"{low:>8.3f}-{high:.3f}" for low, high in itertools.pairwise(BANDS))
     print(f"{'cycles per pixel':<18}{edges}")
     for name, contestant in contestants.items():
         if contestant["pixel_filter"] != traced["pixel_filter"]:
             continue
-        share = shared(spectra(folder_of(bench, contestant), every), reference) / whole
+        share = shared(spectra(folder_of(bench, contestant), every, exposure_ev), reference) / whole
         print(f"{name:<18}" + "".join(f"{value:>14.3f}" for value in share))
+
+
+def exposure_of(found: dict) -> float:
+    """Stops with which a bench is judged; 0 where an older one does not say."""
+    return found.get("exposure_ev", 0.0)
 
 
 def folder_of(bench: Path, contestant: dict) -> Path:
@@ -49,15 +55,27 @@ def frames_of(folder: Path) -> list[Path]:
     return sorted((folder / "frames" if (folder / "frames").is_dir() else folder).glob("*.exr"))
 
 
-def spectra(folder: Path, every: int) -> list[np.ndarray]:
-    """Fourier transforms of the encoded luminance of some frames, windowed."""
+def radiance(file: Path) -> np.ndarray:
+    """Linear colours of a frame, (H, W, 3)."""
     from enfilade.codec import read_exr
-    from enfilade.pixels.tone import luminance, srgb_encode
+
+    return read_exr(file)["RGB"].astype(np.float32)
+
+
+def encoded(color: np.ndarray, exposure_ev: float) -> np.ndarray:
+    """Colours as a display is sent them."""
+    from enfilade.pixels.tone import srgb_encode
+
+    return srgb_encode(np.clip(color * np.float32(2.0**exposure_ev), 0.0, 1.0))
+
+
+def spectra(folder: Path, every: int, exposure_ev: float) -> list[np.ndarray]:
+    """Fourier transforms of the encoded luminance of some frames, windowed."""
+    from enfilade.pixels.tone import luminance
 
     found = []
     for file in frames_of(folder)[::every]:
-        color = np.clip(read_exr(file)["RGB"].astype(np.float32), 0.0, 1.0)
-        image = luminance(srgb_encode(color))
+        image = luminance(encoded(radiance(file), exposure_ev))
         window = np.outer(np.hanning(image.shape[0]), np.hanning(image.shape[1]))
         found.append(np.fft.fft2((image - image.mean()) * window))
     return found

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sharpness import folder_of, frames_of
+from sharpness import encoded, exposure_of, folder_of, frames_of, radiance
 
 
 def main() -> None:
@@ -29,36 +29,24 @@ def main() -> None:
         reference = arguments.bench / "references" / f"reference-{contestant['pixel_filter']}"
         files = frames_of(reference)
         folder = frames_of(folder_of(arguments.bench, contestant))
-        error, change, mean = broad_errors(folder, files, arguments.block)
+        error, change, mean = broad_errors(folder, files, arguments.block, exposure_of(found))
         worst = int(change.argmax())
         numbers = f"{error:>10.4f}{np.median(change):>10.4f}{change[worst]:>10.4f}"
         print(f"{contestant['name']:<18}{numbers}{files[worst + 1].stem:>10}{mean:>10.4f}")
 
 
-def broad_errors(files: list[Path], references: list[Path], block: int) -> tuple[float, np.ndarray, float]:
+def broad_errors(
+    files: list[Path], references: list[Path], block: int, exposure_ev: float
+) -> tuple[float, np.ndarray, float]:
     """RMS over all frames, RMS of the change from each frame to the next, and the mean by the reference's."""
     errors, sums = [], np.zeros(2)
     for file, reference in zip(files, references, strict=True):
         one, other = radiance(file), radiance(reference)
-        errors.append(averaged(encoded(one) - encoded(other), block))
+        errors.append(averaged(encoded(one, exposure_ev) - encoded(other, exposure_ev), block))
         sums += one.mean(), other.mean()
     difference = np.array(errors)
     change = np.sqrt((np.diff(difference, axis=0) ** 2).mean(axis=(1, 2, 3)))
     return float(np.sqrt((difference**2).mean())), change, float(sums[0] / sums[1])
-
-
-def radiance(file: Path) -> np.ndarray:
-    """Linear colours of a frame, (H, W, 3)."""
-    from enfilade.codec import read_exr
-
-    return read_exr(file)["RGB"].astype(np.float32)
-
-
-def encoded(color: np.ndarray) -> np.ndarray:
-    """Colours as a display is sent them."""
-    from enfilade.pixels.tone import srgb_encode
-
-    return srgb_encode(np.clip(color, 0.0, 1.0))
 
 
 def averaged(image: np.ndarray, block: int) -> np.ndarray:

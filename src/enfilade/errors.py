@@ -58,6 +58,10 @@ class DamagedFileError(RunFolderError):
         super().__init__(message)
         self.file = file
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle with all that the constructor takes: errors pass from one process to another."""
+        return type(self), (str(self), self.file), self.__dict__
+
 
 class DeviceError(EnfiladeError):
     """No usable LLVM or CUDA on this machine."""

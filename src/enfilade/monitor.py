@@ -9,7 +9,7 @@ class Monitor(Protocol):
     """Someone who watches a run."""
 
     def stage(self, name: str, total: int) -> None:
-        """Say that a stage begins, and how many frames (or other units) it has."""
+        """Say that a stage begins, and how many frames (or other units) are to be done in it."""
         ...
 
     def advance(self, count: int = 1) -> None:

@@ -25,9 +25,10 @@ def option(
     least: float | None = None,
     most: float | None = None,
     choices: tuple[str, ...] = (),
+    is_odd: bool = False,
 ) -> Any:
     """Declare a setting: default, one sentence of help, range (ends included) or words to choose from."""
-    metadata = {"help": text, "least": least, "most": most, "choices": choices}
+    metadata = {"help": text, "least": least, "most": most, "choices": choices, "is_odd": is_odd}
     return field(default=default, metadata=metadata)
 
 
@@ -128,16 +129,10 @@ class WarpSettings(Section):
     """3D warp and compositing (§2.2)."""
 
     max_magnification: float = option(
-        4.0,
-        "Splats stretch to at most this many pixels a side; beyond is a hole.",
-        least=1.0,
-        most=16.0,
+        4.0, "Splats stretch to at most this many pixels a side; beyond is a hole.", least=1.0, most=16.0
     )
     depth_tolerance: float = option(
-        0.02,
-        "Relative difference of depth within which two samples are one surface.",
-        least=1e-5,
-        most=0.5,
+        0.02, "Relative difference of depth within which two samples are one surface.", least=1e-5, most=0.5
     )
 
 
@@ -175,10 +170,14 @@ class MaskSettings(Section):
 class AntialiasSettings(Section):
     """Motion-compensated spatiotemporal filter (§5.2, §5.3, §5.4)."""
 
-    frames: int = option(11, "Temporal support, frames.", least=1, most=63)
-    slow_frames: int = option(15, "Largest temporal support of slow pixels, frames.", least=1, most=63)
+    frames: int = option(11, "Temporal support, frames (odd).", least=1, most=63, is_odd=True)
+    slow_frames: int = option(
+        15, "Largest temporal support of slow pixels, frames (odd).", least=1, most=63, is_odd=True
+    )
     slow_deg_s: float = option(0.15, "Below this the temporal support grows, deg/s.", least=0.0)
-    specular_frames: int = option(3, "Temporal support on specular surfaces, frames.", least=1, most=63)
+    specular_frames: int = option(
+        3, "Temporal support on specular surfaces, frames (odd).", least=1, most=63, is_odd=True
+    )
     support_still_px: float = option(3.0, "Spatial support at rest, pixels.", least=1.0, most=31.0)
     support_fast_px: float = option(
         9.0, "Spatial support at the fast velocity, pixels of 1/28 degree.", least=1.0, most=31.0
@@ -392,3 +391,5 @@ def _check(f: dataclasses.Field[Any], value: Any, where: str) -> None:
     if (least is not None and not value >= least) or (most is not None and not value <= most):
         span = f"at least {least:.10g}" if most is None else f"between {least:.10g} and {most:.10g}"
         raise SettingsError(f"{where} = {value!r} is out of range: it must be {span}")
+    if f.metadata["is_odd"] and value % 2 == 0:
+        raise SettingsError(f"{where} = {value!r}: give an odd number: a frame and as many on either side")

@@ -160,6 +160,13 @@ def test_what_is_not_judged_does_not_count(metric, textured):
     assert nothing.score == nothing.percent_visible == 0.0
 
 
+def test_a_comparison_keeps_its_mask_when_the_caller_changes_his(metric, textured):
+    valid = np.ones(textured.shape, bool)
+    compared = metric.compare(textured, textured, valid=valid)
+    valid[:] = False
+    assert compared.valid.all()
+
+
 def test_borders_do_not_ring(metric):
     ramp = np.broadcast_to(np.linspace(5, 90, 160, dtype=np.float32), (128, 160)).copy()
     test = ramp.copy()

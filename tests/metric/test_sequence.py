@@ -136,6 +136,13 @@ def test_change_follows_the_surface():
     assert changes.next(error, black, flow, None).min() == -1.0
 
 
+def test_the_callers_mask_may_change_after_a_frame():
+    ones, changes, valid = np.ones((6, 8), np.float32), ErrorChange(), np.ones((6, 8), bool)
+    changes.next(ones, np.zeros_like(ones), None, valid)
+    valid[:] = False
+    assert (changes.next(np.zeros_like(ones), np.zeros_like(ones), None, None) == -1.0).all()
+
+
 def test_flicker_is_seen_best_at_low_spatial_frequency():
     light = np.array([10.0, 100.0])
     coarse, fine = (flicker_sensitivity(cpd, 30.0, light, 0.785) for cpd in (1.0, 16.0))

@@ -47,6 +47,22 @@ def test_frame_rate_of_the_caller_samples_the_same_motion():
     assert fine.fps == 20.0
 
 
+@pytest.mark.parametrize(("rate", "count"), [(20.0, 40), (5.0, 10), (10.0, 20), (12.5, 25)])
+def test_frames_of_the_file_last_as_long_at_another_rate(rate, count):
+    keys = [key(0), key(2, (4, 2, 5))]
+    coarse, other = read(keys, frames=20), read(keys, frames=20, at=rate)
+    assert len(other.poses) == count
+    at = np.arange(count) / rate
+    np.testing.assert_allclose(eyes(other)[:, 0], 2.0 * at, atol=1e-12)
+    np.testing.assert_allclose(other.poses[0], coarse.poses[0], atol=1e-12)
+    with pytest.raises(CameraPathError, match="20000000 frames are too many"):
+        read(keys, frames=20, at=1e7)
+
+
+def test_without_a_rate_in_the_file_its_frames_are_those_of_the_caller():
+    assert len(read([key(0), key(1)], fps=None, frames=7, at=24.0).poses) == 7
+
+
 def test_a_hold_is_a_real_stop():
     shots = read([key(0), key(1, (2, 1, 5), hold=1.0), key(3, (6, 1, 5))])
     x = eyes(shots)[:, 0]

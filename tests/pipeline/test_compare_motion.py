@@ -105,6 +105,39 @@ def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
         judged(broken, broken)
 
 
+def moving_right(step_px):
+    """Layers that tell the flow to the next frame alone."""
+    return {"motion": np.broadcast_to(np.float32((step_px, 0.0)), (*SIZE, 2)).copy()}
+
+
+def test_a_cut_between_shots_that_move_is_found_without_flow_to_the_last_frame(sequence):
+    shots = [textured(-2.0 * f, level) for level in (0.1, 0.6) for f in range(3)]
+    faulty = [image.copy() for image in shots]
+    for f, image in enumerate(faulty):
+        image[10:30, 10 + 2 * (f % 3) : 30 + 2 * (f % 3)] *= 0.8  # on its surface
+    test, reference = (
+        sequence(name, images, layers=moving_right(2.0)) for name, images in (("t", faulty), ("r", shots))
+    )
+    found = judged(test, reference)
+    assert found.flow == "layers"
+    assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 6, abs=1e-3)
+    assert min(f.steady.score for f in found.frames) > 0.1
+
+
+def test_motion_that_changes_the_whole_image_is_no_cut(sequence):
+    panels = np.where(np.arange(SIZE[1] + 64) // 16 % 2, np.float32(0.6), np.float32(0.05))
+    shots = [
+        np.broadcast_to(panels[64 - 16 * f :][: SIZE[1], None], (*SIZE, 3)).astype(np.float32)
+        for f in range(3)
+    ]
+    faulty = [image * np.float32(0.8 if f == 1 else 1.0) for f, image in enumerate(shots)]
+    test, reference = (
+        sequence(name, images, layers=moving_right(16.0)) for name, images in (("t", faulty), ("r", shots))
+    )
+    found = judged(test, reference)
+    assert [f.transient.score > 1.0 for f in found.frames] == [False, True, True]
+
+
 def test_what_flickers_at_a_cut_is_not_counted(sequence):
     """Across a cut the error changes altogether, and nobody sees that as flicker."""
     still = np.zeros((*SIZE, 2), np.float32)

@@ -13,8 +13,8 @@ def raw(number, wall_s, *, is_keyframe=False):
     return line(f"raw {number}", wall_s, frame=number, sources={"keyframe": 100 * is_keyframe, "reused": 0})
 
 
-def of(method, lines, count=10):
-    return forecast({"method": method, "path": {"frames": list(range(1, count + 1))}}, lines)
+def of(method, lines, count=10, **who):
+    return forecast({"method": method, "path": {"frames": list(range(1, count + 1))}}, lines, **who)
 
 
 def test_a_reference_at_its_pace():
@@ -29,6 +29,23 @@ def test_a_reference_at_its_pace():
 def test_in_betweens_and_antialiasing_add_up_and_keyframes_do_not_count():
     lines = [raw(1, 0.0, is_keyframe=True), raw(2, 3.0), raw(3, 3.0), line("frame 1", 0.5)]
     assert of("paper", lines).left_s == pytest.approx(7 * 3.0 + 9 * 0.5)
+
+
+def test_frames_that_repeat_another_do_not_count():
+    copies = [line(f"raw {i}", 0.01, sources={"keyframe": 0, "hole": 0, "reused": 100}) for i in (3, 4, 5)]
+    assert of("paper", [raw(2, 3.0), *copies]).left_s == pytest.approx(6 * 3.0)
+    reused = line("raw 2", 3.0, sources={"keyframe": 0, "hole": 2, "reused": 98})
+    assert of("paper", [reused, *copies]).left_s == pytest.approx(6 * 3.0)
+
+
+@pytest.mark.parametrize(
+    ("workers", "rounds", "words"),
+    [(0, 6, "2 frames, one after the other"), (1, 6, "2 frames"), (4, 2, "2 frames, 4 at a time")],
+)
+def test_units_are_done_side_by_side(workers, rounds, words):
+    found = of("reference", [line(f"frame {i}", 5.0) for i in (1, 2)], count=8, workers=workers)
+    assert found.left_s == pytest.approx(rounds * 5.0)
+    assert found.text == f"at the pace of the last {words}"
 
 
 def test_shading_counts_and_so_does_the_average_over_time():

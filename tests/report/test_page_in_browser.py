@@ -11,6 +11,10 @@ import pytest
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
+from enfilade.report import live
+from enfilade.report.live import Live
+from enfilade.report.page import Wishes
+
 FRAMES = 10
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 PLACE = """(plot, frame) => {
@@ -239,3 +243,32 @@ def test_everything_has_a_name(open_page):
     assert nameless == []
     page.keyboard.press("Tab")
     assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+
+
+def test_a_page_that_is_made_anew_shows_the_same(browser, copied, monkeypatch):
+    monkeypatch.setattr(live, "LEAST_S", 0.0)
+    monkeypatch.setattr(live, "REST", 0.0)
+    context = browser.new_context(viewport=DESKTOP)
+    with Live(copied, Wishes(has_metric=False)) as served:
+        page = context.new_page()
+        page.goto(served.address)
+        first = page.wait_for_selector("iframe").content_frame()
+        first.wait_for_selector("html[data-ready=yes]")
+        first.locator("#scrubber").fill("6")
+        first.get_by_role("button", name="Velocity").click()
+        shown(first, 7, "velocity")
+        first.get_by_text("All frames", exact=True).click()
+        first.evaluate("scrollTo(0, 300)")
+        with (copied / "ledger.jsonl").open("a") as ledger:
+            ledger.write('{"unit": "frame 11", "fil')  # being written just now
+        anew = page.wait_for_selector('iframe[src="page?2"]').content_frame()
+        anew.wait_for_url("**/page?2")
+        anew.wait_for_selector("html[data-ready=yes]")
+        shown(anew, 7, "velocity")
+        assert anew.evaluate("scrollY") == 300
+        assert anew.evaluate("[...document.querySelectorAll('details')].map((one) => one.open)") == [
+            False,
+            False,
+            True,
+        ]
+    context.close()

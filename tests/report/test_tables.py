@@ -2,7 +2,8 @@
 
 import pytest
 
-from enfilade.report.tables import as_text, percent, plan_tables, run_tables, seconds
+from enfilade.report.bench_tables import bench_tables
+from enfilade.report.tables import as_text, comparison_table, percent, plan_tables, run_tables, seconds
 from made_up_runs import made_up_plan, made_up_summary
 
 
@@ -54,6 +55,20 @@ def test_a_rehearsed_plan():
     assert ["rays", "per", "pixel", "and", "frame", "18.5"] in table
     assert ["time", "2.00", "h"] in table
     assert table[-1] == ["Rehearsed", "with", "9", "frames", "at", "365x274."]
+
+
+def test_names_are_text_and_not_markup():
+    row = {"name": "shots/shot[final].0001.exr", "score_jnd": 1.0, "steady_jnd": 1.0, "transient_jnd": 0.0}
+    row |= {"psnr_db": None, "percent_visible": 2.0, "velocity_deg_s": 0.5}
+    found = {**row, "per_frame": [row], "percent_visible": {"mean": 2.0}, "size": [64, 48], "fps": 24.0}
+    text = as_text(comparison_table({**found, "pixels_per_degree": 28.0, "mode": "modern"}))
+    assert "shot[final].0001.exr" in text
+    bench = {"scene": "shot[final]/scene.xml", "frames": [1], "size": [64, 48], "judges": {}}
+    bench |= {"contestants": []}
+    reference = {"floor": None, "filters": ["box"], "spp": 4}
+    verdict = {"traced": {}, "denoised": {}, "paper": {}}
+    (table,) = bench_tables({**bench, "reference": reference, "verdict": verdict})
+    assert "shot[final]/scene.xml, 1 frames" in as_text(table)
 
 
 def test_many_keyframes_are_cut_short():

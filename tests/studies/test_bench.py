@@ -73,6 +73,7 @@ def test_everybody_is_rendered_charged_and_judged(held):
         assert row["per_frame"]["temporal"][0] is None
         assert len(list((folder / "contestants" / row["name"] / "frames").glob("*.exr"))) == 5
     assert json.loads((folder / "bench.json").read_text()) == json.loads(json.dumps(found))
+    assert found["exposure_ev"] == 0.0
 
 
 def test_more_paths_are_judged_better_and_the_box_has_its_own_reference(held):
@@ -173,6 +174,19 @@ def test_who_can_not_take_part_is_named(held, tmp_path, monkeypatch):
     assert "flip" not in found["judges"]
     with pytest.raises(SettingsError, match="no FLIP here"):
         bench(job, everybody, Terms(64, judges=("flip",)), tmp_path / "other", told)
+
+
+def test_of_one_frame_no_flicker_is_counted(tmp_path):
+    job = job_of(tmp_path, room(), room_walk(1, size=(32, 24)), method="reference")
+    traced = lineup(job, traced=(1,), denoised=(), presets=())[:1]
+    told, terms = Told(), Terms(4, judges=("psnr", "temporal"))
+    found = bench(job, traced, terms, tmp_path / "bench", told)
+    assert list(found["judges"]) == list(found["contestants"][0]["scores"]) == ["psnr"]
+    assert list(found["reference"]["floor"]) == ["psnr"]
+    assert "'temporal' is left out" in found["left_out"][0]
+    assert found["left_out"] == told.said
+    with pytest.raises(SettingsError, match="give it consecutive frames, or let others judge"):
+        bench(job, traced, Terms(4, judges=("temporal",)), tmp_path / "bench", told)
 
 
 def test_a_contestant_that_fails_says_why(held, tmp_path):

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from enfilade.studies.bench.equal import Point, cost_at, front, ratio_at, ratio_over
+from enfilade.studies.bench.judging import without_silent
 from enfilade.studies.bench.verdict import verdict
 
 # Monte Carlo: four times the paths, half the error.
@@ -93,6 +94,42 @@ def test_the_verdict_of_made_up_contestants():
     assert denoised["by_judge"]["psnr"]["times"] == pytest.approx(4.0)
     both = denoised["by_judge"]["aqm"]["times"] * denoised["by_judge"]["psnr"]["times"]
     assert denoised["geometric_mean"] == pytest.approx(math.sqrt(both))
+
+
+@pytest.mark.parametrize(
+    ("psnr_db", "kind"),
+    [
+        ((40.0, 40.0), "equal"),
+        ((40.0, 50.0), "at least"),
+        ((40.0, 30.0), "at most"),
+    ],
+)
+@pytest.mark.parametrize("jnd", [1.0, 0.5, 2.0])
+def test_a_mean_is_a_bound_where_a_ratio_is_one(psnr_db, kind, jnd):
+    """One judge is equal, or a bound in either way; the other one too."""
+    theirs, ours = psnr_db
+    rows = [
+        _row("denoised-4", "denoised", 20.0, 1.0, theirs),
+        _row("decoupled-a", "decoupled", 5.0, jnd, ours),
+    ]
+    found = verdict(rows, ["aqm", "psnr"])["denoised"]
+    other = {1.0: "equal", 0.5: "at least", 2.0: "at most"}[jnd]
+    assert [found["by_judge"][judge]["kind"] for judge in ("aqm", "psnr")] == [other, kind]
+    bounds = {kind, other} - {"equal"}
+    assert found["kind"] == (None if len(bounds) > 1 else bounds.pop() if bounds else "equal")
+
+
+def test_a_judge_of_changes_that_saw_none_is_left_out():
+    values = {"aqm": [1.0, 1.0], "psnr": [None, None], "temporal": [None, None], "cvvdp": [None, None]}
+    row = {"name": "a", "scores": dict.fromkeys(values, 0.0), "per_frame": values}
+    rows, names, reasons = without_silent([row, row], list(values))
+    # PSNR of identical frames and a judge of whole sequences have no numbers of frames either
+    assert names == ["aqm", "psnr", "cvvdp"]
+    assert [list(r[key]) for r in rows for key in ("scores", "per_frame")] == [names] * 4
+    assert [reason.partition(":")[0] for reason in reasons] == ["the judge 'temporal' is left out"]
+    heard = {**row, "per_frame": {**values, "temporal": [None, 0.1]}}
+    assert without_silent([heard], list(values)) == ([heard], list(values), [])
+    assert without_silent([], list(values)) == ([], list(values), [])
 
 
 def test_without_our_own_there_is_no_verdict():

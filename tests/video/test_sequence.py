@@ -58,6 +58,12 @@ def test_a_folder_is_read_in_natural_order(tmp_path):
     assert set(sequence.layers(0)) == {"RGB", "Z"}
 
 
+def test_only_numbers_of_digits_are_taken_by_value(tmp_path):
+    for name, value in (("2", 1), ("\u0663", 2), ("10", 3), ("\u00b2", 4)):  # an Arabic three, a superscript
+        exr(tmp_path / f"{name}.exr", value)
+    assert means(open_sequence(tmp_path)) == [1, 2, 3, 4]
+
+
 @pytest.mark.parametrize(
     "pattern", ["shot-%04d.exr", "shot-%d.exr", "shot-####.exr", "shot-*.exr", "shot-[0-9]*.exr"]
 )

@@ -19,7 +19,6 @@ from scenes_analytic import ball, room, room_walk, wall
 from twins.painter import occlusion_compatible_order, painted
 
 SETTINGS = WarpSettings()
-REACH = 0.75 * SETTINGS.max_magnification
 
 
 def camera_at(eye, target=(0, 0, 0), size=(96, 72), fov_deg=50.0):
@@ -114,11 +113,13 @@ def test_a_magnified_plane_has_its_exact_colours():
         np.testing.assert_allclose(got.magnification, (4 / distance) ** 2, rtol=1e-3)
 
 
-def test_beyond_the_largest_magnification_there_are_holes():
+@pytest.mark.parametrize("roll_deg", [0, 30, 45])
+def test_beyond_the_largest_magnification_there_are_holes_however_the_camera_rolls(roll_deg):
     keyframe = keyframe_of(wall(), camera_at((0, 0, 4)))
     settings = WarpSettings(max_magnification=2.0)
-    assert not warp_keyframe(keyframe, camera_at((0, 0, 2.05)), settings).is_hole.any()
-    assert warp_keyframe(keyframe, camera_at((0, 0, 1.3)), settings).is_hole.all()
+    for magnification, is_hole in ((1.98, False), (2.02, True)):
+        target = beside(camera_at((0, 0, 4 / magnification)), (0, 0, 0), (0, 0, roll_deg))
+        assert (warp_keyframe(keyframe, target, settings).is_hole == is_hole).all()
 
 
 def sphere_before_plane(sphere=(0.9, 0.1, 0.1), plane=(0.1, 0.1, 0.9)):
@@ -176,6 +177,7 @@ def test_the_z_buffer_shows_what_the_painter_shows(name, motion):
     target = beside(camera, *ORDERS[motion])
     keyframe = keyframe_of(scene, camera)
     splats = _land(keyframe.geometry, target).splats
+    longest = np.maximum(*(np.linalg.norm(side, axis=0) for side in (splats.by_x, splats.by_y)))
     table = list(
         zip(
             np.array(splats.x),
@@ -184,12 +186,12 @@ def test_the_z_buffer_shows_what_the_painter_shows(name, motion):
             np.array(splats.by_x).T,
             np.array(splats.by_y).T,
             np.array(splats.slope).T,
-            np.array(splats.is_splat),
+            np.array(splats.is_splat) & (longest <= SETTINGS.max_magnification),
             strict=True,
         )
     )
     order = occlusion_compatible_order(camera, target)
-    lanes = painted(table, order, target.width, target.height, REACH)
+    lanes = painted(table, order, target.width, target.height, math.inf)
     items = np.where(lanes >= 0, keyframe.geometry.item.ravel()[lanes], 0)
     got = warp_keyframe(keyframe, target, SETTINGS)
     np.testing.assert_array_equal(got.is_hole, lanes < 0)

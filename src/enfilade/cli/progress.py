@@ -22,6 +22,7 @@ from rich.progress import (
 from enfilade.monitor import Monitor, Silence
 
 LINE_EVERY_S = 5.0  # a plain line of progress at most this often
+PACE_S = 3600.0  # over which a bar takes its pace: a unit may take many minutes
 
 
 class BarMonitor:
@@ -71,6 +72,8 @@ class _Count:
     shown_s: float
     done: int = 0
     shown: int = 0
+    first_s: float = 0.0  # when its first units were done
+    first: int = 0  # how many they were
 
 
 class LineMonitor:
@@ -115,6 +118,8 @@ class LineMonitor:
         stage = self._stages.get(self._now)
         if stage is None:
             return
+        if stage.done == 0:
+            stage.first_s, stage.first = self._clock(), count
         stage.done += count
         if self._clock() - stage.shown_s >= self._every_s:
             self._show(self._now, stage)
@@ -181,7 +186,10 @@ def _times(stage: _Count, now: float) -> str:
     elapsed = now - stage.started_s
     if stage.done >= stage.total:
         return f"took {clock_time(elapsed)}"
-    left = elapsed / max(stage.done, 1) * (stage.total - stage.done)
+    # Where a stage is told of when its first unit is done, that one took none of its time.
+    later = stage.done - stage.first
+    pace = (now - stage.first_s) / later if later else elapsed / max(stage.done, 1)
+    left = pace * (stage.total - stage.done)
     return f"{clock_time(elapsed)} passed, about {clock_time(left)} left"
 
 
@@ -206,6 +214,19 @@ def watch(*, quiet: bool) -> Iterator[Monitor]:
         finally:
             lines.close()
         return
+    with bars(console) as progress:
+        yield BarMonitor(progress)
+
+
+def bars(console: Console, clock: Callable[[], float] = time.monotonic) -> Progress:
+    """Rich's display of bars with their times, not yet started.
+
+    Parameters
+    ----------
+    console
+    clock
+        Seconds, rising.
+    """
     columns = (
         TextColumn("{task.description:<12}"),
         BarColumn(),
@@ -214,5 +235,4 @@ def watch(*, quiet: bool) -> Iterator[Monitor]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console) as progress:
-        yield BarMonitor(progress)
+    return Progress(*columns, console=console, speed_estimate_period=PACE_S, get_time=clock)

@@ -82,7 +82,7 @@ def command(
     page = run / PAGE if file is None else file
     wishes = Wishes(reference, numbers, max_mb, has_metric)
     if is_served:
-        _serve(run, wishes, port)
+        _serve(run, wishes, port, quiet=quiet)
         return
     with watch(quiet=quiet) as monitor:
         notes = write_page(run, page, wishes, monitor)
@@ -91,10 +91,13 @@ def command(
     click.echo(f"report  {page}")
 
 
-def _serve(run: Path, wishes: Any, port: int) -> None:
+def _serve(run: Path, wishes: Any, port: int, *, quiet: bool) -> None:
+    from enfilade.cli.progress import watch
     from enfilade.report.live import Live
 
-    with Live(run, wishes, port) as live:
+    with watch(quiet=quiet) as monitor:
+        live = Live(run, wishes, port, monitor=monitor)
+    with live:
         click.echo(f"report  {live.address}")
         with contextlib.suppress(KeyboardInterrupt):
             live.wait()

@@ -26,6 +26,9 @@ class Scale:
     error_of : callable
         From a score to an error, 0 or more, 0 for identical sequences: what is compared and
         interpolated on a logarithmic axis, whichever way the score goes.
+    is_of_changes : bool
+        Whether only a frame with one before it in its shot has a number: without any such frame the
+        score was measured by nobody.
     """
 
     name: str
@@ -33,6 +36,7 @@ class Scale:
     unit: str
     is_more_better: bool = False
     error_of: Callable[[float], float] = float
+    is_of_changes: bool = False
 
 
 class Judge(Protocol):

@@ -33,7 +33,7 @@ class Temporal:
     flatter those whose errors are noise.
     """
 
-    SCALE = Scale("temporal", "temporal", "RMS")
+    SCALE = Scale("temporal", "temporal", "RMS", is_of_changes=True)
 
     def __init__(self) -> None:
         self._before: F32 | None = None

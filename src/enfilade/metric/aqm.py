@@ -182,7 +182,7 @@ class Aqm:
             check_map("noise_variance", noise_variance, self._shape, valid, is_signed=False)
         if change is not None:
             check_map("change", change, self._shape, None, is_signed=True)
-        is_judged = np.ones(self._shape, dtype=np.bool_) if valid is None else valid
+        is_judged = np.ones(self._shape, dtype=np.bool_) if valid is None else valid.copy()
         test, reference = fill_undefined(test, reference, valid)
         pair = self._retina.pair(test, reference, is_judged, noise_variance, change)
         movements = (pursuit or self.pursuit).hypotheses

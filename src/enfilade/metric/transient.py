@@ -96,7 +96,7 @@ class ErrorChange:
             Error of this frame less that of the last at the same surface, cd/m2; 0 where either is
             not valid or the surface was outside. None where there is no last frame.
         """
-        is_judged = np.ones(test.shape, dtype=np.bool_) if valid is None else valid
+        is_judged = np.ones(test.shape, dtype=np.bool_) if valid is None else valid.copy()
         error = np.zeros_like(test)
         np.subtract(test, reference, out=error, where=is_judged)
         last, self._last = self._last, (error, is_judged)

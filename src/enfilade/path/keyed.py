@@ -60,7 +60,8 @@ def read_keyed(table: Table, *, fps: float | None = None) -> Shots:
     table
         The whole file.
     fps
-        Replaces the file's frame rate: the same motion, sampled more or less often.
+        Replaces the file's frame rate: the same motion, sampled more or less often, for as long as the
+        frames last that the file asks for.
 
     Raises
     ------
@@ -68,9 +69,10 @@ def read_keyed(table: Table, *, fps: float | None = None) -> Shots:
         Something is missing, malformed, unknown or contradictory.
     """
     table.allow_only(*_FILE_KEYS)
-    rate = fps or table.positive("fps")
+    own = table.positive("fps") if "fps" in table or fps is None else fps
+    rate = own if fps is None else fps
     keys = _read_keys(table)
-    count = _frame_count(table, keys, rate)
+    count = _frame_count(table, keys, own, rate)
     times = keys[0].time_s + np.arange(count) / rate
     poses = np.tile(np.eye(4), (count, 1, 1))
     fov_deg = np.empty(count)
@@ -157,13 +159,14 @@ def _rotation(row: Table) -> Matrix:
     return matrix
 
 
-def _frame_count(table: Table, keys: list[Key], fps: float) -> int:
+def _frame_count(table: Table, keys: list[Key], own_fps: float, fps: float) -> int:
+    """Frames at a rate; how long so many frames last that a file asks for, its own rate says."""
     if "seconds" in table and "frames" in table:
         raise table.fail("give seconds or frames, not both")
-    if "frames" in table:
-        return table.integer("frames", least=1, most=MOST_FRAMES)
     span = keys[-1].time_s - keys[0].time_s
-    if "seconds" in table:
+    if "frames" in table:
+        exact = table.integer("frames", least=1, most=MOST_FRAMES) * (fps / own_fps)
+    elif "seconds" in table:
         exact = table.positive("seconds") * fps
     elif span == 0.0:
         raise table.fail("one key is a camera at rest; say how long by seconds, frames or the key's hold")

@@ -30,6 +30,7 @@ from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
+from enfilade.store.lock import sign_workers
 
 ASIDE = "failed"  # folder for the logs of units that were set aside
 LOGS = "logs"  # folder for what worker processes print
@@ -91,13 +92,16 @@ def carry_out(
     EnfiladeError
         What the stages raise.
     """
+    progress = _Progress(monitor)
     for _ in range(REPAIRS):
-        shift = _Shift(job, run, monitor, is_wanted or _everything)
+        shift = _Shift(job, run, progress, is_wanted or _everything)
         if not shift.left:
             return []
+        progress.tell_before()
         # Workers of their own for each shift: those of the last have what was damaged in memory, and would
         # not write it again.
         with closing(_open(job, run, crew, monitor)) as executor:
+            sign_workers(run.folder, executor.slots)
             damaged = shift.work(executor)
         if damaged is None:
             return shift.left
@@ -130,13 +134,12 @@ def _open(job: Job, run: Run, crew: Crew, monitor: Monitor) -> Executor:
 class _Shift:
     """One pass over the units, until all are done or a damaged file is found."""
 
-    def __init__(self, job: Job, run: Run, monitor: Monitor, is_wanted: Callable[[Unit], bool]) -> None:
+    def __init__(self, job: Job, run: Run, progress: _Progress, is_wanted: Callable[[Unit], bool]) -> None:
         self._blueprint = Blueprint(job, run)
         self._run = run
-        self._monitor = monitor
         self._is_wanted = is_wanted
         self._graph = Graph()
-        self._progress = _Progress(monitor)
+        self._progress = progress
         self._take_up(self._blueprint.first())
 
     @property
@@ -170,14 +173,15 @@ class _Shift:
         while pending:
             unit = pending.popleft()
             is_done = not unit.is_gate and self._blueprint.is_done(unit)
-            if not unit.is_gate and not is_done and not self._is_wanted(unit):
+            is_wanted = self._is_wanted(unit)
+            if not unit.is_gate and not is_done and not is_wanted:
                 continue
             if is_done:
                 self._graph.finish(unit.name)
             self._graph.add(unit)
-            self._progress.add(unit)
+            if is_wanted:
+                self._progress.add(unit, is_done=is_done)
             if is_done:
-                self._progress.finish(unit)
                 pending.extend(self._blueprint.follow(unit))
 
     def _finished(self, unit: Unit) -> tuple[Unit, ...]:
@@ -190,7 +194,7 @@ class _Shift:
         is_scarce = failure.kind is FailureKind.MEMORY or (failure.kind is FailureKind.DIED and attempt > 1)
         if is_scarce and attempt < ATTEMPTS:
             after += " with fewer paths in flight"
-        self._monitor.say(f"{unit.name}: {failure.text}; {after}")
+        self._progress.monitor.say(f"{unit.name}: {failure.text}; {after}")
 
     def _set_aside(self, aside: list[tuple[Unit, list[Failure]]]) -> None:
         names = tuple(unit.name for unit, _ in aside)
@@ -236,24 +240,46 @@ class _Here:
 
 
 class _Progress:
-    """Counts units for a monitor, by stage."""
+    """Counts this command's units for a monitor, by stage, over all shifts.
+
+    Units that were done before are told of and not counted: they took none of the time that has passed.
+    """
 
     def __init__(self, monitor: Monitor) -> None:
-        self._monitor = monitor
+        self.monitor = monitor
+        self._before: dict[str, int] | None = {}  # None once they are told of
+        self._open: set[str] = set()  # units that are counted and not finished
         self._totals: dict[str, int] = {}
         self._begun: set[str] = set()
         self._now = ""
 
-    def add(self, unit: Unit) -> None:
-        """Take up a unit."""
+    def add(self, unit: Unit, *, is_done: bool) -> None:
+        """Take up a unit; one of an earlier shift is counted already."""
         if not unit.stage:
             return
-        if unit.stage not in self._begun:
-            self._totals[unit.stage] = self._totals.get(unit.stage, 0) + 1
-        elif unit.stage == self._now:
-            self._monitor.extend(1)
+        if is_done:
+            if unit.name in self._open:
+                self.finish(unit)
+            elif self._before is not None:
+                self._before[unit.stage] = self._before.get(unit.stage, 0) + 1
+            return
+        if unit.name in self._open:
+            return
+        self._open.add(unit.name)
+        if unit.stage in self._begun and unit.stage == self._now:
+            self.monitor.extend(1)
         else:
             self._totals[unit.stage] = self._totals.get(unit.stage, 0) + 1
+
+    def tell_before(self) -> None:
+        """Say what was done before this command began; a second call does nothing."""
+        counts = [
+            f"{stage} {count} of {count + self._totals.get(stage, 0)}"
+            for stage, count in (self._before or {}).items()
+        ]
+        self._before = None
+        if counts:
+            self.monitor.say(f"done before: {', '.join(counts)}")
 
     def finish(self, unit: Unit) -> None:
         """Count a unit as done."""
@@ -262,9 +288,10 @@ class _Progress:
             return
         self._now = unit.stage
         self._begun.add(unit.stage)
+        self._open.discard(unit.name)
         # Each time: what workers say of their clips comes in between.
-        self._monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
-        self._monitor.advance()
+        self.monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
+        self.monitor.advance()
 
 
 def bytes_needed(run: Run, names: list[str]) -> float:

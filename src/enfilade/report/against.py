@@ -10,11 +10,17 @@ from enfilade.errors import ImageError, RunFolderError
 from enfilade.judges.shown import Shown, shown
 from enfilade.metric import Pursuit, SequenceAqm
 from enfilade.pixels.tone import srgb_encode
-from enfilade.records import F32
+from enfilade.records import F32, Flow
 from enfilade.report.seen import SeenFrame, SeenRun
 from enfilade.settings import MetricSettings
 
 __all__ = ["Against", "Beside"]
+
+NO_FLOW = (
+    "the reference's image flow leads to other frames than this run has before and after, and this run's "
+    "files have none: such frames are judged as if nothing moved; render with --output-layers "
+    "forward,backward,source"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +103,7 @@ class Against:
             other.color,
             self._test.viewing,
             exposure_ev=self._test.exposure_ev,
-            flow=other.flow or frame.flow,
+            flow=self._flow(frame, other),
         )
         error = np.abs(pair.test - pair.reference)
         squared = float(np.mean(np.square(error), dtype=np.float64))
@@ -110,6 +116,16 @@ class Against:
             percent_visible=visible,
             grey=self._grey(pair),
         )
+
+    def _flow(self, frame: SeenFrame, other: SeenFrame) -> Flow | None:
+        """The reference's image flow where it leads to the neighbours that this run's frame has."""
+        if other.flow is None or self._test.neighbours(frame.index) == self._reference.neighbours(
+            other.index
+        ):
+            return other.flow or frame.flow
+        if frame.flow is None and NO_FLOW not in self.notes:
+            self.notes.append(NO_FLOW)
+        return frame.flow
 
     def _judged(self, frame: SeenFrame, pair: Shown) -> tuple[F32 | None, float | None, float | None]:
         if self._aqm is None:

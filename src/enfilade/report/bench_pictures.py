@@ -57,10 +57,10 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
         ax.set_axis_off()
     for row, number in enumerate(frames):
         references = {
-            name: _shown(folder / "references" / f"reference-{name}", number)
+            name: _shown(found, folder / "references" / f"reference-{name}", number)
             for name in found["reference"]["filters"]
         }
-        images = {c["name"]: _shown(folder / "contestants" / c["name"], number) for c in shown.values()}
+        images = {name: _shown(found, folder / "contestants" / name, number) for name in shown}
         against = {c["name"]: references[c["pixel_filter"]] for c in shown.values()}
         place = _most_different(images, against)
         reference = references.get("gaussian", next(iter(references.values()), None))
@@ -98,14 +98,14 @@ def plot_slices(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
     popping as a step at one height. The line is that where the contestants' flicker differs most.
     """
     shown, numbers = _selected(found["contestants"]), found["frames"]
-    line = _most_flickering(shown.values(), numbers, folder, found["size"][1])
+    line = _most_flickering(shown.values(), found, folder)
     references = {f"reference, {name}": f"reference-{name}" for name in found["reference"]["filters"]}
     strips = {name: folder / "references" / held for name, held in references.items()}
     strips |= {name: folder / "contestants" / name for name in shown}
     figure = Figure(figsize=(9.0, 0.75 * len(strips) + 0.3), dpi=DPI, layout="constrained")
     axes = figure.subplots(len(strips), 1, squeeze=False)[:, 0]
     for ax, (name, frames) in zip(axes, strips.items(), strict=True):
-        strip = np.stack([_shown(frames, number)[line] for number in numbers])
+        strip = np.stack([_shown(found, frames, number)[line] for number in numbers])
         ax.imshow(strip, interpolation="nearest", aspect="auto")
         ax.set_xticks([])
         ax.set_yticks([])
@@ -116,16 +116,15 @@ def plot_slices(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
     return save(figure, file)
 
 
-def _most_flickering(
-    shown: Iterable[Mapping[str, Any]], numbers: Sequence[int], folder: Path, height: int
-) -> int:
+def _most_flickering(shown: Iterable[Mapping[str, Any]], found: Mapping[str, Any], folder: Path) -> int:
     """The line of pixels whose errors change most from frame to frame, each contestant counting the same."""
+    height = found["size"][1]
     total = np.zeros(height)
     for one in shown:
         changes, last = np.zeros(height), None
-        for number in numbers:
-            reference = _shown(folder / "references" / f"reference-{one['pixel_filter']}", number)
-            error = _shown(folder / "contestants" / one["name"], number) - reference
+        for number in found["frames"]:
+            test, reference = _pair(found, one, folder, number)
+            error = test - reference
             if last is not None:
                 changes += np.square(error - last).sum(axis=(1, 2))
             last = error
@@ -149,7 +148,7 @@ def write_differences(found: Mapping[str, Any], folder: Path) -> list[Path]:
         files.append(folder / "differences" / f"{one['name']}.mp4")
         encode_video(
             files[-1],
-            _side_by_side(one, found["frames"], folder),
+            _side_by_side(found, one, folder),
             fps=found["fps"],
             width=2 * width,
             height=height,
@@ -159,10 +158,9 @@ def write_differences(found: Mapping[str, Any], folder: Path) -> list[Path]:
     return files
 
 
-def _side_by_side(one: Mapping[str, Any], numbers: Sequence[int], folder: Path) -> Iterator[F32]:
-    for number in numbers:
-        test = _shown(folder / "contestants" / one["name"], number)
-        reference = _shown(folder / "references" / f"reference-{one['pixel_filter']}", number)
+def _side_by_side(found: Mapping[str, Any], one: Mapping[str, Any], folder: Path) -> Iterator[F32]:
+    for number in found["frames"]:
+        test, reference = _pair(found, one, folder, number)
         yield srgb_decode(np.concatenate([test, _difference(test, reference)], axis=1)).astype(np.float32)
 
 
@@ -183,10 +181,18 @@ def _selected(contestants: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str
     return chosen
 
 
-def _shown(folder: Path, number: int) -> F32:
+def _pair(found: Mapping[str, Any], one: Mapping[str, Any], folder: Path, number: int) -> tuple[F32, F32]:
+    """A frame of a contestant, and that of the reference of its pixel filter."""
+    reference = folder / "references" / f"reference-{one['pixel_filter']}"
+    return _shown(found, folder / "contestants" / one["name"], number), _shown(found, reference, number)
+
+
+def _shown(found: Mapping[str, Any], folder: Path, number: int) -> F32:
+    """A frame as the judges see it: after exposure and clipping, encoded; older benches say no exposure."""
     sign = "-" if number < 0 else ""
     linear = read_exr(folder / "frames" / f"{sign}{abs(number):04d}.exr")["RGB"].astype(np.float32)
-    return srgb_encode(np.clip(linear, 0.0, 1.0)).astype(np.float32)
+    exposed = linear * np.float32(2.0 ** found.get("exposure_ev", 0.0))
+    return srgb_encode(np.clip(exposed, 0.0, 1.0)).astype(np.float32)
 
 
 def _most_different(images: Mapping[str, F32], against: Mapping[str, F32]) -> tuple[slice, slice]:

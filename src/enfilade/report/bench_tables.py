@@ -7,6 +7,7 @@ from typing import Any
 
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ "}
 
@@ -56,7 +57,7 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
         if denoised := verdict["denoised"]:
             table.add_section()
             table.add_row("denoised", *(ratio_text(denoised["by_judge"][judge]) for judge in judges))
-            table.caption = f"denoised: geometric mean over the judges {denoised['geometric_mean']:.2f}"
+            table.caption = f"denoised: geometric mean over the judges {_mean_text(denoised)}"
         tables.append(table)
     if verdict["paper"]:
         table = _table("decoupled, better by every judge at less cost", "than")
@@ -70,6 +71,13 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
 def ratio_text(ratio: Mapping[str, Any]) -> str:
     """A ratio for people: ``≥ 3.12``."""
     return SIGNS[ratio["kind"]] + number_text(ratio["times"])
+
+
+def _mean_text(denoised: Mapping[str, Any]) -> str:
+    """The mean over the judges with its sign; older files do not say its kind."""
+    kind = denoised.get("kind", "equal")
+    text = f"{denoised['geometric_mean']:.2f}"
+    return f"{text}, of bounds both ways" if kind is None else SIGNS[kind] + text
 
 
 def number_text(value: float) -> str:
@@ -88,7 +96,8 @@ def score_text(score: float | None) -> str:
 
 
 def _table(title: str, first: str, *others: str) -> Table:
-    table = Table(title=title, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
+    shown = Text(title, style="table.title")  # a scene's name may hold what looks like markup
+    table = Table(title=shown, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
     table.min_width = len(title)
     table.add_column(first, no_wrap=True)
     for name in others:

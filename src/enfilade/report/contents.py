@@ -29,7 +29,7 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         None: without one.
     film
     """
-    ahead = forecast(seen.identity, seen.lines)
+    ahead = forecast(seen.identity, seen.lines, workers=sum(one["workers"] for one in seen.writers))
     made = panels(seen.figures, seen.numbers, seen.speed_deg_s, film.beside)
     return {
         "name": seen.name,
@@ -85,15 +85,16 @@ def _efforts(figures: Mapping[str, Any]) -> dict[int, list[float]]:
 
 
 def _state(seen: SeenRun) -> dict[str, str]:
-    writer = seen.run.writer()
     count = f"{len(seen.finished)} of {len(seen.numbers)} frames"
     if seen.is_finished:
         return {
             "word": "finished",
             "text": f"all {len(seen.numbers)} frames" + (" and the video" if _video(seen) else ""),
         }
-    if writer is not None:
-        who = f"process {writer['pid']} on {writer['host']}, since {writer['started']}"
+    if seen.writers:
+        first, *others = seen.writers
+        who = f"process {first['pid']} on {first['host']}, since {first['started']}"
+        who += f", and {len(others)} more" if others else ""
         return {"word": "running", "text": f"{count} finished; {who}"}
     return {
         "word": "unfinished",

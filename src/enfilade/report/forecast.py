@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,7 +45,8 @@ class Forecast:
     steps : tuple of Step
         In order.
     left_s : float or None
-        Wall-clock seconds until the last frame at the present pace; None where it can't be known yet.
+        Wall-clock seconds until the last frame at the present pace, by those who are at work; by one worker
+        where nobody is. None where it can't be known yet.
     text : str
         What it rests on, or why it isn't known.
     """
@@ -54,8 +56,12 @@ class Forecast:
     text: str
 
 
-def forecast(identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> Forecast:
+def forecast(
+    identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]], *, workers: int = 1
+) -> Forecast:
     """Tell how far a run has come.
+
+    Frames of `paper` that repeat another, while the camera rests, count as in-betweens where they are left.
 
     Parameters
     ----------
@@ -63,15 +69,18 @@ def forecast(identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) ->
         As ``run.json`` has it.
     lines
         Of the ledger.
+    workers
+        How many units are done at once; 0: nobody is at work.
     """
-    work = _Work(identity, lines)
+    work = _Work(identity, lines, workers)
     steps = tuple(work.steps())
     left, text = work.left()
     return Forecast(steps, left, text)
 
 
 class _Work:
-    def __init__(self, identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> None:
+    def __init__(self, identity: Mapping[str, Any], lines: Sequence[Mapping[str, Any]], workers: int) -> None:
+        self._workers = workers
         self._method = identity["method"]
         self._numbers = identity["path"]["frames"]
         self._units: dict[str, list[Mapping[str, Any]]] = {}
@@ -104,7 +113,7 @@ class _Work:
         if self._method not in TWICE:
             if frames is None:
                 return None, "the time left is known once the first frame is finished"
-            return frames, f"at the pace of the last {min(RECENT, self._done('frame'))} frames"
+            return frames, self._basis("frame", "frames")
         first, second = TWICE[self._method]
         raw, share = self._left_of("raw"), self._judged_share()
         if raw is None:
@@ -117,8 +126,17 @@ class _Work:
             return None, f"only {second} is left; its time is known once the first frame is finished"
         rest = "" if frames is not None else f", {second} left out: no frame tells yet what it costs"
         kind, noun = ("raw", f"{first}s") if raw > 0.0 else ("frame", "frames")
+        return raw + (frames or 0.0), self._basis(kind, noun) + rest
+
+    def _basis(self, kind: str, noun: str) -> str:
         basis = f"at the pace of the last {min(RECENT, self._done(kind))} {noun}"
-        return raw + (frames or 0.0), basis + rest
+        match self._workers:
+            case 0:
+                return f"{basis}, one after the other"
+            case 1:
+                return basis
+            case count:
+                return f"{basis}, {count} at a time"
 
     def _done(self, kind: str) -> int:
         return len(self._units.get(kind, []))
@@ -130,8 +148,9 @@ class _Work:
         left = len(self._numbers) - self._done(kind)
         if left <= 0:
             return 0.0
-        recent = [_wall(line) for line in self._units.get(kind, []) if not _is_keyframe(line)][-RECENT:]
-        return left * sum(recent) / len(recent) if recent else None
+        recent = [_wall(line) for line in self._units.get(kind, []) if not _is_given(line)][-RECENT:]
+        rounds = math.ceil(left / max(self._workers, 1))
+        return rounds * sum(recent) / len(recent) if recent else None
 
     def _judged_share(self) -> float:
         """Share of the path in segments that are not split any more."""
@@ -146,6 +165,9 @@ def _wall(line: Mapping[str, Any]) -> float:
     return sum(float(stage["wall_s"]) for stage in line.get("cost", {}).values())
 
 
-def _is_keyframe(line: Mapping[str, Any]) -> bool:
-    # A keyframe of `paper` becomes a frame at no cost: it says nothing about the in-betweens that are left.
-    return line["unit"].startswith("raw ") and bool(line.get("sources", {}).get("keyframe"))
+def _is_given(line: Mapping[str, Any]) -> bool:
+    # A keyframe of `paper` becomes a frame at no cost, and so does one that repeats another while the camera
+    # rests: they say nothing about the in-betweens that are left.
+    sources = line.get("sources", {})
+    is_copy = 0 < sources.get("reused", 0) == sum(sources.values())
+    return line["unit"].startswith("raw ") and (is_copy or bool(sources.get("keyframe")))

@@ -1,7 +1,7 @@
 """A report that follows a running run, for browsers of this machine alone.
 
 It listens on the loopback interface, answers only who knows the token in its address, and makes the page
-anew when the ledger has grown.
+anew when more is finished, or when someone begins or ends to work on the run.
 """
 
 from __future__ import annotations
@@ -11,53 +11,61 @@ import json
 import secrets
 import tempfile
 import threading
-import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 
 from enfilade.errors import EnfiladeError
-from enfilade.monitor import Silence
+from enfilade.monitor import Monitor, Silence
 from enfilade.report.page import Wishes, write_page
+from enfilade.store.checksum import size_of
+from enfilade.store.identity import LEDGER_FILE
+from enfilade.store.lock import writers_of
+from enfilade.store.run import PARTS
 
 __all__ = ["Live"]
 
 LOOPBACK = "127.0.0.1"
 TOKEN_BYTES = 32
 LEAST_S = 3.0  # between two pages
-LEDGER = "ledger.jsonl"
+REST = 10.0  # times as long as a page took, until the next one: the run needs the processor
 
 FOLLOWER = """<!doctype html><html lang="en"><meta charset="utf-8"><title>enfilade: a run</title>
 <style>html,body,iframe{margin:0;width:100%;height:100%;border:0;display:block}
 p{position:fixed;bottom:0;right:0;margin:0;padding:.2em .6em;font:13px sans-serif}
 p{background:#0008;color:#fff}</style>
-<iframe src="page" title="report"></iframe><p hidden></p>
+<iframe src="page?VERSION" title="report"></iframe><p hidden></p>
 <script>
 const frame = document.querySelector("iframe"), note = document.querySelector("p");
-let seen = null;
+let seen = VERSION;
 async function look() {
   try {
     const state = await (await fetch("state", {cache: "no-store"})).json();
     note.hidden = !state.problem;
     note.textContent = state.problem;
-    if (seen !== null && state.version !== seen) frame.src = "page?" + state.version;
+    if (state.version !== seen) frame.src = "page?" + state.version;
     seen = state.version;
   } catch (error) {
     note.hidden = false;
     note.textContent = "enfilade no longer answers";
   }
+  setTimeout(look, 2000);
 }
-setInterval(look, 2000);
 look();
 </script></html>"""
 
 
 class Live:
     """A server of a run's report; used as a context, it serves until the end of it.
+
+    The first page is made at once: what is no run, and wishes that can't be met, are refused before anybody
+    is told of an address.
 
     Parameters
     ----------
@@ -67,6 +75,8 @@ class Live:
         What the page shall hold.
     port
         0: any that is free.
+    monitor
+        Watches the first page being made; None: nobody.
 
     Attributes
     ----------
@@ -77,13 +87,21 @@ class Live:
     ------
     OSError
         The port is taken.
+    RunFolderError, SettingsError
+        As by :func:`~enfilade.report.page.write_page`.
     """
 
-    def __init__(self, folder: Path, wishes: Wishes, port: int = 0) -> None:
+    def __init__(
+        self, folder: Path, wishes: Wishes, port: int = 0, *, monitor: Monitor | None = None
+    ) -> None:
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._pages = _Pages(folder, wishes)
         self._server = ThreadingHTTPServer((LOOPBACK, port), partial(_Handler, self._find))
         self._server.daemon_threads = True
+        try:
+            self._pages = _Pages(folder, wishes, monitor or Silence())
+        except BaseException:
+            self._server.server_close()
+            raise
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self.address = f"http://{LOOPBACK}:{self._server.server_port}/{self._token}/"
 
@@ -143,43 +161,70 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class _Pages:
-    """The page as it was made last, made anew when the ledger has grown."""
+    """The page as it was made last, made anew when the run has gone on."""
 
-    def __init__(self, folder: Path, wishes: Wishes) -> None:
-        self._ledger = folder / LEDGER
+    def __init__(self, folder: Path, wishes: Wishes, monitor: Monitor) -> None:
         self._folder = folder
         self._wishes = wishes
         self._lock = threading.Lock()
-        self._made_s = -LEAST_S
-        self._version = -1
-        self._page = b""
-        self._problem = ""
+        self._page, self._version, self._problem = b"", 0, ""
+        self._progress: _Progress | None = None
+        self._took_s = self._ended_s = 0.0
+        self._make(monitor)
 
     def find(self, name: str) -> tuple[str, bytes] | None:
         """Kind and content of a page by its name; None if there is none."""
         match name:
             case "":
-                return "text/html", FOLLOWER.encode()
+                return "text/html", FOLLOWER.replace("VERSION", str(self._version)).encode()
             case "page":
-                with self._lock:
-                    self._renew()
-                    return "text/html", self._page or self._problem.encode()
+                return "text/html", self._page
             case "state":
-                with self._lock:
-                    self._renew()
-                    state = {"version": self._version, "problem": self._problem}
+                self._renew()
+                state = {"version": self._version, "problem": self._problem}
                 return "application/json", json.dumps(state).encode()
         return None
 
     def _renew(self) -> None:
-        version = self._ledger.stat().st_size if self._ledger.exists() else 0
-        if version == self._version or time.monotonic() - self._made_s < LEAST_S:
+        if not self._lock.acquire(blocking=False):  # another request does it; meanwhile the last page stands
             return
+        try:
+            self._renew_if_due()
+        finally:
+            self._lock.release()
+
+    def _renew_if_due(self) -> None:
+        progress = _progress(self._folder)
+        # When nobody works any more, the last page need not wait: there is no run whose processor it takes.
+        rest_s = max(LEAST_S, REST * self._took_s) if progress.writers else LEAST_S
+        if progress == self._progress or monotonic() - self._ended_s < rest_s:
+            return
+        try:
+            self._make(Silence())
+            self._problem = ""
+        except EnfiladeError as error:
+            self._problem = str(error)
+            self._progress, self._ended_s = progress, monotonic()
+
+    def _make(self, monitor: Monitor) -> None:
+        progress, began_s = _progress(self._folder), monotonic()
         with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
             file = Path(place) / "report.html"
-            try:
-                write_page(self._folder, file, self._wishes, Silence())
-                self._page, self._problem = file.read_bytes(), ""
-            except EnfiladeError as error:
-                self._problem = str(error)
-        self._version, self._made_s = version, time.monotonic()
+            write_page(self._folder, file, self._wishes, monitor)
+            self._page = file.read_bytes()
+        self._version += 1
+        self._progress, self._ended_s = progress, monotonic()
+        self._took_s = self._ended_s - began_s
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """How far a run has come, told without reading it: sizes of its ledgers by name, and who writes."""
+
+    sizes: dict[str, int | None]
+    writers: list[dict[str, Any]]
+
+
+def _progress(folder: Path) -> _Progress:
+    ledgers = (folder / LEDGER_FILE, *sorted((folder / PARTS).glob("*.jsonl")))
+    return _Progress({file.name: size_of(file) for file in ledgers}, writers_of(folder))

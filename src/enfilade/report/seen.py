@@ -15,6 +15,7 @@ from enfilade.errors import ImageError, RunFolderError
 from enfilade.records import F32, U8, Flow
 from enfilade.settings import MaskSettings, VideoSettings, ViewingSettings
 from enfilade.store import Run, tally
+from enfilade.store.lock import writers_of
 from enfilade.viewing import Viewing
 
 __all__ = ["SeenFrame", "SeenRun"]
@@ -76,6 +77,8 @@ class SeenRun:
     exposure_ev : float
         Stops.
     video : VideoSettings
+    writers : list of dict
+        Who worked on it when it was opened, see :func:`~enfilade.store.lock.writers_of`.
     notes : list of str
         What is odd about the run, for the user to know.
 
@@ -88,6 +91,7 @@ class SeenRun:
     def __init__(self, folder: Path) -> None:
         self.run = Run.existing(folder, is_lenient=True)
         self.identity = self.run.identity
+        self.writers = writers_of(folder)
         self.notes = list(self.run.notes)
         self.lines = list(self.run.lines())
         try:
@@ -149,6 +153,13 @@ class SeenRun:
         """Whether nothing is carried to a frame from the one before."""
         return index == 0 or self.numbers[index] in self._cuts
 
+    def neighbours(self, index: int) -> tuple[int | None, int | None]:
+        """Numbers of the frames before and after, to which flow leads; None at the ends of a shot."""
+        after = index + 1
+        is_last = after == len(self.numbers) or self.begins_shot(after)
+        before = None if self.begins_shot(index) else self.numbers[index - 1]
+        return before, None if is_last else self.numbers[after]
+
     def frame(self, index: int) -> SeenFrame:
         """Read a frame that is finished or waits for antialiasing; its checksum is compared.
 
@@ -183,11 +194,11 @@ class SeenRun:
     def _flow(self, index: int, layers: Mapping[str, Any]) -> Flow | None:
         if "forward" not in layers or "backward" not in layers:
             return None
-        is_last = index + 1 == len(self.numbers) or self.begins_shot(index + 1)
+        before, after = self.neighbours(index)
         backward, forward = (
             np.ascontiguousarray(layers[name], np.float32) for name in ("backward", "forward")
         )
-        return Flow(backward, forward, has_backward=not self.begins_shot(index), has_forward=not is_last)
+        return Flow(backward, forward, has_backward=before is not None, has_forward=after is not None)
 
 
 def _version(identity: Mapping[str, Any]) -> str:

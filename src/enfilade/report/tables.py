@@ -9,6 +9,7 @@ from typing import Any
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 SOURCES = {  # Table 1, in its order: key of the summary, heading
     "slow": "slow",
@@ -148,7 +149,7 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
     table = _table("", "frame", "JND", "steady", "transient", "visible, %", "PSNR, dB", "deg/s")
     rows = found["per_frame"]
     for row in sorted(rows, key=lambda r: -r["score_jnd"])[:WORST_FRAMES]:
-        table.add_row(_short(row["name"]), *_difference(row, row["percent_visible"]))
+        table.add_row(Text(_short(row["name"])), *_difference(row, row["percent_visible"]))
     if len(rows) > WORST_FRAMES:
         table.caption = f"the {WORST_FRAMES} frames with most; --json lists all"
     table.add_section()

@@ -12,9 +12,10 @@ from typing import Any
 
 from enfilade.errors import RunFolderError
 
-__all__ = ["LOCK_NAME", "Lock", "writer_of"]
+__all__ = ["LOCK_NAME", "Lock", "sign_workers", "writers_of"]
 
 LOCK_NAME = "run.lock"
+PART_LOCKS = "parts/*.lock"
 
 
 class Lock:
@@ -83,8 +84,8 @@ def _locked(file: Path, kind: int) -> int:
     return handle
 
 
-def writer_of(folder: Path) -> dict[str, Any] | None:
-    """Who is writing in a run folder, told without touching the lock; None if nobody is.
+def writers_of(folder: Path) -> list[dict[str, Any]]:
+    """Who is writing in a run folder, told without touching the locks: one, or those who share it.
 
     Parameters
     ----------
@@ -92,15 +93,52 @@ def writer_of(folder: Path) -> dict[str, Any] | None:
 
     Returns
     -------
-    dict or None
-        ``host``, ``pid`` and ``started`` (ISO 8601). A process of this host that has gone writes no more;
-        whether one of another host still lives can't be seen from here.
+    list of dict
+        ``host``, ``pid``, ``started`` (ISO 8601) and ``workers``: how many units it does at once. A process
+        of this host that has gone writes no more; whether one of another host still lives can't be seen
+        from here.
     """
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for file in _locks(folder):
+        name = _signature(file)
+        if name is None or (
+            name["host"] == socket.gethostname() and not Path(f"/proc/{name['pid']}").exists()
+        ):
+            continue
+        found.setdefault((name["host"], name["pid"]), name)  # who shares a run signs two locks
+    return list(found.values())
+
+
+def sign_workers(folder: Path, workers: int) -> None:
+    """Say in the lock that this process holds how many units it does at once.
+
+    Parameters
+    ----------
+    folder
+    workers
+    """
+    for file in _locks(folder):
+        name = _signature(file)
+        if name is not None and (name["host"], name["pid"]) == (socket.gethostname(), os.getpid()):
+            with file.open("r+b") as stream:
+                _write(stream.fileno(), {**name, "workers": workers})
+            return
+
+
+def _locks(folder: Path) -> list[Path]:
+    return [*sorted(folder.glob(PART_LOCKS)), folder / LOCK_NAME]
+
+
+def _signature(file: Path) -> dict[str, Any] | None:
     try:
-        name = json.loads((folder / LOCK_NAME).read_bytes())
-        is_gone = name["host"] == socket.gethostname() and not Path(f"/proc/{name['pid']:d}").exists()
-        return None if is_gone else {key: name[key] for key in ("host", "pid", "started")}
-    except (OSError, ValueError, KeyError, TypeError):  # it is just signing, or has gone
+        name = json.loads(file.read_bytes())
+        return {
+            "host": str(name["host"]),
+            "pid": int(name["pid"]),
+            "started": str(name["started"]),
+            "workers": int(name.get("workers", 1)),
+        }
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):  # it is just signing, or has gone
         return None
 
 
@@ -110,6 +148,10 @@ def _sign(handle: int) -> None:
         "pid": os.getpid(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    _write(handle, name)
+
+
+def _write(handle: int, name: dict[str, Any]) -> None:
     os.ftruncate(handle, 0)
     os.pwrite(handle, json.dumps(name).encode() + b"\n", 0)
 

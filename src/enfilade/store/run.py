@@ -14,7 +14,7 @@ from enfilade.errors import DamagedFileError, RunFolderError
 from enfilade.store.checksum import checksum, size_of
 from enfilade.store.identity import LEDGER_FILE, RUN_FILE, claim, identity_of, prepare
 from enfilade.store.ledger import Ledger, covered
-from enfilade.store.lock import LOCK_NAME, Lock, writer_of
+from enfilade.store.lock import LOCK_NAME, Lock
 
 __all__ = ["KINDS", "Run"]
 
@@ -179,10 +179,6 @@ class Run:
         if self._lock is not None:
             self._lock.release()
             self._lock = None
-
-    def writer(self) -> dict[str, Any] | None:
-        """Who is writing here now, see :func:`~enfilade.store.lock.writer_of`."""
-        return writer_of(self.folder)
 
     def file(self, kind: str, number: int) -> Path:
         """File of a frame, by the number by which the user knows it.

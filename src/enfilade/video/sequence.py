@@ -117,7 +117,7 @@ def _images(files: Iterator[Path]) -> list[Path]:
 def _natural(file: Path) -> tuple[list[tuple[int, int, str]], str]:
     # numbers by value; one that begins the name may be negative
     parts = re.findall(r"^-?\d+|\d+|\D+", file.stem)
-    key = [(0, int(p), "") if p.lstrip("-").isdigit() else (1, 0, p.lower()) for p in parts]
+    key = [(0, int(p), "") if p.lstrip("-").isdecimal() else (1, 0, p.lower()) for p in parts]
     return key, file.name
 
 

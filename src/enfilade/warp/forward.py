@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -45,11 +45,12 @@ def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) ->
         they are magnified: the density of the noise, which resampling makes coarser, not weaker.
     """
     landing = _land(keyframe.geometry, camera)
+    longest = settings.max_magnification
     keys = splat_nearest(
-        landing.splats,
+        _within(landing.splats, longest),
         width=camera.width,
         height=camera.height,
-        reach=0.75 * settings.max_magnification,
+        reach=2.0 * longest,  # more than half of the largest box around two such sides
     )
     dr.eval(keys)
     return _resample(keyframe, camera, landing, keys, settings.depth_tolerance)
@@ -113,6 +114,13 @@ def _land(source: Geometry, camera: Camera) -> _Landing:
     splats = Splats(x + flow.x, y + flow.y, inverse_depth, by_x, by_y, slope, is_ahead)
     dr.eval(vars(splats), disparity, gradient)
     return _Landing(splats, disparity, gradient)
+
+
+def _within(splats: Splats, longest: float) -> Splats:
+    """Splats whose sides are no longer than this, in pixels, however they are turned."""
+    square = longest * longest
+    is_short = (dr.squared_norm(splats.by_x) <= square) & (dr.squared_norm(splats.by_y) <= square)
+    return replace(splats, is_splat=splats.is_splat & is_short)
 
 
 def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, tolerance: float) -> Warped:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.errors import ImageError
+from enfilade.metric.transient import moved
 from enfilade.opticalflow import FlowEstimator
 from enfilade.pipeline.compare.pairs import Pair
 from enfilade.pixels.tone import srgb_encode
@@ -21,7 +22,7 @@ __all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
 
 Layers = Mapping[str, npt.NDArray[Any]]
 
-CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, across which no flow means a cut
+CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, that means a cut where no flow leads back
 BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 
@@ -108,6 +109,7 @@ def open_motion(test: Sequence, reference: Sequence, choice: FlowChoice) -> Moti
 class _Kind:
     text: str
     read: Callable[[Layers], Flow | None]
+    is_forward_only: bool = False  # the flow to the last frame is made up from that to the next
 
 
 def _flow(backward: npt.NDArray[Any], forward: npt.NDArray[Any]) -> Flow:
@@ -148,7 +150,7 @@ def _plain(layers: Layers) -> Flow | None:
 KINDS = (
     _Kind("forward.u/v and backward.u/v (pixels to the next and previous frame, x right, y down)", _own),
     _Kind("Vector.X/Y/Z/W (Blender's Vector pass)", _blender),
-    _Kind("motion.u/v (pixels to the next frame, x right, y down)", _plain),
+    _Kind("motion.u/v (pixels to the next frame, x right, y down)", _plain, is_forward_only=True),
 )
 
 
@@ -181,6 +183,14 @@ def _blocks(image: F32) -> F32:
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
+def _change(image: F32, before: F32, backward: F32) -> float:
+    """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image."""
+    fetched, is_inside = moved(before, backward)
+    share = float(_blocks(is_inside.astype(np.float32)).mean())
+    change = _blocks(np.where(is_inside, image - fetched, np.float32(0.0)))
+    return float(np.abs(change).mean()) / share if share else 0.0
+
+
 class _FromLayers:
     kind = "layers"
 
@@ -190,17 +200,20 @@ class _FromLayers:
         self.text = f"image flow: from the {role}'s layers {kind.text}"
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
-        """Pairs with the flow of their layers. No flow to the last frame is a cut where the image changes."""
+        """Pairs with the flow of their layers.
+
+        Where no layer tells the flow to the last frame, a cut is where the image changes altogether.
+        """
         before: F32 | None = None
         for pair in pairs:
             flow = self._read(pair.index)
-            now = _blocks(srgb_encode(pair.reference_relative))
+            now = srgb_encode(pair.reference_relative)
             is_cut = (
-                not flow.has_backward
-                and before is not None
-                and float(np.abs(now - before).mean()) > CUT_DIFFERENCE
+                before is not None
+                and (self._kind.is_forward_only or not flow.has_backward)
+                and _change(now, before, flow.backward) > CUT_DIFFERENCE
             )
-            yield pair, Moved(flow.motion, flow.backward, is_cut)
+            yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
             before = now
 
     def _read(self, index: int) -> Flow:

@@ -262,6 +262,34 @@
     event.preventDefault();
   }
 
+  // ---- a page that takes the place of this one, as a running run goes on, shows the same
+
+  const PLACE = `enfilade-place ${location.pathname}`;
+  const folds = [...document.querySelectorAll("details")];
+
+  function keepPlace() {
+    const place = {
+      frame: frames.length ? frames[at.frame].number : null,
+      layer: at.layer,
+      isPlaying: playing !== 0,
+      open: folds.map((one) => one.open),
+      scroll: [scrollX, scrollY],
+    };
+    try {
+      sessionStorage.setItem(PLACE, JSON.stringify(place));
+    } catch {
+      // a browser may keep nothing for pages from the disk
+    }
+  }
+
+  function keptPlace() {
+    try {
+      return JSON.parse(sessionStorage.getItem(PLACE));
+    } catch {
+      return null;
+    }
+  }
+
   document.addEventListener("keydown", onKey);
   for (const button of document.querySelectorAll("[data-layer]")) {
     button.addEventListener("click", (event) => {
@@ -285,5 +313,14 @@
     });
     show(0);
   }
+  const kept = keptPlace();
+  if (kept) {
+    const hasLayer = data.layers.some((one) => one.name === kept.layer);
+    if (kept.frame !== null && frames.length) show(nearest(kept.frame), hasLayer ? kept.layer : at.layer);
+    folds.forEach((one, index) => { one.open = Boolean(kept.open[index]); });
+    scrollTo(...kept.scroll);
+    if (kept.isPlaying) play(true);
+  }
+  addEventListener("pagehide", keepPlace);
   root.dataset.ready = "yes";
 })();

@@ -30,7 +30,7 @@ from enfilade.renderer import PixelFilter
 from enfilade.settings import Settings
 from enfilade.store import Run
 from enfilade.studies.bench.contestants import FAMILIES, Contestant
-from enfilade.studies.bench.judging import judge
+from enfilade.studies.bench.judging import judge, without_silent
 from enfilade.studies.bench.machine import machine, versions
 from enfilade.studies.bench.race import race
 from enfilade.studies.bench.verdict import verdict
@@ -95,7 +95,7 @@ def bench(
     InputError
         The scene, the settings, or a folder that holds another bench.
     SettingsError
-        A judge that was asked for by name can't be had here.
+        A judge that was asked for by name can't be had here; none has anything to say of these frames.
     """
     judges, left_out = _judges(terms.judges)
     reasons = {c.family: why for c in contestants if (why := _why_unable(c))}
@@ -114,7 +114,11 @@ def bench(
             for f in PixelFilter
             if any(c.pixel_filter is f for c in able)
         }
-        rows = [race_of.contestant(c, judges) for c in able]
+        rows, judges, silent = without_silent([race_of.contestant(c, judges) for c in able], judges)
+        for text in silent:
+            monitor.say(text)
+        if not judges:
+            raise SettingsError(f"nobody can judge: {'; '.join(silent)}, or let others judge")
         floor = race_of.floor(able, judges)
         found = {
             "format": FORMAT,
@@ -126,6 +130,7 @@ def bench(
             "fps": job.path.fps,
             "frames": list(job.path.numbers),
             "pixels_per_degree": job.viewing.pixels_per_degree,
+            "exposure_ev": job.settings.viewing.exposure_ev,
             "reference": {"spp": terms.reference_spp, "filters": references, "floor": floor},
             "judges": {
                 j: {
@@ -135,7 +140,7 @@ def bench(
                 }
                 for j in judges
             },
-            "left_out": left_out,
+            "left_out": left_out + silent,
             "contestants": rows,
             "verdict": verdict(rows, judges),
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.records import F32, Flow
 
-__all__ = ["judge", "pairs"]
+__all__ = ["error_of", "judge", "pairs", "without_silent"]
 
 
 def judge(
@@ -61,6 +61,38 @@ def judge(
 def error_of(name: str, score: float | None) -> float:
     """Error of a score as :func:`judge` gives it: identical sequences have none."""
     return 0.0 if score is None else SCALES[name].error_of(score)
+
+
+def without_silent(
+    rows: Sequence[Mapping[str, Any]], names: Sequence[str]
+) -> tuple[list[dict[str, Any]], list[str], list[str]]:
+    """Leave out judges of changes where no frame has one before it: nobody measured their scores.
+
+    Parameters
+    ----------
+    rows
+        Of contestants, as in ``bench.json``.
+    names
+        Of judges.
+
+    Returns
+    -------
+    rows, names, reasons
+        Rows and names without these judges, and a line for each that is left out.
+    """
+    silent = [name for name in names if SCALES[name].is_of_changes and any(_is_silent(r, name) for r in rows)]
+    kept = [name for name in names if name not in silent]
+    heard = [{**r, **{key: {n: r[key][n] for n in kept} for key in ("scores", "per_frame")}} for r in rows]
+    reasons = [
+        f"the judge {name!r} is left out: no frame has one before it that sees the same surfaces in the same "
+        "shot; give it consecutive frames"
+        for name in silent
+    ]
+    return heard, kept, reasons
+
+
+def _is_silent(row: Mapping[str, Any], name: str) -> bool:
+    return all(value is None for value in row["per_frame"][name])
 
 
 def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[Shown]:

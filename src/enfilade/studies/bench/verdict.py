@@ -30,8 +30,9 @@ def verdict(contestants: Sequence[Mapping[str, Any]], judges: Sequence[str]) -> 
     dict
         ``traced``: by rival and judge, :class:`Ratio` at the rival's own quality (for AQM 0.1 JND above its
         score). ``denoised``: by judge, over all qualities that both reach, with the geometric mean over the
-        judges and the smallest. ``paper``: by contestant, which of ours are better by every judge at less
-        cost. Empty where one side did not take part.
+        judges, its kind (that of the ratios; None where they are bounds both ways, so that it bounds
+        nothing) and the smallest. ``paper``: by contestant, which of ours are better by every judge at
+        less cost. Empty where one side did not take part.
     """
     by_family: dict[str, list[Mapping[str, Any]]] = {}
     for contestant in contestants:
@@ -64,8 +65,16 @@ def _denoised(rivals: Sequence[Mapping[str, Any]], curves: Mapping[str, Sequence
     return {
         "by_judge": {judge: ratio.to_dict() for judge, ratio in ratios.items()},
         "geometric_mean": math.exp(sum(map(math.log, times)) / len(times)),
+        "kind": _kind_of_mean([ratio.kind for ratio in ratios.values()]),
         "least": min(times),
     }
+
+
+def _kind_of_mean(kinds: Sequence[str]) -> str | None:
+    bounds = set(kinds) - {"equal"}
+    if len(bounds) > 1:
+        return None
+    return bounds.pop() if bounds else "equal"
 
 
 def _beats(one: Mapping[str, Any], rival: Mapping[str, Any], judges: Sequence[str]) -> bool:
