@@ -55,8 +55,8 @@ def splat_nearest(splats: Splats, *, width: int, height: int, reach: float) -> A
     width, height
         Of the target.
     reach
-        Largest half extent of a splat, target pixels; larger ones are left out: a stretched sample
-        is no longer worth reusing.
+        Largest half extent of the box around a splat, target pixels; larger ones are left out, which
+        bounds the work.
 
     Returns
     -------
