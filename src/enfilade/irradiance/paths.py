@@ -7,14 +7,11 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import PCG32, Array3f, Float, UInt, opaque
+from enfilade.arrays import PCG32, Array3f, Float, UInt
+from enfilade.pixels.replay import padded
 from enfilade.renderer import Bounce, Lit, Rays
 
-__all__ = ["Path", "begun", "chosen", "padded", "scatter_add"]
-
-# Lanes of a recorded kernel are a multiple of this: else they might be as many as some array of the scene
-# has, which is another form of its arguments.
-STEP = 1021
+__all__ = ["Path", "begun", "chosen", "scatter_add"]
 
 
 @dataclass(frozen=True)
@@ -85,13 +82,6 @@ def chosen(path: Path, lanes: Any) -> Path:
     )
     dr.eval(taken)
     return taken
-
-
-def padded(lanes: Any) -> tuple[Any, Any]:
-    """Lanes of a list, the last repeated until they suit a recorded kernel, and which are no repetitions."""
-    count = dr.width(lanes)
-    index = dr.arange(UInt, -(-count // STEP) * STEP)
-    return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)
 
 
 def scatter_add(radiance: Any, sent: Any, lane: Any) -> None:

@@ -12,10 +12,10 @@ import numpy as np
 from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
 from enfilade.irradiance.cache import LightCache
 from enfilade.irradiance.cells import LEVELS, Estimates, cell_key
-from enfilade.irradiance.paths import Path, begun, chosen, padded, scatter_add
+from enfilade.irradiance.paths import Path, begun, chosen, scatter_add
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
-from enfilade.pixels.replay import recorded
+from enfilade.pixels.replay import padded, recorded
 from enfilade.renderer import MOST_EDGES, LightRenderer, Rays
 
 BOUNCES = MOST_EDGES - 1  # off lobes, from cache to cache; what goes on then is path traced to its end

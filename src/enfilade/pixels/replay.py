@@ -11,7 +11,13 @@ from typing import Any
 
 import drjit as dr
 
-__all__ = ["recorded"]
+from enfilade.arrays import UInt, opaque
+
+__all__ = ["padded", "recorded"]
+
+# Lanes of a recorded kernel are a multiple of this: else they might be as many as some array of the scene
+# has, which is another form of its arguments.
+STEP = 1021
 
 
 def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[..., Any]:
@@ -37,3 +43,10 @@ def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[.
                 gc.enable()
 
     return replayed
+
+
+def padded(lanes: Any) -> tuple[Any, Any]:
+    """Lanes of a list, the last repeated until they suit a recorded kernel, and which are no repetitions."""
+    count = dr.width(lanes)
+    index = dr.arange(UInt, -(-count // STEP) * STEP)
+    return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)

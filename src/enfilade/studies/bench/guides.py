@@ -12,6 +12,7 @@ from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, m
 from enfilade.camera import Camera
 from enfilade.pixels.random import streams
 from enfilade.pixels.rays import pinhole_directions
+from enfilade.pixels.replay import padded
 from enfilade.records import F32, SPECULAR, SurfaceClass
 from enfilade.renderer import LightRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
@@ -103,7 +104,7 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
         rays, throughput = dr.gather(Rays, scattered.rays, going), dr.gather(Array3f, throughput, going)
 
         # A sharp one shows what is behind.
-        seen = renderer.surfaces(rays)
+        seen = _surfaces(renderer, rays, len(lane))
         behind, turned = _first(seen)
         shines = _is_one_of(seen, SPECULAR)
         _add(albedo, lane, throughput * behind)
@@ -116,6 +117,14 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
         lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
         rays, throughput = dr.gather(Rays, rays, going), dr.gather(Array3f, throughput, going)
     return albedo, normal
+
+
+def _surfaces(renderer: Renderer, rays: Rays, count: int) -> Surfaces:
+    """What so many rays meet, asked in a number of lanes that suits recorded kernels."""
+    every = dr.arange(UInt, count)
+    more, _ = padded(every)
+    found: Surfaces = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, more)), every)
+    return found
 
 
 def _is_one_of(seen: Surfaces, classes: tuple[SurfaceClass, ...]) -> Any:
