@@ -17,7 +17,7 @@ from collections import defaultdict
 from pathlib import Path
 
 RAYS = ("gather", "scatter")  # stages that send rays and look up light; all others are overhead
-STAGES = (*RAYS, "files", "over time", "geometry")
+STAGES = (*RAYS, "pool", "geometry", "over time", "files")
 UNITS = ("raw ", "frame ")  # a frame shaded by itself, and the one that is delivered
 
 
