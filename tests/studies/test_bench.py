@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -113,6 +114,19 @@ def test_what_is_finished_is_not_done_again(held):
     again = bench(job, everybody, TERMS, folder, told)
     assert not told.stages
     assert again["contestants"] == found["contestants"]
+
+
+def test_one_that_was_begun_anew_and_killed_is_finished(held, tmp_path):
+    job, everybody, folder, found, _ = held
+    shutil.copytree(folder, tmp_path / "bench")
+    half = tmp_path / "bench" / "contestants" / "traced-1"
+    lines = (half / "ledger.jsonl").read_text().splitlines(keepends=True)
+    (half / "ledger.jsonl").write_text("".join(lines[:3]))
+    for number in (4, 5):
+        (half / "frames" / f"{number:04d}.exr").unlink()
+    again = bench(job, everybody, TERMS, tmp_path / "bench", Told())
+    assert len(list((half / "frames").glob("*.exr"))) == 5
+    assert [row["scores"] for row in again["contestants"]] == [row["scores"] for row in found["contestants"]]
 
 
 def test_a_contestant_can_be_added_and_one_begun_anew(held):

@@ -248,12 +248,14 @@ class _Race:
         except RunFolderError as error:
             remedy = f"\nOr begin it anew: --redo {folder.name}" if setting else ""
             raise RunFolderError(f"{error}{remedy}") from error
-        self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting})
+        made = _ledger_digest(folder)
+        self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting, "made": made})
         return spent.to_dict()
 
     def _finished(self, unit: str, folder: Path) -> dict[str, Any] | None:
-        """The line of a contestant that was rendered, and not forgotten since."""
-        return self._run.done(unit) if (folder / "ledger.jsonl").is_file() else None
+        """The line of a contestant whose frames stand there still; it may have been begun anew since."""
+        line, made = self._run.done(unit), _ledger_digest(folder)
+        return line if line is not None and made and line.get("made", made) == made else None
 
     def _judged(self, one: Contestant, folder: Path, judges: Sequence[str]) -> dict[str, Any]:
         made = _ledger_digest(folder)
