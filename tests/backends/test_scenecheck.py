@@ -108,10 +108,10 @@ def test_includes_are_read_too(scene):
 @pytest.fixture
 def elsewhere(scene, tmp_path, monkeypatch):
     """Files that Mitsuba finds in other folders than beside what names them; who names each, and the file."""
-    (tmp_path / "work").mkdir()
-    monkeypatch.chdir(tmp_path / "work")
+    (tmp_path / "desk").mkdir()
+    monkeypatch.chdir(tmp_path / "desk")
     folder = scene("").parent
-    for name in ("alt/a", "alt/both", "both", "shared", "spectrum", "../work/here", "kept"):
+    for name in ("alt/a", "alt/both", "both", "shared", "spectrum", "../desk/here", "kept"):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(name)
     (folder / "sub").mkdir()
@@ -127,7 +127,7 @@ NAMED = {
     '<include filename="sub/part.xml"/>': "shared",
     '<default name="which" value="kept"/>' + texture("$which"): "kept",
     '<spectrum name="x" filename="spectrum"/>': "spectrum",
-    texture("here"): "../work/here",
+    texture("here"): "../desk/here",
 }
 
 
