@@ -65,3 +65,22 @@ def part_of(path: CameraPath, frames: range) -> CameraPath:
 
 def with_cut(path: CameraPath, frame: int) -> CameraPath:
     return dataclasses.replace(path, cuts=frozenset({frame}))
+
+
+class Told:
+    """A monitor that keeps what it hears."""
+
+    def __init__(self):
+        self.stages, self.said = [], []
+
+    def stage(self, name, _total):
+        self.stages.append(name)
+
+    def advance(self, count=1):
+        pass
+
+    def extend(self, count):
+        pass
+
+    def say(self, text):
+        self.said.append(text)

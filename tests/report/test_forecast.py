@@ -5,12 +5,13 @@ import pytest
 from enfilade.report.forecast import forecast
 
 
-def line(unit, wall_s, **more):
-    return {"unit": unit, "files": {}, "cost": {"trace": {"wall_s": wall_s, "cpu_s": wall_s}}, **more}
+def line(unit, wall_s, stage="trace", **more):
+    return {"unit": unit, "files": {}, "cost": {stage: {"wall_s": wall_s, "cpu_s": wall_s}}, **more}
 
 
 def raw(number, wall_s, *, is_keyframe=False):
-    return line(f"raw {number}", wall_s, frame=number, sources={"keyframe": 100 * is_keyframe, "reused": 0})
+    sources = {"keyframe": 100 * is_keyframe, "reused": 0}
+    return line(f"raw {number}", wall_s, "files" if is_keyframe else "warp", frame=number, sources=sources)
 
 
 def of(method, lines, count=10, **who):
@@ -32,9 +33,10 @@ def test_in_betweens_and_antialiasing_add_up_and_keyframes_do_not_count():
 
 
 def test_frames_that_repeat_another_do_not_count():
-    copies = [line(f"raw {i}", 0.01, sources={"keyframe": 0, "hole": 0, "reused": 100}) for i in (3, 4, 5)]
+    whole = {"keyframe": 0, "hole": 0, "reused": 100}
+    copies = [line(f"raw {i}", 0.01, "files", sources=whole) for i in (3, 4, 5)]
     assert of("paper", [raw(2, 3.0), *copies]).left_s == pytest.approx(6 * 3.0)
-    reused = line("raw 2", 3.0, sources={"keyframe": 0, "hole": 2, "reused": 98})
+    reused = line("raw 2", 3.0, "warp", sources=whole)  # nothing had to be traced, but it is no copy
     assert of("paper", [reused, *copies]).left_s == pytest.approx(6 * 3.0)
 
 

@@ -22,32 +22,13 @@ from enfilade.studies.bench.contestants import Preset, chosen, lineup, read_pres
 from enfilade.studies.bench.race import Spent
 from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
-from small_runs import job_of
+from small_runs import Told, job_of
 
 PRESETS = (
     Preset("paper-2", "paper", {"trace": {"spp": 2}}),
     Preset("paper-8", "paper", {"trace": {"spp": 8}}),
 )
 TERMS = Terms(reference_spp=64)
-
-
-class Told:
-    """A monitor that keeps what it hears."""
-
-    def __init__(self):
-        self.stages, self.said = [], []
-
-    def stage(self, name, _total):
-        self.stages.append(name)
-
-    def advance(self, count=1):
-        pass
-
-    def extend(self, count):
-        pass
-
-    def say(self, text):
-        self.said.append(text)
 
 
 @pytest.fixture(scope="module")

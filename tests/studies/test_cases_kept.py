@@ -14,27 +14,7 @@ from enfilade.studies.cases.case import Case
 from enfilade.studies.cases.runner import ITEMS, measure
 from enfilade.studies.cases.terms import TERMS
 from scenes_analytic import room, room_walk
-from small_runs import job_of
-
-
-class Told:
-    """A monitor that keeps the names of stages, and what was said."""
-
-    def __init__(self):
-        self.stages = []
-        self.said = []
-
-    def stage(self, name, _total):
-        self.stages.append(name)
-
-    def advance(self, count=1):
-        pass
-
-    def extend(self, count):
-        pass
-
-    def say(self, text):
-        self.said.append(text)
+from small_runs import Told, job_of
 
 
 def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):

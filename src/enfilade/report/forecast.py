@@ -167,7 +167,5 @@ def _wall(line: Mapping[str, Any]) -> float:
 
 def _is_given(line: Mapping[str, Any]) -> bool:
     # A keyframe of `paper` becomes a frame at no cost, and so does one that repeats another while the camera
-    # rests: they say nothing about the in-betweens that are left.
-    sources = line.get("sources", {})
-    is_copy = 0 < sources.get("reused", 0) == sum(sources.values())
-    return line["unit"].startswith("raw ") and (is_copy or bool(sources.get("keyframe")))
+    # rests: they say nothing about the in-betweens that are left, each of which is warped.
+    return line["unit"].startswith("raw ") and "sources" in line and "warp" not in line["cost"]

@@ -255,7 +255,7 @@ class _Race:
     def _finished(self, unit: str, folder: Path) -> dict[str, Any] | None:
         """The line of a contestant whose frames stand there still; it may have been begun anew since."""
         line, made = self._run.done(unit), _ledger_digest(folder)
-        return line if line is not None and made and line.get("made", made) == made else None
+        return line if line is not None and made and line.get("made") == made else None
 
     def _judged(self, one: Contestant, folder: Path, judges: Sequence[str]) -> dict[str, Any]:
         made = _ledger_digest(folder)
