@@ -16,6 +16,7 @@ from enfilade.errors import CameraPathError
 from enfilade.path.fields import LARGEST_SIZE, Table
 from enfilade.path.frames import MOST_FRAMES
 from enfilade.path.interpolate import interpolate_aims, interpolate_rotations, interpolate_values
+from enfilade.path.rotation import from_quaternion
 from enfilade.path.shots import Shots
 
 FORMAT = "enfilade-path"
@@ -149,14 +150,11 @@ def _aim(row: Table, eye: Matrix, target: Matrix, up: Matrix) -> Matrix:
 
 
 def _rotation(row: Table) -> Matrix:
-    from scipy.spatial.transform import Rotation
-
     quaternion = row.vector("rotation", 4)
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > 0.01:
         raise row.fail(f"rotation is a unit quaternion w x y z; this one has length {length:.4g}")
-    matrix: Matrix = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-    return matrix
+    return from_quaternion(quaternion)
 
 
 def _frame_count(table: Table, keys: list[Key], own_fps: float, fps: float) -> int:
