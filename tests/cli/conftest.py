@@ -46,7 +46,7 @@ def jobs(monkeypatch):
         (folder / "summary.json").write_text(json.dumps(answer))
         return answer
 
-    def prepare(job, folder):
+    def prepare(job, folder, *, is_tried):
         take(job)
 
     def plan(job, monitor):

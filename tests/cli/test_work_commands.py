@@ -46,10 +46,22 @@ def test_prepared_and_worked_on(run, begun, tmp_path):
     assert run("work", out, "--step", "frames", "--quiet").exit_code == 1
     rest = run("work", out, "--quiet")
     assert rest.exit_code == 0, rest.output
-    assert rest.stdout == f"video   {out / 'video.mp4'}\n"
+    video, plot = out / "video.mp4", out / "plots" / "walkthrough.png"
+    assert rest.stdout == f"video   {video}\nplot    {plot}\nrun     {out}\n"
+    assert plot.exists()
     again = run(*begun, "--quiet", "--verify", "--json")
     assert again.exit_code == 0, again.output
     assert json.loads(again.stdout)["frames"] == 3
+
+
+def test_a_scene_that_can_not_be_loaded_begins_no_run(run, camera_path, tmp_path):
+    scene = tmp_path / "scene.xml"
+    scene.write_text('<scene version="3.0.0"><shape type="nonesuch"/><emitter type="constant"/></scene>')
+    out = tmp_path / "run"
+    result = run("render", scene, "--path", camera_path, "--out", out, "--device", "cpu", "--prepare")
+    assert result.exit_code == 2
+    assert "nonesuch" in result.stderr
+    assert not out.exists()
 
 
 def test_a_farm_gets_a_template(run, begun, tmp_path):

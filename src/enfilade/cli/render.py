@@ -11,8 +11,7 @@ import click
 from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import JOB_SECTIONS, crew_of, crew_options, job_of, job_options, output_options
-
-LEDGER = "ledger.jsonl"
+from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
 
 
 @click.command(
@@ -63,38 +62,19 @@ def command(
     from enfilade.pipeline.walkthrough import prepare, render
 
     if is_prepared:
-        prepare(job, folder)
+        prepare(job, folder, is_tried=True)
         click.echo(f"run     {folder}")
         return
-    before = _size(folder / LEDGER)
+    before = ledger_bytes(folder)
     with watch(quiet=quiet) as monitor:
         summary = render(job, folder, monitor, crew, is_verified=is_verified, is_tried=True)
-    plots = _plots(folder, has_changed=_size(folder / LEDGER) != before)
+    plots = draw_plots(folder, has_changed=ledger_bytes(folder) != before)
     if as_json:
         extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
         click.echo(json.dumps({**summary, **extra}, indent=2))
         return
     _show(summary)
-    for name, file in (
-        ("video", folder / summary["video"]),
-        *(("plot", plot) for plot in plots),
-        ("run", folder),
-    ):
-        click.echo(f"{name:7} {file}")
-
-
-def _size(file: Path) -> int:
-    return file.stat().st_size if file.exists() else -1
-
-
-def _plots(folder: Path, *, has_changed: bool) -> list[Path]:
-    """Draw what the run did; where nothing was done, what was drawn stays."""
-    there = sorted((folder / "plots").glob("*.png"))
-    if there and not has_changed:
-        return there
-    from enfilade.report.plots import plot_run
-
-    return plot_run(folder)
+    name_files(folder, summary, plots)
 
 
 def _show(summary: dict[str, Any]) -> None:

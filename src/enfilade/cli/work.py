@@ -9,6 +9,7 @@ import click
 
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import crew_of, crew_options, device_option, quiet_option
+from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
 from enfilade.device import Choice, activate
 
 
@@ -54,7 +55,9 @@ def command(
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
         if step is None:
+            before = ledger_bytes(run)
             summary = go_on(run, monitor, crew)
-            click.echo(f"video   {run / summary['video']}")
+            plots = draw_plots(run, has_changed=ledger_bytes(run) != before)
+            name_files(run, summary, plots)
         else:
             do_share(run, Share(step, chunk, count), monitor, crew)

@@ -66,8 +66,8 @@ def render(
     """
     crew = crew or Crew()
     _check(job, crew)
-    if is_tried and not folder.exists():
-        job.check_scene(is_tried=True)
+    if is_tried:
+        _try(job, folder)
     with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
         for note in run.notes:
             monitor.say(note)
@@ -113,8 +113,13 @@ def kept(method: str, keys: list[str]) -> str:
     return f"Of what is there, this would be the same: {found.pop()}\n"
 
 
-def prepare(job: Job, folder: Path) -> None:
+def prepare(job: Job, folder: Path, *, is_tried: bool = False) -> None:
     """Begin a run folder without doing any of its work: for commands elsewhere that share it.
+
+    Parameters
+    ----------
+    job, folder, is_tried
+        As of :func:`render`.
 
     Raises
     ------
@@ -122,6 +127,8 @@ def prepare(job: Job, folder: Path) -> None:
         The scene, the settings, or a folder that holds another run.
     """
     _check(job, Crew())
+    if is_tried:
+        _try(job, folder)
     with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
         _write_job(run, job)
 
@@ -140,6 +147,12 @@ def _verify(run: Run, monitor: Monitor) -> None:
     for name in run.damaged():
         run.forget(name)
         monitor.say(f"{name} is missing or damaged: what made it is done again")
+
+
+def _try(job: Job, folder: Path) -> None:
+    """Let a process of its own load the scene of a run that is not begun yet."""
+    if not folder.exists():
+        job.check_scene(is_tried=True)
 
 
 def _check(job: Job, crew: Crew) -> None:

@@ -1,0 +1,36 @@
+"""What a command that finished a run leaves: plots, and where everything is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+LEDGER = "ledger.jsonl"
+
+
+def ledger_bytes(folder: Path) -> int:
+    """How long the ledger of a run folder is; -1 where there is none. It grows by all that is done."""
+    file = folder / LEDGER
+    return file.stat().st_size if file.exists() else -1
+
+
+def draw_plots(folder: Path, *, has_changed: bool) -> list[Path]:
+    """Draw what the run did; where nothing was done, what was drawn stays."""
+    there = sorted((folder / "plots").glob("*.png"))
+    if there and not has_changed:
+        return there
+    from enfilade.report.plots import plot_run
+
+    return plot_run(folder)
+
+
+def name_files(folder: Path, summary: dict[str, Any], plots: list[Path]) -> None:
+    """Print where video, plots and run are."""
+    for name, file in (
+        ("video", folder / summary["video"]),
+        *(("plot", plot) for plot in plots),
+        ("run", folder),
+    ):
+        click.echo(f"{name:7} {file}")
