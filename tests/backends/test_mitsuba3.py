@@ -486,6 +486,18 @@ def test_a_folder_is_no_scene(tmp_path):
         opened(tmp_path)
 
 
+@pytest.mark.parametrize(
+    "error", [MemoryError(), RuntimeError("jit_malloc(): out of memory!"), RuntimeError("std::bad_alloc")]
+)
+def test_too_little_memory_is_no_fault_of_the_scene(tmp_path, monkeypatch, error):
+    def scarce(*_arguments, **_options):
+        raise error
+
+    monkeypatch.setattr(mi, "load_file", scarce)
+    with pytest.raises(MemoryError):
+        opened(write(tmp_path, placed("sphere", "ball", (0, 0, 0), DIFFUSE)))
+
+
 def test_the_fingerprint_follows_the_scene_and_what_it_names(tmp_path):
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

@@ -94,6 +94,17 @@ def test_garbage_is_refused_by_name(tmp_path, data):
         read_exr(tmp_path / "a.exr")
 
 
+def test_too_little_memory_is_no_damage(tmp_path, monkeypatch):
+    write_exr(tmp_path / "a.exr", {"Z": np.zeros((10, 20), np.float32)})
+
+    def scarce(*_arguments, **_options):
+        raise MemoryError
+
+    monkeypatch.setattr("enfilade.codec.exr.OpenEXR.File", scarce)
+    with pytest.raises(MemoryError):
+        read_exr(tmp_path / "a.exr")
+
+
 def test_missing_files_and_folders_are_refused(tmp_path):
     for file in (tmp_path / "none.exr", tmp_path):
         with pytest.raises(ImageError, match=str(file)):

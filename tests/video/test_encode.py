@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from fractions import Fraction
 
@@ -153,6 +154,24 @@ def test_a_place_that_can_not_be_written_is_said(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match=r"file/a\.mp4"):
         encoded(tmp_path / "file" / "a.mp4", bars())
+
+
+def test_too_little_memory_is_no_place_that_can_not_be_written(tmp_path):
+    def scarce():
+        yield bars()[0]
+        raise av.error.MemoryError(errno.ENOMEM, "Cannot allocate memory")
+
+    with pytest.raises(MemoryError):
+        encode_video(
+            tmp_path / "a.mp4",
+            scarce(),
+            fps=24.0,
+            width=128,
+            height=64,
+            settings=VideoSettings(),
+            exposure_ev=0.0,
+        )
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

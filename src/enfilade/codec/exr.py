@@ -244,7 +244,7 @@ def _failures(file: Path) -> Iterator[None]:
     try:
         with contextlib.redirect_stdout(sys.stderr):
             yield
-    except (RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
+    except (RuntimeError, ValueError, TypeError, KeyError) as error:
         if isinstance(error, ImageError):
             raise
         raise _damaged(file, str(error)) from error

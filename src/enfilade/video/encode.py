@@ -136,6 +136,8 @@ def _delay(clip: Path, rate: Fraction) -> int:
 def _opened(clip: Path) -> Any:
     try:
         return av.open(str(clip))
+    except MemoryError:
+        raise
     except (av.FFmpegError, OSError) as error:
         raise _damaged(clip, error) from error
 
@@ -156,6 +158,8 @@ def _packets(clip: Path, opened: Any) -> Iterator[Any]:
             packet = next(packets)
         except StopIteration:
             return
+        except MemoryError:
+            raise
         except av.FFmpegError as error:
             raise _damaged(clip, error) from error
         if packet.size:
@@ -213,6 +217,8 @@ def _written(file: Path, codec: Codec) -> Iterator[Any]:
         try:
             with _container(beside, codec) as container:
                 yield container
+        except MemoryError:  # one of FFmpeg's errors, too
+            raise
         except av.FFmpegError as error:
             if error.errno in whole.FULL:
                 raise whole.unwritable(file, OSError(error.errno, error.strerror)) from error

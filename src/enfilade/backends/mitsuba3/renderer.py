@@ -19,7 +19,7 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.backends.mitsuba3.integrators import scene_integrator, shortened, why_undivided
 from enfilade.backends.mitsuba3.light import Light
-from enfilade.backends.mitsuba3.lobes import diffuse_reflectance, has_lobe
+from enfilade.backends.mitsuba3.lobes import has_lobe
 from enfilade.backends.scenefile import fingerprint
 from enfilade.camera import Camera
 from enfilade.device import active
@@ -43,6 +43,7 @@ from enfilade.settings import TraceSettings
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 PASSED_WHOLE = 0.5  # of the light that a surface lets through, above which a G-buffer passes it by
 PASSED = 0.999  # ... above which a path does
+SCARCE = ("out of memory", "bad_alloc")  # Dr.Jit's words for too little memory, and C++'s
 LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
 
 
@@ -71,7 +72,11 @@ class MitsubaRenderer:
         try:
             # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
             scene = mi.load_file(str(file), optimize=False)
+        except MemoryError:
+            raise
         except Exception as error:
+            if any(words in str(error).lower() for words in SCARCE):
+                raise MemoryError(f"too little memory to load {file}") from error
             raise SceneError(f"Mitsuba can't load {file}: {_reason(error)}") from error
         if not isinstance(scene, mi.Scene):
             raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
@@ -176,7 +181,7 @@ class MitsubaRenderer:
             is_hit=is_hit,
             distance=distance / length,
             normal=Array3f(normal),
-            albedo=Array3f(diffuse_reflectance(seen, material, is_hit)),
+            albedo=self._light.albedo(seen, material, is_hit),
             item=dr.gather(UInt, self._items.number, _registry(seen), is_hit),
             surface=_surface_class(flags, seen.shape.is_emitter(), is_hit),
         )
