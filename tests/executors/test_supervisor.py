@@ -3,12 +3,15 @@
 import subprocess
 import sys
 import time
+import weakref
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.executors import ATTEMPTS, FailureKind, Graph, Recipe, Unit, open_executor, supervise
+from enfilade.executors.inprocess import InProcess
 from enfilade.executors.processes import Processes
 
 TESTS = Path(__file__).parents[1]
@@ -113,6 +116,32 @@ def test_what_had_too_little_memory_is_done_with_less(work, name):
     ending, _, _ = work(name, [unit("m", "starves", times=2)])
     assert not ending.aside
     assert [t.split()[0] for t in (work.folder / "m.tries").read_text().splitlines()] == ["1", "4", "16"]
+
+
+class Big:
+    """Stands for a scene."""
+
+
+def test_a_failed_attempt_keeps_nothing_of_its_worker_in_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
+    scenes, alive = [], []
+
+    def make(_tell, *, share):
+        big = Big()
+        alive.append(sum(scene() is not None for scene in scenes))
+        scenes.append(weakref.ref(big))
+
+        def do(_kind, _facts):
+            if share < 16:
+                raise MemoryError(big)
+
+        return do
+
+    graph = Graph()
+    graph.add(unit("m"))
+    executor = InProcess(SimpleNamespace(make=make), nothing)
+    supervise(graph, executor, follow=nothing, is_done=lambda _: True, failed=nothing)
+    assert alive == [0, 0, 0]
 
 
 @pytest.mark.parametrize(("kind", "what"), [("damaged", FailureKind.DAMAGED), ("full", FailureKind.SPACE)])

@@ -77,7 +77,8 @@ class Failure:
     log : str
         What else its worker said.
     error : Exception or None
-        To be raised where the command ends with it.
+        To be raised where the command may end with it. Not of what is tried again: its traceback would keep
+        all that its worker had in memory.
     file : str
         The damaged one.
     is_final : bool
@@ -103,11 +104,11 @@ class Failure:
             case errors.EnfiladeError():
                 return Failure(FailureKind.REFUSED, text, log, error)
             case MemoryError():
-                return Failure(FailureKind.MEMORY, text, log, error)
+                return Failure(FailureKind.MEMORY, text, log)
             case RuntimeError() if "out of memory" in str(error).lower():  # Dr.Jit's own
-                return Failure(FailureKind.MEMORY, text, log, error)
+                return Failure(FailureKind.MEMORY, text, log)
             case _:
-                return Failure(FailureKind.ERROR, text, log, error)
+                return Failure(FailureKind.ERROR, text, log)
 
     def to_json(self) -> dict[str, str]:
         """Fit to be sent; read back by :meth:`from_json`."""
