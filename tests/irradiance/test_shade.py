@@ -183,6 +183,32 @@ def test_with_a_cache_one_sample_is_near_many_paths(diffuse):
     assert abs(cached.color.mean() / reference.mean() - 1.0) < 0.02
 
 
+def test_light_seen_from_one_side_is_shown_from_another(tmp_path):
+    checks = (
+        '<texture type="checkerboard" name="reflectance"><rgb name="color0" value="0.8, 0, 0"/>'
+        '<rgb name="color1" value="0.8"/><transform name="to_uv"><scale x="9" y="9"/></transform></texture>'
+    )
+    balls = {
+        "blend": MATERIALS["blend"],
+        "two sides": f'<bsdf type="twosided">{MATERIALS["blend"]}</bsdf>',
+        "checks": f'<bsdf type="diffuse">{checks}</bsdf>',
+        "principled": MATERIALS["principled"],
+    }
+    renderer = _opened(tmp_path, balls)
+    page, camera = _page(renderer, _camera(96, 72)), Camera(look_at((4, 1.8, 5), (0, 0.7, 0)), 36, 48, 36)
+    ours = _shaded(renderer, _opened_cache([page]), camera, 64)
+    reference = _traced(renderer, camera, 256)
+    item = find_geometry(renderer, camera).item.ravel()
+    ratios = {
+        name: ours.color[item == number].sum(axis=0) / reference.color[item == number].sum(axis=0)
+        for number, name in enumerate(renderer.describe().items, 1)
+        if name in balls
+    }
+    assert set(ratios) == set(balls)
+    # What the page does not see is traced; what it sees may not depend on from where.
+    assert {name: ratio for name, ratio in ratios.items() if np.abs(ratio - 1.0).max() > 0.04} == {}
+
+
 def test_a_page_knows_its_own_pixels(diffuse):
     renderer, pages = diffuse
     page = pages[0]
@@ -251,6 +277,18 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     assert is_floor.ravel()[last]
     is_same = shown.item == seen.item
     np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
+
+
+def test_rough_glass_shows_no_image(tmp_path):
+    balls = {"rough": MATERIALS["roughdielectric"], "glass": MATERIALS["thindielectric"]}
+    renderer, camera = _opened(tmp_path, balls), _camera()
+    seen = find_geometry(renderer, camera)
+    shown = VirtualImages(renderer).of(seen)
+    rough, glass = (seen.item == renderer.describe().items.index(name) + 1 for name in balls)
+    assert rough.sum() > 20
+    np.testing.assert_array_equal(shown.item[rough], seen.item[rough])
+    np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
+    assert (shown.item[glass] >= BEHIND).all()
 
 
 def test_what_moves_along_is_averaged(diffuse):

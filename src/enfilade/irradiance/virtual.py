@@ -49,13 +49,14 @@ class VirtualImages:
         path = chosen(path, path.lane)
         way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
         first = geometry.depth.ravel() * _lengths(geometry.camera)
-        item[pixels], normal[pixels] = BEHIND, 0.0
         count = len(pixels)  # of paths; what is added to have enough of them comes after
         for _ in range(LAYERS):
-            path, found, turned, distance, is_sharp = self._look_on(path)
-            lane = pixels[np.array(path.lane)[:count]]
-            item[lane], normal[lane] = np.array(found)[:count] + BEHIND, rows(turned)[:count]
-            way[lane] = np.minimum(way[lane] + np.array(distance)[:count] / first[lane], ENDLESS)
+            path, found, turned, distance, is_image, is_sharp = self._look_on(path)
+            shown = np.array(is_image)[:count]  # rough glass shows none: what is seen is its own surface
+            lane = pixels[np.array(path.lane)[:count][shown]]
+            item[lane], normal[lane] = np.array(found)[:count][shown] + BEHIND, rows(turned)[:count][shown]
+            far = np.array(distance)[:count][shown] / first[lane]
+            way[lane] = np.minimum(way[lane] + far, ENDLESS)
             going: Any = dr.compress(is_sharp)
             count = dr.width(going)
             if not count:
@@ -69,8 +70,12 @@ class VirtualImages:
             normal=np.ascontiguousarray(normal.reshape(*size, 3)),
         )
 
-    def _look_on_kernel(self, path: Path) -> tuple[Path, Any, Any, Any, Any]:
-        """Go through the surface that the rays meet, or be mirrored; and say what is met next."""
+    def _look_on_kernel(self, path: Path) -> tuple[Path, Any, Any, Any, Any, Any]:
+        """Go through the surface that the rays meet, or be mirrored; and say what is met next.
+
+        Also whether the one direction in which the surface sends the ray makes an image, and whether the
+        image is of a surface that may make another.
+        """
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
         scattered = self._renderer.scatter(lit, rng, Float(THROUGH))
@@ -81,8 +86,9 @@ class VirtualImages:
             is_sharp |= surfaces.surface == int(sharp)
         item = dr.select(surfaces.is_hit, surfaces.item, 0)
         normal = dr.select(surfaces.is_hit, surfaces.normal, 0.0)
-        is_sharp &= surfaces.is_hit & scattered.is_alive
-        return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_sharp)
+        is_image = scattered.is_alive & scattered.bounce.is_delta
+        is_sharp &= surfaces.is_hit & is_image
+        return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
 
 
 def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, Any]:

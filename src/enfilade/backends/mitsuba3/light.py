@@ -36,6 +36,10 @@ class Light:
         """Arrays that the materials' division reads."""
         return self._lobes.state
 
+    def albedo(self, seen: Any, material: Any, active: Any) -> Any:
+        """Albedo of the diffuse lobe, 0..1; 0 where there is none."""
+        return Array3f(self._lobes.albedo(seen, material, active))
+
     def emission(self, seen: Any, bounce: Bounce | None) -> Any:
         """Radiance that a hit, or the environment, sends back along the ray."""
         emitted = seen.emitter(self._scene).eval(seen)
@@ -78,14 +82,14 @@ class Light:
         seen, albedo = lit.native, lit.surfaces.albedo
         active = seen.is_valid() & (dr.max(albedo) > LEAST_ALBEDO)
         material = seen.bsdf()
-        direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active)
+        direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active, albedo)
         wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
         ray = seen.spawn_ray(seen.to_world(wo))
         return Scattered(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
             bounce=Bounce(Array3f(seen.p), pdf, Bool(False)),
             throughput=_divided(weight, albedo),
-            direct=_divided(direct, albedo),
+            direct=Array3f(direct),
             is_alive=Bool(active & (pdf > 0.0)),
         )
 
@@ -104,20 +108,30 @@ class Light:
             is_alive=Bool(lit.has_lobe & (pdf > 0.0)),
         )
 
-    def _sampled_lights(self, seen: Any, material: Any, evaluate: Any, rng: Any, active: Any) -> Any:
-        """Radiance that a lobe sends from one sampled point on the lights, weighted."""
+    def _sampled_lights(
+        self, seen: Any, material: Any, evaluate: Any, rng: Any, active: Any, albedo: Any = None
+    ) -> Any:
+        """Weighted radiance that a lobe, by its albedo if any, sends from one sampled point on the lights."""
         point = mi.Point2f(rng.next_float32(), rng.next_float32())
         light, radiance = self._scene.sample_emitter_direction(seen, point, True, active)
         active = active & (light.pdf != 0.0)
         value, pdf = evaluate(seen, material, seen.to_local(light.d), active)
+        if albedo is not None:
+            value = _divided(value, albedo)
         share = dr.select(light.delta, 1.0, _balance(light.pdf, pdf))
         return dr.select(active, value * radiance * share, 0.0)
 
 
-def _divided(received: Any, albedo: Any) -> Any:
-    """By the albedo, 0 where it is none; Array3f."""
-    channels = zip(Array3f(received), albedo, strict=True)
-    return Array3f(*(dr.select(a > LEAST_ALBEDO, r / dr.maximum(a, LEAST_ALBEDO), 0.0) for r, a in channels))
+def _divided(lobe: Any, albedo: Any) -> Any:
+    """A diffuse lobe by its albedo; in channels that have none, as in the one that has most: Array3f.
+
+    What light a red surface gets, its pale neighbours get, too: a channel that it swallows may not look dark.
+    """
+    channels = list(zip(Array3f(lobe), Array3f(albedo), strict=True))
+    most = dr.max(Array3f(albedo))
+    brightest = dr.select(most > LEAST_ALBEDO, dr.max(Array3f(lobe)) / dr.maximum(most, LEAST_ALBEDO), 0.0)
+    quotients = (dr.select(a > LEAST_ALBEDO, v / dr.maximum(a, LEAST_ALBEDO), brightest) for v, a in channels)
+    return Array3f(*quotients)
 
 
 def _balance(this: Any, other: Any) -> Any:

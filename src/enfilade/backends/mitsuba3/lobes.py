@@ -3,7 +3,8 @@
 Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when asked to. Some do not
 (``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
 diffuse lobe is Lambert's with their own albedo, and the rest is what the whole BSDF has beyond it, which may
-be negative.
+be negative. Some have a diffuse component and don't say its albedo (``blendbsdf`` answers for all of itself,
+seen from where it is): theirs is what the component sends straight ahead.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
+UNTOLD = ("BlendBSDF", "PolarizedPlastic")  # their albedo
 LEAST_ALBEDO = 1e-4  # below it the diffuse lobe counts as none
 
 
@@ -37,25 +39,43 @@ class Lobes:
         materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
         numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
         registry = [int(number[0]) for number in numbers]
-        is_undivided = np.zeros(max(registry, default=0) + 1, bool)
-        is_undivided[registry] = [_has_undivided(material) for material in materials]
-        self._is_undivided = Bool(is_undivided)
+        marks = np.zeros((2, max(registry, default=0) + 1), bool)
+        for mark, classes in zip(marks, (UNDIVIDED, UNTOLD), strict=True):
+            mark[registry] = [_has_any(material, classes) for material in materials]
+        self._is_undivided, self._is_untold = Bool(marks[0]), Bool(marks[1])
+        self._has_untold = bool(marks[1].any())
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._is_undivided
+        return self._is_undivided, self._is_untold
 
     def is_undivided(self, seen: Any, material: Any) -> Any:
         """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
         number: Any = dr.reinterpret_array(UInt, material)
         return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
 
+    def albedo(self, seen: Any, material: Any, active: Any) -> Any:
+        """Albedo of the diffuse lobe, 0..1: what light is multiplied with, and what the rest is without."""
+        # Of materials without a diffuse lobe Mitsuba would answer with their value straight ahead.
+        is_diffuse = active & has_lobe(material.flags(), "DiffuseReflection", "DiffuseTransmission")
+        if self._has_untold:
+            number: Any = dr.reinterpret_array(UInt, material)
+            untold = dr.gather(Bool, self._is_untold, number, is_diffuse)
+            ahead = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), seen.wi.z))
+            sent = dr.pi * material.eval(self._diffuse, seen, ahead, is_diffuse & untold)
+            told = material.eval_diffuse_reflectance(seen, is_diffuse & ~untold)
+            albedo = dr.select(untold, sent, told)
+        else:
+            albedo = material.eval_diffuse_reflectance(seen, is_diffuse)
+        parts = (albedo.x, albedo.y, albedo.z)
+        return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
+
     def eval_diffuse(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """Diffuse lobe times cosine, and its density, for a direction in the local frame."""
         undivided = self.is_undivided(seen, material)
         own, own_pdf = material.eval_pdf(self._diffuse, seen, wo, active & ~undivided)
-        lambert, lambert_pdf = _lambert(seen, material, wo, active & undivided)
+        lambert, lambert_pdf = self._lambert(seen, material, wo, active & undivided)
         return dr.select(undivided, lambert, own), dr.select(undivided, lambert_pdf, own_pdf)
 
     def sample_diffuse(self, seen: Any, material: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
@@ -64,7 +84,7 @@ class Lobes:
         second, first = mi.Point2f(rng.next_float32(), rng.next_float32()), rng.next_float32()
         own, weight = material.sample(self._diffuse, seen, first, second, active & ~undivided)
         up = _cosine(seen, second)
-        albedo = diffuse_reflectance(seen, material, active & undivided)
+        albedo = self.albedo(seen, material, active & undivided)
         wo = dr.select(undivided, up, own.wo)
         pdf = dr.select(undivided, dr.abs(up.z) / dr.pi, own.pdf)
         return wo, pdf, dr.select(undivided, albedo, weight)
@@ -82,13 +102,14 @@ class Lobes:
         """Direction, density, weight, and whether the direction is the only one (a delta lobe).
 
         What a whole BSDF has beyond Lambert's lobe is sampled by both in turn: where only the one or the
-        other is large, the weight stays bounded.
+        other is large, the weight stays bounded. Who makes the choice of the lobe, 0..1, gets a direction
+        of it, and no weight.
         """
         undivided = self.is_undivided(seen, material)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-        if choice is not None:
-            first = choice
         is_turn = rng.next_float32() < 0.5
+        if choice is not None:
+            first, is_turn = choice, Bool(True)
         own, weight = material.sample(self._rest, seen, first, second, ~undivided)
         whole, whole_weight = material.sample(self._all, seen, first, second, undivided)
         kind = dr.select(undivided, whole.sampled_type, own.sampled_type)
@@ -107,25 +128,19 @@ class Lobes:
     def _beyond(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """What a whole BSDF has beyond Lambert's lobe, and the mean density of sampling the two."""
         whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active)
-        lambert, lambert_pdf = _lambert(seen, material, wo, active)
+        lambert, lambert_pdf = self._lambert(seen, material, wo, active)
         return whole - lambert, 0.5 * (whole_pdf + lambert_pdf)
 
+    def _lambert(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        is_reflected = wo.z * seen.wi.z > 0.0
+        pdf = dr.select(is_reflected, dr.abs(wo.z) / dr.pi, 0.0)
+        return self.albedo(seen, material, active) * pdf, pdf
 
-def _has_undivided(material: Any) -> bool:
-    """Whether a material, or one nested in it, does not divide itself."""
+
+def _has_any(material: Any, classes: tuple[str, ...]) -> bool:
+    """Whether a material, or one nested in it, is of some classes."""
     nodes = mi.traverse(material).hierarchy
-    return any(isinstance(n, mi.BSDF) and n.class_name() in UNDIVIDED for n in nodes)
-
-
-def diffuse_reflectance(seen: Any, material: Any, active: Any) -> Any:
-    """Albedo of the diffuse lobe, 0..1: what the light is multiplied with and what the rest is without.
-
-    Of materials without a diffuse lobe Mitsuba would answer with their value straight ahead.
-    """
-    is_diffuse = active & has_lobe(material.flags(), "DiffuseReflection", "DiffuseTransmission")
-    albedo = material.eval_diffuse_reflectance(seen, is_diffuse)
-    channels = (albedo.x, albedo.y, albedo.z)
-    return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in channels))
+    return any(isinstance(n, mi.BSDF) and n.class_name() in classes for n in nodes)
 
 
 def has_lobe(flags: Any, *lobes: str) -> Any:
@@ -137,9 +152,3 @@ def _cosine(seen: Any, square: Any) -> Any:
     """Direction on the side from which a surface is seen, as likely as its cosine."""
     up = mi.warp.square_to_cosine_hemisphere(square)
     return mi.Vector3f(up.x, up.y, dr.copysign(up.z, seen.wi.z))
-
-
-def _lambert(seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-    is_reflected = wo.z * seen.wi.z > 0.0
-    pdf = dr.select(is_reflected, dr.abs(wo.z) / dr.pi, 0.0)
-    return diffuse_reflectance(seen, material, active) * pdf, pdf
