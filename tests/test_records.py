@@ -144,3 +144,4 @@ def test_neighbours_and_rest_end_at_a_cut():
     assert path.neighbours(3) == (None, other)
     assert path.neighbours(5) == (other, None)
     assert [path.original(frame) for frame in range(6)] == [0, 1, 1, 3, 3, 5]
+    assert [path.place(frame) for frame in range(6)] == [0, 1, 1, 2, 2, 3]

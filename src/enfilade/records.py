@@ -6,6 +6,7 @@ values, never a NaN.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -135,6 +136,15 @@ class CameraPath:
             rests = frame > 0 and frame not in self.cuts and camera.is_same_view(self.cameras[frame - 1])
             found.append(found[-1] if rests else frame)
         return found
+
+    def place(self, frame: int) -> int:
+        """How many other views come before a frame's: how far it is along the path, rests left out."""
+        return self._places[frame]
+
+    @cached_property
+    def _places(self) -> list[int]:
+        moves = [int(original == frame) for frame, original in enumerate(self._originals)]
+        return [place - 1 for place in itertools.accumulate(moves)]
 
     def middle(self, segment: Segment) -> int | None:
         """The in-between that stands for a segment (§4.3): the middle one of those that move."""

@@ -403,6 +403,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         ('<integrator type="volpath"/>', DIFFUSE, ""),
         ("", DIFFUSE, ""),
         ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
+        ('<integrator type="path"><integer name="max_depth" value="3"/></integrator>', DIFFUSE, "3 edges"),
         (HIDDEN.format("path"), DIFFUSE, "hides"),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "media"),
     ],

@@ -2,13 +2,15 @@
 
 import pytest
 
+from enfilade.camera import Camera, look_at
 from enfilade.errors import SettingsError
 from enfilade.monitor import Silence
 from enfilade.pipeline import rehearsal
+from enfilade.pipeline.kept import nearest
 from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.plan import plan
-from enfilade.pipeline.rehearsal import forecast_decoupled
-from enfilade.records import Segment
+from enfilade.pipeline.rehearsal import excerpt_of, forecast_decoupled
+from enfilade.records import CameraPath, Segment
 from enfilade.store import Run
 from scenes_analytic import room_walk, slide, wall
 from small_runs import job_of
@@ -23,6 +25,19 @@ def test_too_few_paths_to_know_their_noise_are_refused(tmp_path):
         plan(job, Silence())
 
 
+def test_a_rest_is_not_rehearsed():
+    def at(x):
+        return Camera(look_at((x, 0, 1), (x, 0, 0)), 50.0, 64, 48)
+
+    cameras = (at(0), at(1), at(2), *[at(3)] * 40, *(at(x) for x in range(4, 12)))
+    path = CameraPath(cameras, tuple(range(1, len(cameras) + 1)), 30.0)
+    assert excerpt_of(path, Segment(3, 44)).numbers == (4, 44, 45)
+    # From the keyframe at which the rest begins, the nearest on the path.
+    keyframes = [0, 3, 44, 47, 50]
+    assert nearest(path, keyframes, 40, 2) == [3, 44]
+    assert nearest(path, keyframes, 42, 3) == [3, 44, 0]
+
+
 def rehearse(job, folder, _monitor):
     """Stands for a render of five frames of a shot that begins and ends with a keyframe."""
     assert len(job.path) == 5
@@ -34,7 +49,8 @@ def rehearse(job, folder, _monitor):
         *((f"cells {n}", 3.0, {}) for n in (1, 5)),
         ("pilot 5", 7.0, {"frame": 5, "jnd": JND, "paths": paths, "rays": {"drafts": 8 * PIXELS}}),
         *((f"keyframe {n}", 11.0, {"frame": n, "rays": light}) for n in (1, 5)),
-        ("light 1-5", 13.0, {}),
+        ("keyframe 3", 0.5, {"frame": 3}),
+        ("light 1-5", 13.0, {"fills": [3]}),
         *((f"raw {n}", 17.0, {}) for n in range(1, 6)),
         *((f"frame {n}", 19.0, {"rays": {"camera": 4 * PIXELS}, "frame": n}) for n in range(1, 6)),
         ("video", 5.0, {}),
@@ -58,6 +74,7 @@ def test_a_rehearsed_segment_is_multiplied_shot_by_shot(tmp_path, monkeypatch):
     cpu_s = {
         "survey and video": 4 * (5.0 + 5.0),
         "keyframes": 10 * (2.0 + 3.0 + 11.0 * mean / 128),
+        "fills": 8 * 0.5 * mean / 128,
         "pilots": 2 * 7.0,
         "segments": 8 * 13.0,
         "frames": 20 * (17.0 + 19.0),

@@ -58,7 +58,7 @@ class Drafts:
 
     def cells(self, frame: int) -> Cells | None:
         """What is known of surfaces that no draft near a frame sees."""
-        near = sorted(nearest(self._keyframes, frame, SCOUTS))
+        near = sorted(nearest(self._workshop.job.path, self._keyframes, frame, SCOUTS))
         if self._cells[0] != near:
             self._cells = near, Estimates.joined([self.scout(k) for k in near]).opened()
         return self._cells[1]
@@ -72,7 +72,7 @@ class Drafts:
         return self._traced.made(frame, lambda: self._read_or_trace(frame))
 
     def _pages(self, frame: int) -> LightCache:
-        near = nearest(self._keyframes, frame, PAGES)
+        near = nearest(self._workshop.job.path, self._keyframes, frame, PAGES)
         pages = [self._page(keyframe) for keyframe in near]
         # Always as many, so that the kernels which look them up are recorded once.
         missing = PAGES - len(pages)
@@ -82,7 +82,7 @@ class Drafts:
         return self._pooled.made(frame, lambda: self._pool(frame))
 
     def _pool(self, frame: int) -> Page:
-        around = sorted(nearest(self._keyframes, frame, 2 * POOL + 1))
+        around = sorted(nearest(self._workshop.job.path, self._keyframes, frame, 2 * POOL + 1))
         return pooled(self.trace(frame), [self._open(keyframe) for keyframe in around])
 
     def _open(self, frame: int) -> Page:

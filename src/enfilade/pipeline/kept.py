@@ -6,6 +6,8 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import TypeVar
 
+from enfilade.records import CameraPath
+
 __all__ = ["Kept", "nearest"]
 
 T = TypeVar("T")
@@ -35,9 +37,10 @@ class Kept(OrderedDict[int, T]):
         return self[frame]
 
 
-def nearest(frames: list[int], frame: int, count: int) -> list[int]:
-    """The so many of some frames that are nearest to one, nearest first."""
-    return sorted(frames, key=lambda k: (abs(k - frame), k))[:count]
+def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list[int]:
+    """The so many of some frames of a path that are nearest to one, nearest first; rests take no way."""
+    here = path.place(frame)
+    return sorted(frames, key=lambda k: (abs(path.place(k) - here), k))[:count]
 
 
 def either_side(fills: list[int], frame: int) -> list[int]:

@@ -55,7 +55,8 @@ class LightTable:
     """
 
     def __init__(self, workshop: Workshop, segments: list[Segment]) -> None:
-        first = workshop.job.path.cameras[segments[0].first]
+        self._path = workshop.job.path
+        first = self._path.cameras[segments[0].first]
         self.shader = workshop.shader(1.0 / first.focal_px)
         self._workshop = workshop
         self.segments = segments
@@ -87,10 +88,11 @@ class LightTable:
         Pages are weighted so that none comes or goes abruptly.
         """
         settings = self._workshop.job.settings.light
-        frames = [*nearest(self.keyframes, frame, settings.keyframes)]
+        frames = [*nearest(self._path, self.keyframes, frame, settings.keyframes)]
         frames += either_side(self._fills_at(frame), frame)
         pages = [self._page(f) for f in frames]
-        shares = [max(1.0 - abs(f - frame) / (REACH * self._spacing), LEAST_SHARE) for f in frames]
+        reach, here = REACH * self._spacing, self._path.place(frame)
+        shares = [max(1.0 - abs(self._path.place(f) - here) / reach, LEAST_SHARE) for f in frames]
         view = seen_from(self._workshop.views[frame].geometry, pages, shares)
         # Always as many pages, so that the kernels which look them up are recorded once.
         missing = settings.keyframes + FILLS - len(pages)
@@ -116,18 +118,19 @@ class LightTable:
 
     @property
     def _spacing(self) -> float:
-        return max((self.keyframes[-1] - self.keyframes[0]) / max(len(self.keyframes) - 1, 1), 1.0)
+        way = self._path.place(self.keyframes[-1]) - self._path.place(self.keyframes[0])
+        return max(way / max(len(self.keyframes) - 1, 1), 1.0)
 
     def _frame(self, number: int) -> int:
         return self._workshop.job.path.numbers.index(number)
 
     def _filled(self, first: int, last: int, fills: list[int]) -> list[int]:
-        """Halve a stretch of frames until nothing new comes into view; returns the frames that fill holes.
+        """Halve a stretch of views until nothing new comes into view; returns the frames that fill holes.
 
         A page that fills holes knows all that the keyframes don't, so that the two around a frame do.
         """
-        middle = (first + last) // 2
-        if middle == first or self._holes(middle, either_side(fills, middle)).mean() < LEAST_HOLES:
+        middle = self._path.middle(Segment(first, last))
+        if middle is None or self._holes(middle, either_side(fills, middle)).mean() < LEAST_HOLES:
             return fills
         self._trace(middle, self._holes(middle, []))
         fills = sorted([*fills, middle])
@@ -136,7 +139,7 @@ class LightTable:
     def _holes(self, frame: int, fills: list[int]) -> Mask:
         """Pixels whose light is known neither to the keyframes nor to pages that fill holes."""
         geometry = self._workshop.views[frame].geometry
-        frames = nearest(self.keyframes, frame, self._workshop.job.settings.light.keyframes)
+        frames = nearest(self._path, self.keyframes, frame, self._workshop.job.settings.light.keyframes)
         return geometry.has_light & ~known(geometry, [self._open(f) for f in (*frames, *fills)])
 
     def _page(self, frame: int) -> Page:
@@ -144,8 +147,8 @@ class LightTable:
         return self._pooled.made(frame, lambda: self._pool(frame))
 
     def _pool(self, frame: int) -> Page:
-        around = nearest(self.keyframes, frame, 2 * POOL + 1)
-        around += nearest(sorted(set().union(*self._fills.values())), frame, 2 * POOL + 1)
+        around = nearest(self._path, self.keyframes, frame, 2 * POOL + 1)
+        around += nearest(self._path, sorted(set().union(*self._fills.values())), frame, 2 * POOL + 1)
         with self._workshop.costs.of("pool"):
             pages = [self._open(f) for f in sorted({*around, frame})]
             page = self._trace(frame)

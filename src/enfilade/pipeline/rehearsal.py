@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ __all__ = ["excerpt_of", "forecast_decoupled"]
 
 PIXELS = 100_000  # of a rehearsed frame: a larger one is made smaller
 KEYFRAMES = ("draft", "cells", "keyframe")  # units of a keyframe
+FILL = "fill"  # the page of a frame that fills holes: in the ledger a "keyframe", too
 FRAMES = ("raw", "frame")  # ... and of a frame; that of an initial segment is "light"
 
 
@@ -56,7 +57,7 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
         of a keyframe's pixel, the mean over all keyframes. ``rehearsed_frames``, ``rehearsed_size``.
     """
     segments = [segment for shot in shots for segment in shot]
-    segment = max(segments, key=lambda s: (s.last - s.first, -abs(s.first + s.last - len(job.path))))
+    segment = max(segments, key=lambda s: (_views(job.path, s), -abs(s.first + s.last - len(job.path))))
     small = _smaller(job, segment)
     count = len(small.path)
     monitor.stage("rehearsal", count)
@@ -72,6 +73,7 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
         **dict.fromkeys(FRAMES, frames),
         **dict.fromkeys(KEYFRAMES, all_keyframes),
         "keyframe": all_keyframes * more,
+        FILL: len(segments) * len(_fills(lines)) * more,  # as many in each as in this one
         "light": len(segments),
         "pilot": len(shots),
     }
@@ -110,12 +112,16 @@ def _rehearsed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def excerpt_of(path: CameraPath, segment: Segment) -> CameraPath:
-    """A segment of a path, at a size that does not take long."""
+    """A segment of a path without its rests, at a size that does not take long."""
     scale = min(math.sqrt(PIXELS / (path.width * path.height)), 1.0)
     width, height = (max(round(scale * n), 1) for n in (path.width, path.height))
-    span = slice(segment.first, segment.last + 1)
-    cameras = tuple(replace(camera, width=width, height=height) for camera in path.cameras[span])
-    return CameraPath(cameras, path.numbers[span], path.fps, frozenset())
+    span = [f for f in range(segment.first, segment.last + 1) if path.original(f) == f or f == segment.first]
+    cameras = tuple(replace(path.cameras[f], width=width, height=height) for f in span)
+    return CameraPath(cameras, tuple(path.numbers[f] for f in span), path.fps, frozenset())
+
+
+def _views(path: CameraPath, segment: Segment) -> int:
+    return path.place(segment.last) - path.place(segment.first)
 
 
 def _paths(jnd: float, job: Job, keyframes: list[int]) -> float:
@@ -124,16 +130,22 @@ def _paths(jnd: float, job: Job, keyframes: list[int]) -> float:
     return sum(n * count for n, count in zip(paths, keyframes, strict=True)) / sum(keyframes)
 
 
-def _multiplied(lines: Iterable[Mapping[str, Any]], times: Mapping[str, float], other_times: float) -> _Spent:
+def _fills(lines: Sequence[Mapping[str, Any]]) -> set[str]:
+    """Units that filled holes between keyframes."""
+    return {f"keyframe {number}" for line in lines for number in line.get("fills", ())}
+
+
+def _multiplied(lines: Sequence[Mapping[str, Any]], times: Mapping[str, float], other_times: float) -> _Spent:
     """What a whole path takes, by the ledger of one segment, and how often the path has a unit of each kind.
 
     Of units of a kind the one in the middle counts, so that kernels that were compiled for the first do not.
     """
     by_kind: dict[str, list[_Spent]] = defaultdict(list)
+    fills = _fills(lines)
     for line in lines:
         costs = line.get("cost", {}).values()
         spent = _Spent(sum(c["wall_s"] for c in costs), sum(c["cpu_s"] for c in costs))
-        by_kind[line["unit"].split()[0]].append(spent)
+        by_kind[FILL if line["unit"] in fills else line["unit"].split()[0]].append(spent)
     total = _Spent()
     for kind, units in by_kind.items():
         middle = sorted(units, key=lambda spent: spent.cpu_s)[(len(units) - 1) // 2]

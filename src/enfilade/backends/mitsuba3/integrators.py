@@ -8,6 +8,7 @@ from typing import Any
 import mitsuba as mi
 
 from enfilade.errors import SceneError
+from enfilade.renderer import MOST_EDGES
 
 PATHS = {  # Mitsuba's classes that follow paths from the camera to their end; their plugins
     "PathIntegrator": "path",
@@ -57,6 +58,9 @@ def why_undivided(scene: Any, integrator: Any) -> str:
         return f"its integrator is {integrator.class_name()}, not a path tracer"
     if integrator.hide_emitters:
         return "its integrator hides the emitters"
+    longest, _ = _limits(integrator)
+    if longest < MOST_EDGES:
+        return f"its paths end after {longest} edges, fewer than {MOST_EDGES}"
     if any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
         return "there are media in it"
     return ""
