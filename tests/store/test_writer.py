@@ -1,10 +1,22 @@
 """Who writes in a run folder is told without touching the lock."""
 
+import errno
 import json
 import os
 import socket
 
-from enfilade.store.lock import LOCK_NAME, Lock, writers_of
+import pytest
+
+from enfilade.errors import RunFolderError
+from enfilade.store.lock import LOCK_NAME, Lock, sign_workers, writers_of
+
+GONE = {"host": "another", "pid": 7, "started": "2026-01-01T00:00:00+00:00"}
+
+
+@pytest.fixture
+def shared(tmp_path):
+    (tmp_path / "parts").mkdir()
+    return tmp_path
 
 
 def test_the_holder_is_named_until_it_lets_go(tmp_path):
@@ -27,3 +39,41 @@ def test_what_cannot_be_read_names_nobody(tmp_path):
     for text in ("", "[]", '{"pid": "x"}', "{"):
         (tmp_path / LOCK_NAME).write_text(text)
         assert writers_of(tmp_path) == []
+
+
+def test_who_shares_a_run_is_named_and_who_had_it_before_is_not(shared):
+    (shared / LOCK_NAME).write_text(json.dumps(GONE))
+    one, two = Lock(shared, part="one"), Lock(shared, part="two")
+    sign_workers(shared, 3)
+    assert (shared / LOCK_NAME).read_text() == ""
+    assert [(w["host"], w["pid"]) for w in writers_of(shared)] == [(socket.gethostname(), os.getpid())] * 2
+    assert [w["workers"] for w in writers_of(shared)] == [3, 1]
+    with pytest.raises(RunFolderError, match=rf"process {os.getpid()} on .*; process {os.getpid()} on "):
+        Lock(shared)
+    one.release()
+    two.release()
+    assert writers_of(shared) == []
+
+
+def test_a_part_that_was_killed_elsewhere_is_not_named_beside_who_has_the_folder_to_itself(shared):
+    (shared / "parts" / "one.lock").write_text(json.dumps(GONE))
+    assert [w["pid"] for w in writers_of(shared)] == [7]
+    lock = Lock(shared)
+    assert [w["pid"] for w in writers_of(shared)] == [os.getpid()]
+    with pytest.raises(RunFolderError, match=f"{shared}: process {os.getpid()} on [^;]*; wait"):
+        Lock(shared, part="two")
+    lock.release()
+
+
+def test_a_full_disk_leaves_a_lock_without_a_name(tmp_path, monkeypatch):
+    def full(*_arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / LOCK_NAME).write_text(json.dumps(GONE))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pwrite", full)
+        lock = Lock(tmp_path)
+    assert (tmp_path / LOCK_NAME).read_text() == ""
+    with pytest.raises(RunFolderError, match="hasn't given its name"):
+        Lock(tmp_path)
+    lock.release()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
 import socket
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ __all__ = ["LOCK_NAME", "Lock", "sign_workers", "writers_of"]
 
 LOCK_NAME = "run.lock"
 PART_LOCKS = "parts/*.lock"
+SHOWN = 3  # holders named in a message
 
 
 class Lock:
@@ -33,6 +36,10 @@ class Lock:
         Name of a share of the run: those who share it keep away who wants the folder to itself, and others
         of the same name. None: the folder to itself.
 
+    Attributes
+    ----------
+    is_shared : bool
+
     Raises
     ------
     RunFolderError
@@ -40,17 +47,19 @@ class Lock:
     """
 
     def __init__(self, folder: Path, *, part: str | None = None) -> None:
+        self.is_shared = part is not None
         self._own = self._shared = -1
         try:
-            if part is not None:
+            if part is None:
+                self._own = _locked(folder / LOCK_NAME, fcntl.LOCK_EX)
+            else:
                 self._shared = _locked(folder / LOCK_NAME, fcntl.LOCK_SH)
-            self._own = _locked(folder / (LOCK_NAME if part is None else f"parts/{part}.lock"), fcntl.LOCK_EX)
+                os.ftruncate(self._shared, 0)  # who had the folder to itself has gone
+                self._own = _locked(folder / f"parts/{part}.lock", fcntl.LOCK_EX)
+            _sign(self._own)
         except BaseException:
             self.release()
             raise
-        for handle in (self._shared, self._own):
-            if handle >= 0:
-                _sign(handle)
 
     def release(self) -> None:
         """Let others write. A second call does nothing."""
@@ -73,12 +82,11 @@ def _locked(file: Path, kind: int) -> int:
     try:
         fcntl.flock(handle, kind | fcntl.LOCK_NB)
     except OSError as error:
-        holder = _holder(handle)
         os.close(handle)
         if not isinstance(error, BlockingIOError):
             raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
         raise RunFolderError(
-            f"another command is writing {file.parent}: {holder}; wait for it, stop it, "
+            f"another command is writing {file.parent}: {_holders(file)}; wait for it, stop it, "
             "or choose another --out"
         ) from error
     return handle
@@ -98,15 +106,7 @@ def writers_of(folder: Path) -> list[dict[str, Any]]:
         of this host that has gone writes no more; whether one of another host still lives can't be seen
         from here.
     """
-    found: dict[tuple[str, int], dict[str, Any]] = {}
-    for file in _locks(folder):
-        name = _signature(file)
-        if name is None or (
-            name["host"] == socket.gethostname() and not Path(f"/proc/{name['pid']}").exists()
-        ):
-            continue
-        found.setdefault((name["host"], name["pid"]), name)  # who shares a run signs two locks
-    return list(found.values())
+    return _living([folder / LOCK_NAME]) or _living(_part_locks(folder))
 
 
 def sign_workers(folder: Path, workers: int) -> None:
@@ -117,16 +117,23 @@ def sign_workers(folder: Path, workers: int) -> None:
     folder
     workers
     """
-    for file in _locks(folder):
+    for file in (*_part_locks(folder), folder / LOCK_NAME):
         name = _signature(file)
         if name is not None and (name["host"], name["pid"]) == (socket.gethostname(), os.getpid()):
-            with file.open("r+b") as stream:
+            with contextlib.suppress(OSError), file.open("r+b") as stream:  # the name is only to be read
                 _write(stream.fileno(), {**name, "workers": workers})
             return
 
 
-def _locks(folder: Path) -> list[Path]:
-    return [*sorted(folder.glob(PART_LOCKS)), folder / LOCK_NAME]
+def _living(locks: Iterable[Path]) -> list[dict[str, Any]]:
+    """Names that stand in locks, but for those of this host that are known to be gone."""
+    names = [name for name in map(_signature, locks) if name is not None]
+    here = socket.gethostname()
+    return [name for name in names if name["host"] != here or Path(f"/proc/{name['pid']}").exists()]
+
+
+def _part_locks(folder: Path) -> list[Path]:
+    return sorted(folder.glob(PART_LOCKS))
 
 
 def _signature(file: Path) -> dict[str, Any] | None:
@@ -138,7 +145,7 @@ def _signature(file: Path) -> dict[str, Any] | None:
             "started": str(name["started"]),
             "workers": int(name.get("workers", 1)),
         }
-    except (OSError, ValueError, KeyError, TypeError, OverflowError):  # it is just signing, or has gone
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):  # it is empty, or just being written
         return None
 
 
@@ -152,13 +159,18 @@ def _sign(handle: int) -> None:
 
 
 def _write(handle: int, name: dict[str, Any]) -> None:
-    os.ftruncate(handle, 0)
-    os.pwrite(handle, json.dumps(name).encode() + b"\n", 0)
+    data = json.dumps(name).encode() + b"\n"
+    size = 0
+    with contextlib.suppress(OSError):  # a full disk: the name is only to be read
+        size = os.pwrite(handle, data, 0)
+    os.ftruncate(handle, size)
 
 
-def _holder(handle: int) -> str:
-    try:
-        name = json.loads(os.pread(handle, 4096, 0))
-        return f"process {name['pid']} on {name['host']}, since {name['started']}"
-    except (OSError, ValueError, KeyError, TypeError):  # it is just signing, or has gone
+def _holders(file: Path) -> str:
+    name = _signature(file)
+    names = _living(_part_locks(file.parent)) if name is None else [name]
+    if not names:  # they are just signing, or have gone
         return "a process that hasn't given its name"
+    shown = [f"process {name['pid']} on {name['host']}, since {name['started']}" for name in names[:SHOWN]]
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return f"{'; '.join(shown)}{more}"

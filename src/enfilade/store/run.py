@@ -161,6 +161,11 @@ class Run:
             lock.release()
             raise
 
+    @property
+    def is_sole_writer(self) -> bool:
+        """Whether it was opened to write in it, and no other command may."""
+        return self._lock is not None and not self._lock.is_shared
+
     def refresh(self) -> None:
         """Read what other processes have finished since."""
         self._ledger.read_on(self.folder / LEDGER_FILE, *_parts(self.folder))
