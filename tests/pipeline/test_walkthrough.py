@@ -13,8 +13,9 @@ from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sph
 from enfilade.codec import read_exr
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.monitor import Silence
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.plan import plan
-from enfilade.pipeline.walkthrough import kept
+from enfilade.pipeline.walkthrough import kept, prepare
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import CameraPath, Source, SurfaceClass
 from keyframes_analytic import psnr
@@ -404,3 +405,13 @@ def test_where_the_camera_rests_the_image_is_antialiased(tmp_path):
     truth = colors(rendered(tmp_path, reference, "reference")[1])
     scores = [psnr(a, b) for a, b in zip(colors(folder), truth, strict=True)]
     assert min(scores[9:16]) > max(scores[2:5]) + 3
+
+
+def test_a_scene_is_tried_before_its_run_begins_also_where_its_folder_is_there(tmp_path, monkeypatch):
+    tried = []
+    monkeypatch.setattr(Job, "check_scene", lambda _, *, is_tried=False: tried.append(is_tried))
+    (tmp_path / "run").mkdir()
+    job = job_of(tmp_path, room(), PATH)
+    prepare(job, tmp_path / "run", is_tried=True)
+    prepare(job, tmp_path / "run", is_tried=True)
+    assert tried == [False, True, False]

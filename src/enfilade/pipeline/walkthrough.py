@@ -14,6 +14,7 @@ from enfilade.pipeline.job import JOB_FILE, Job
 from enfilade.pipeline.summary import summarize
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
+from enfilade.store.identity import RUN_FILE
 from enfilade.video import check_encodable
 
 METHODS = ("decoupled", "paper", "reference")
@@ -151,7 +152,7 @@ def _verify(run: Run, monitor: Monitor) -> None:
 
 def _try(job: Job, folder: Path) -> None:
     """Let a process of its own load the scene of a run that is not begun yet."""
-    if not folder.exists():
+    if not (folder / RUN_FILE).exists():
         job.check_scene(is_tried=True)
 
 
