@@ -30,18 +30,20 @@ def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
     Raises
     ------
     RunFolderError
+        Also where this host would render otherwise.
     DeviceError
     """
     activate("gpu" if spec["device"] == "cuda" else "cpu")
     load().set_thread_count(spec["threads"] or len(os.sched_getaffinity(0)))
-    from enfilade.pipeline.job import read_job
+    from enfilade.pipeline.job import check_identity, read_job
     from enfilade.pipeline.worker import Worker, smaller
     from enfilade.store import Run
 
     folder = Path(spec["folder"])
-    job = smaller(read_job(folder), spec["share"])
+    job = read_job(folder)
     run = Run.joining(folder, lambda line: tell("line", line))
-    return Worker(job, run, _Distant(tell)).do
+    check_identity(job, run)
+    return Worker(smaller(job, spec["share"]), run, _Distant(tell)).do
 
 
 class _Distant:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from enfilade.errors import CameraPathError, RunFolderError, SettingsError
 from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings, TraceSettings
+from enfilade.store import Run
 from enfilade.viewing import Viewing
 
 ANALYTIC_SUFFIX = ".analytic.json"
@@ -188,6 +190,21 @@ def read_job(folder: Path) -> Job:
         raise RunFolderError(
             f"{folder / JOB_FILE} is damaged ({error}); run the command that made the run again"
         ) from error
+
+
+def check_identity(job: Job, run: Run) -> None:
+    """Refuse to work on a run with another scene, or on a host that would render otherwise.
+
+    Raises
+    ------
+    RunFolderError
+    """
+    if job.identity() != run.identity:
+        raise RunFolderError(
+            f"{run.folder}: on {socket.gethostname()}, the scene, the device, or the version of enfilade, "
+            "Mitsuba or the denoiser is not the one with which the run began; "
+            "`enfilade render` says what differs"
+        )
 
 
 def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
+from enfilade.errors import SettingsError, UnfinishedError
 from enfilade.executors import Unit
 from enfilade.monitor import Monitor
 from enfilade.pipeline.crew import Crew, carry_out
-from enfilade.pipeline.job import Job, read_job
+from enfilade.pipeline.job import Job, check_identity, read_job
 from enfilade.pipeline.units import STEPS, Blueprint, Step, place_of
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
@@ -57,7 +57,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
     Raises
     ------
     RunFolderError
-        It holds no run, one command has it to itself, or the scene is not what it was.
+        It holds no run, one command has it to itself, or this host would render otherwise.
     SettingsError
         There is no such step.
     UnfinishedError
@@ -69,11 +69,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
     with Run.sharing(folder, f"{share.step}-{share.number}-of-{share.count}") as run:
         for note in run.notes:
             monitor.say(note)
-        if run.identity != job.identity():
-            raise RunFolderError(
-                f"{folder}: the scene or this version of enfilade is not the one with which the run began; "
-                "`enfilade render` says what differs"
-            )
+        check_identity(job, run)
         _check_begun(run, job, step)
 
         def is_wanted(unit: Unit) -> bool:
