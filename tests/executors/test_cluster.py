@@ -5,11 +5,13 @@ import importlib.util
 import json
 import subprocess
 import sys
+from contextlib import closing
+from types import SimpleNamespace
 
 import pytest
 
 from enfilade.errors import EnfiladeError
-from enfilade.executors import Recipe, open_executor
+from enfilade.executors import FailureKind, Graph, Recipe, Unit, cluster, open_executor, supervise
 from enfilade.monitor import Silence
 from enfilade.pipeline.job import read_job
 from enfilade.pipeline.walkthrough import prepare, render
@@ -54,8 +56,6 @@ def test_without_ray_it_says_how_to_get_it(tmp_path, monkeypatch):
 
 
 def test_what_travels_to_a_cluster_is_json():
-    from enfilade.executors import cluster
-
     cluster.KEPT.clear()
     recipe = json.dumps({"target": "toy_worker:open_toy", "spec": {"folder": "/nowhere", "refuses": True}})
     order = json.dumps({"kind": "fine", "facts": {"name": "a"}, "share": 1})
@@ -63,11 +63,72 @@ def test_what_travels_to_a_cluster_is_json():
     assert (what, value["type"], value["message"]) == ("failed", "SettingsError", "no such scene")
 
 
-def test_what_another_try_may_mend_is_raised_for_ray(tmp_path):
-    from enfilade.executors import cluster
-
+def test_what_another_try_may_mend_is_for_the_supervisor(tmp_path):
     recipe = json.dumps({"target": "toy_worker:open_toy", "spec": {"folder": str(tmp_path)}})
     order = json.dumps({"kind": "raises", "facts": {"name": "a", "times": 1}, "share": 1})
-    with pytest.raises(ZeroDivisionError):
-        cluster.do_unit(recipe, order)
+    [[what, value]] = json.loads(cluster.do_unit(recipe, order))
+    assert (what, value["kind"], value["text"]) == ("failed", "error", "ZeroDivisionError: by nought")
+    assert "Traceback" in value["log"]
     assert json.loads(cluster.do_unit(recipe, order)) == [["line", {"unit": "a"}]]
+
+
+class RayError(Exception):
+    pass
+
+
+class OutOfMemoryError(RayError):
+    pass
+
+
+class Ray:
+    """Stands for Ray: does a task when it is asked for, or loses its worker."""
+
+    exceptions = SimpleNamespace(RayError=RayError, OutOfMemoryError=OutOfMemoryError)
+
+    def __init__(self, *lost):
+        self.lost, self.options = list(lost), {}
+
+    def init(self, **_where):
+        pass
+
+    def shutdown(self):
+        pass
+
+    def cluster_resources(self):
+        return {"CPU": 1}
+
+    def remote(self, **options):
+        self.options = options
+        return lambda do: SimpleNamespace(remote=lambda *given: (do, given))
+
+    def wait(self, references, **_how):
+        return references[:1], references[1:]
+
+    def get(self, reference):
+        if self.lost:
+            raise self.lost.pop(0)
+        do, given = reference
+        return do(*given)
+
+
+def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tmp_path, monkeypatch):
+    ray = Ray(OutOfMemoryError("killed"), RayError("its node died"))
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
+    graph, kinds = Graph(), []
+    graph.add(Unit("a", "starves", {"name": "a", "times": 1}))
+    recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path)})
+    with closing(open_executor("ray", recipe, lambda *_: None, workers=1, logs=tmp_path)) as executor:
+        ending = supervise(
+            graph,
+            executor,
+            follow=lambda _: (),
+            is_done=lambda _: (tmp_path / "a").exists(),
+            failed=lambda _, failures: kinds.append(failures[-1].kind),
+        )
+    assert ray.options["max_retries"] == 0
+    assert "retry_exceptions" not in ray.options
+    assert not ending.aside
+    assert kinds == [FailureKind.MEMORY, FailureKind.DIED, FailureKind.MEMORY]
+    shares = [line.split()[0] for line in (tmp_path / "a.tries").read_text().splitlines()]
+    assert shares == ["4", "16"]

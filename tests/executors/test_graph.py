@@ -68,6 +68,15 @@ def test_a_worker_stays_with_its_group_and_out_of_others():
     assert taken(graph) == "next"
 
 
+def test_what_was_set_aside_before_it_came_is_not_offered():
+    graph = Graph()
+    graph.set_aside("a")
+    graph.add(Unit("a", ""))
+    graph.add(Unit("b", "", needs=("a",)))
+    graph.add(Unit("c", ""))
+    assert [taken(graph), taken(graph)] == ["c", None]
+
+
 def test_what_was_set_aside_holds_up_who_needs_it():
     graph = Graph()
     graph.add(Unit("a", ""))

@@ -1,5 +1,8 @@
 """Workers that die, raise, starve or find the disk full: what is lost, tried again, set aside."""
 
+import errno
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -9,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.errors import EnfiladeError, NoSpaceError, SettingsError
 from enfilade.executors import ATTEMPTS, FailureKind, Graph, Recipe, Unit, open_executor, supervise
 from enfilade.executors.inprocess import InProcess
 from enfilade.executors.processes import Processes
@@ -46,7 +49,7 @@ def work(tmp_path, monkeypatch):
                 executor,
                 follow=follow,
                 is_done=lambda unit: (tmp_path / unit.name).exists(),
-                failed=lambda unit, failure, attempt: failures.append((unit.name, failure.kind, attempt)),
+                failed=lambda unit, own: failures.append((unit.name, own[-1].kind, len(own))),
             )
         finally:
             executor.close()
@@ -180,6 +183,30 @@ def test_workers_go_with_who_closes_them(tmp_path, monkeypatch):
     executor.close()
     assert not Path(f"/proc/{pid}").exists()
     assert time.monotonic() - begin < 4.0
+
+
+def test_a_worker_that_the_kernel_holds_ends_nothing(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    monkeypatch.setattr("enfilade.executors.processes.GRACE_S", 0.0)
+    monkeypatch.setattr(subprocess.Popen, "kill", lambda _: None)
+    recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path)})
+    executor = Processes(recipe, nothing, workers=1, logs=tmp_path / "logs")
+    executor.begin(0, unit("h", "hangs"), share=1)
+    process = executor._children[0].process
+    executor.close()
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def test_a_full_disk_without_room_for_a_log_is_said(tmp_path, monkeypatch):
+    def full(*_arguments, **_options):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    executor = Processes(Recipe(""), nothing, workers=1, logs=tmp_path / "logs")
+    monkeypatch.setattr(Path, "mkdir", full)
+    with pytest.raises(NoSpaceError, match=r"logs/worker-0\.log: no room"):
+        executor.begin(0, unit("a"), share=1)
+    executor.close()
 
 
 SUPERVISOR = """

@@ -5,7 +5,6 @@ import itertools
 import os
 import signal
 import time
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +17,7 @@ from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
 from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
-from small_runs import frame_bytes, job_of
+from small_runs import Watcher, children, frame_bytes, job_of
 
 NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 
@@ -38,27 +37,6 @@ def whole(tmp_path_factory):
 
 def digest(folder):
     return Run.existing(folder).digest()
-
-
-class Watcher(Silence):
-    """Notes what is said, and does something after so many units."""
-
-    def __init__(self, after=0, act=lambda: None):
-        self.left, self.act, self.said = after, act, []
-
-    def advance(self, count=1):
-        self.left -= count
-        if self.left == 0:
-            self.act()
-
-    def say(self, text):
-        self.said.append(text)
-
-
-def children():
-    """Processes of this one; not the one in which Python itself counts what processes share."""
-    numbers = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    return [int(n) for n in numbers if b"resource_tracker" not in Path(f"/proc/{n}/cmdline").read_bytes()]
 
 
 def test_worker_processes_make_the_same_bytes(whole, tmp_path):

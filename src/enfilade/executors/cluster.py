@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import traceback
 from dataclasses import asdict
 from typing import Any
 
@@ -15,13 +16,12 @@ from enfilade.errors import EnfiladeError
 from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell, Worker
 from enfilade.executors.unit import Unit
 
-RETRIES = 3  # by Ray itself: four attempts in all
 KEPT: dict[str, Worker] = {}  # in a Ray worker: what it has loaded, by recipe
 LINES: list[list[Any]] = []  # in a Ray worker: reports of the unit in hand
 
 
 class Cluster:
-    """Units as Ray tasks, each retried by Ray where its worker or node dies.
+    """Units as Ray tasks. Ray tries none again by itself: it would not do so with fewer paths in flight.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Cluster:
             raise EnfiladeError(f"no Ray cluster at {address or 'this machine'}: {error}") from error
         self.slots = workers or max(int(ray.cluster_resources().get("CPU", 1)), 1)
         # One worker process stays with one unit at a time; it keeps its scene for the next.
-        self._do = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=True)(do_unit)
+        self._do = ray.remote(num_cpus=1, max_retries=0)(do_unit)
 
     def begin(self, slot: int, unit: Unit, *, share: int) -> None:
         """Hand a unit to Ray."""
@@ -65,7 +65,7 @@ class Cluster:
         self._slots[self._do.remote(self._recipe, order)] = slot
 
     def wait(self, timeout_s: float | None) -> list[Event]:
-        """Wait until Ray has finished a unit or has given it up."""
+        """Wait until Ray has finished a unit or has lost its worker or node."""
         if not self._slots:
             return []
         ready, _ = self._ray.wait(list(self._slots), num_returns=1, timeout=timeout_s)
@@ -92,22 +92,20 @@ class Cluster:
         try:
             reports = json.loads(self._ray.get(reference))
         except self._ray.exceptions.RayError as error:
-            failure = Failure(FailureKind.DIED, f"Ray gave it up: {_first_line(error)}", str(error))
-            return Event(slot, Failure(failure.kind, failure.text, failure.log, is_final=True))
-        failure_ = None
+            is_scarce = isinstance(error, self._ray.exceptions.OutOfMemoryError)
+            kind = FailureKind.MEMORY if is_scarce else FailureKind.DIED
+            return Event(slot, Failure(kind, f"Ray says: {_first_line(error)}", str(error)))
+        failure = None
         for what, value in reports:
             if what == "failed":
-                failure_ = Failure.from_json(value)
+                failure = Failure.from_json(value)
             else:
                 self._tell(what, value)
-        return Event(slot, failure_)
+        return Event(slot, failure)
 
 
 def do_unit(recipe: str, order: str) -> str:
-    """Do a unit in a Ray worker; returns its reports as JSON.
-
-    Errors that another try would not mend are reports, too. Others are raised, for Ray to try again.
-    """
+    """Do a unit in a Ray worker; returns its reports as JSON, an error among them."""
     told = json.loads(order)
     key = json.dumps([recipe, told["share"]])
     LINES.clear()
@@ -116,12 +114,9 @@ def do_unit(recipe: str, order: str) -> str:
             KEPT.clear()  # one scene in memory
             KEPT[key] = Recipe(**json.loads(recipe)).make(_note, share=told["share"])
         KEPT[key](told["kind"], told["facts"])
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001  (the supervisor decides what becomes of it)
         KEPT.clear()
-        failure = Failure.of(error)
-        if failure.kind is FailureKind.ERROR:
-            raise
-        LINES.append(["failed", failure.to_json()])
+        LINES.append(["failed", Failure.of(error, traceback.format_exc()).to_json()])
     return json.dumps(LINES)
 
 

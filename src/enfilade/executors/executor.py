@@ -81,8 +81,6 @@ class Failure:
         all that its worker had in memory.
     file : str
         The damaged one.
-    is_final : bool
-        Whether it was tried often enough.
     """
 
     kind: FailureKind
@@ -90,7 +88,6 @@ class Failure:
     log: str = ""
     error: Exception | None = None
     file: str = ""
-    is_final: bool = False
 
     @staticmethod
     def of(error: Exception, log: str = "") -> Failure:

@@ -55,7 +55,7 @@ class Graph:
                         self._offer(unit)
 
     def set_aside(self, name: str) -> None:
-        """Give a unit up; what needs it is never ready."""
+        """Give a unit up, also before it is taken up; what needs it is never ready."""
         self._aside.add(name)
 
     def take(self, group: str = "", busy: Collection[str] = ()) -> Unit | None:
@@ -88,7 +88,7 @@ class Graph:
         return sorted(left, key=lambda u: u.order)
 
     def _offer(self, unit: Unit) -> None:
-        if unit.name in self._finished:
+        if unit.name in self._finished or unit.name in self._aside:
             return
         if unit.is_gate:
             self.finish(unit.name)

@@ -14,13 +14,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from enfilade.codec.whole import unwritable
 from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell
 from enfilade.executors.unit import Unit
 
 CHILD = "enfilade.executors.child"
 RECEIVED = 1 << 16  # bytes taken at once
 LOG_TAIL = 1 << 14  # bytes of a dead worker's log that are kept
-GRACE_S = 5.0  # in which a killed worker must be gone
+GRACE_S = 5.0  # in which a killed worker should be gone
 
 
 @dataclass(eq=False)
@@ -62,7 +63,13 @@ class Processes:
         return [child.process.pid for child in self._children.values()]
 
     def begin(self, slot: int, unit: Unit, *, share: int) -> None:
-        """Send a unit to a worker."""
+        """Send a unit to a worker.
+
+        Raises
+        ------
+        RunFolderError, NoSpaceError
+            A new one's log can't be written.
+        """
         child = self._children.get(slot) or self._spawn(slot)
         child.unit = unit
         order = {"kind": unit.kind, "facts": dict(unit.facts), "share": share}
@@ -85,11 +92,15 @@ class Processes:
         self._selector.close()
 
     def _spawn(self, slot: int) -> _Child:
-        self._logs.mkdir(parents=True, exist_ok=True)
-        ours, theirs = socket.socketpair()
         file = self._logs / f"worker-{slot}.log"
+        try:
+            self._logs.mkdir(parents=True, exist_ok=True)
+            log = file.open("wb")
+        except OSError as error:
+            raise unwritable(file, error) from error
+        ours, theirs = socket.socketpair()
         command = [sys.executable, "-P", "-m", CHILD, str(theirs.fileno()), str(os.getpid())]
-        with theirs, file.open("wb") as log:
+        with theirs, log:
             process = subprocess.Popen(  # noqa: S603
                 command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
@@ -137,7 +148,10 @@ class Processes:
                 child.process.wait(0.2)
         if child.process.poll() is None:
             child.process.kill()
-        return child.process.wait(GRACE_S)
+        try:
+            return child.process.wait(GRACE_S)
+        except subprocess.TimeoutExpired:  # the kernel holds it, for a disk that doesn't answer
+            return -signal.SIGKILL
 
 
 def _died_of(code: int) -> str:

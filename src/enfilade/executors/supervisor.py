@@ -39,7 +39,7 @@ def supervise(
     *,
     follow: Callable[[Unit], Iterable[Unit]],
     is_done: Callable[[Unit], bool],
-    failed: Callable[[Unit, Failure, int], None],
+    failed: Callable[[Unit, list[Failure]], None],
 ) -> Ending:
     """Hand out the units of a graph until none is left that can be done.
 
@@ -53,7 +53,7 @@ def supervise(
     is_done
         Whether a unit's line is in the ledger. One that says it is finished and isn't has failed.
     failed
-        Told of each failure, and which attempt that was.
+        Told of each failure of a unit, with all that it has had. After :data:`ATTEMPTS` it is set aside.
 
     Returns
     -------
@@ -71,7 +71,7 @@ class _Loop:
         executor: Executor,
         follow: Callable[[Unit], Iterable[Unit]],
         is_done: Callable[[Unit], bool],
-        failed: Callable[[Unit, Failure, int], None],
+        failed: Callable[[Unit, list[Failure]], None],
     ) -> None:
         self.ending = Ending()
         self._graph = graph
@@ -136,8 +136,8 @@ class _Loop:
             return
         failures = self._failures.setdefault(unit.name, [])
         failures.append(failure)
-        self._failed(unit, failure, len(failures))
-        if len(failures) >= ATTEMPTS or failure.is_final:
+        self._failed(unit, failures)
+        if len(failures) >= ATTEMPTS:
             self._graph.set_aside(unit.name)
             self.ending.aside.append((unit, failures))
         else:

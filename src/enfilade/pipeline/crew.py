@@ -7,11 +7,11 @@ import re
 import shutil
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from enfilade.codec import whole_file
+from enfilade.codec import sweep, whole_file
 from enfilade.device import active
 from enfilade.errors import EnfiladeError, NoSpaceError, UnfinishedError
 from enfilade.executors import (
@@ -27,7 +27,7 @@ from enfilade.executors import (
 )
 from enfilade.executors.inprocess import InProcess
 from enfilade.monitor import Monitor
-from enfilade.pipeline.job import Job
+from enfilade.pipeline.job import Job, check_identity
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.store.lock import sign_workers
@@ -92,18 +92,29 @@ def carry_out(
     EnfiladeError
         What the stages raise.
     """
-    progress = _Progress(monitor)
+    try:
+        return _carry_out(job, run, crew, monitor, is_wanted or _everything)
+    finally:
+        if run.is_sole_writer:  # of workers that were killed while they wrote
+            with suppress(OSError):
+                sweep(run.folder)
+
+
+def _carry_out(
+    job: Job, run: Run, crew: Crew, monitor: Monitor, is_wanted: Callable[[Unit], bool]
+) -> list[str]:
+    progress, aside = _Progress(monitor), _Aside(run, monitor)
     for _ in range(REPAIRS):
-        shift = _Shift(job, run, progress, is_wanted or _everything)
-        if not shift.left:
-            return []
-        progress.tell_before()
-        # Workers of their own for each shift: those of the last have what was damaged in memory, and would
-        # not write it again.
-        with closing(_open(job, run, crew, monitor)) as executor:
-            sign_workers(run.folder, executor.slots)
-            damaged = shift.work(executor)
+        shift, damaged = _Shift(job, run, progress, aside, is_wanted), None
+        if shift.left:
+            progress.tell_before()
+            # Workers of their own for each shift: those of the last have what was damaged in memory, and
+            # would not write it again.
+            with closing(_open(job, run, crew, monitor)) as executor:
+                sign_workers(run.folder, executor.slots)
+                damaged = shift.work(executor)
         if damaged is None:
+            aside.check(len(shift.left))
             return shift.left
         run.forget(damaged)
         monitor.say(f"{damaged} is missing or damaged: what made it is done again")
@@ -134,12 +145,15 @@ def _open(job: Job, run: Run, crew: Crew, monitor: Monitor) -> Executor:
 class _Shift:
     """One pass over the units, until all are done or a damaged file is found."""
 
-    def __init__(self, job: Job, run: Run, progress: _Progress, is_wanted: Callable[[Unit], bool]) -> None:
+    def __init__(
+        self, job: Job, run: Run, progress: _Progress, aside: _Aside, is_wanted: Callable[[Unit], bool]
+    ) -> None:
         self._blueprint = Blueprint(job, run)
         self._run = run
         self._is_wanted = is_wanted
         self._graph = Graph()
         self._progress = progress
+        self._aside = aside
         self._take_up(self._blueprint.first())
 
     @property
@@ -154,7 +168,7 @@ class _Shift:
                 self._graph,
                 executor,
                 follow=self._finished,
-                is_done=self._blueprint.is_done,
+                is_done=self._is_done,
                 failed=self._failed,
             )
         except NoSpaceError as error:
@@ -163,8 +177,6 @@ class _Shift:
         if stopped is not None and stopped.kind is not FailureKind.DAMAGED:
             reason = stopped.error or EnfiladeError(stopped.text)
             raise self._no_space(reason) if stopped.kind is FailureKind.SPACE else reason
-        if ending.aside:
-            self._set_aside(ending.aside)
         return None if stopped is None else stopped.file
 
     def _take_up(self, units: Any) -> None:
@@ -178,39 +190,35 @@ class _Shift:
                 continue
             if is_done:
                 self._graph.finish(unit.name)
+                self._aside.drop(unit)
+            elif unit.name in self._aside:
+                self._graph.set_aside(unit.name)
             self._graph.add(unit)
             if is_wanted:
                 self._progress.add(unit, is_done=is_done)
             if is_done:
                 pending.extend(self._blueprint.follow(unit))
 
+    def _is_done(self, unit: Unit) -> bool:
+        if self._blueprint.is_done(unit):
+            return True
+        self._run.refresh()  # another command that shares the run may have finished it meanwhile
+        return self._blueprint.is_done(unit)
+
     def _finished(self, unit: Unit) -> tuple[Unit, ...]:
         self._progress.finish(unit)
         self._take_up(self._blueprint.follow(unit))
         return ()
 
-    def _failed(self, unit: Unit, failure: Failure, attempt: int) -> None:
-        after = "it is set aside" if attempt >= ATTEMPTS or failure.is_final else "it is tried again"
+    def _failed(self, unit: Unit, failures: list[Failure]) -> None:
+        failure, attempt = failures[-1], len(failures)
+        after = "it is tried again" if attempt < ATTEMPTS else "it is set aside"
         is_scarce = failure.kind is FailureKind.MEMORY or (failure.kind is FailureKind.DIED and attempt > 1)
         if is_scarce and attempt < ATTEMPTS:
             after += " with fewer paths in flight"
         self._progress.monitor.say(f"{unit.name}: {failure.text}; {after}")
-
-    def _set_aside(self, aside: list[tuple[Unit, list[Failure]]]) -> None:
-        names = tuple(unit.name for unit, _ in aside)
-        for unit, failures in aside:
-            parts = [f"attempt {n}: {f.text}\n\n{f.log}\n" for n, f in enumerate(failures, 1)]
-            file = self._run.folder / ASIDE / f"{re.sub(r'[^a-z0-9-]+', '-', unit.name.lower())}.log"
-            with whole_file(file) as beside:
-                beside.write_text("".join(parts), encoding="utf-8")
-        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
-        left = len(self._graph.unfinished())
-        raise UnfinishedError(
-            f"{len(names)} of the run's units failed again and again: {shown} ({aside[0][1][-1].text}); "
-            f"their logs are in {self._run.folder / ASIDE}. The rest is done but for {left} that need them; "
-            "the same command tries them again",
-            names,
-        )
+        if attempt >= ATTEMPTS:
+            self._aside.add(unit, failures)
 
     def _no_space(self, error: Exception) -> NoSpaceError:
         need = bytes_needed(self._run, [unit.name for unit in self._graph.unfinished()])
@@ -221,6 +229,46 @@ class _Shift:
             else "what is left needs room"
         )
         return NoSpaceError(f"{error} ({told}; {free / MB:.1f} MB are free)")
+
+
+class _Aside:
+    """Units that were set aside, over all shifts: one that comes later does not hand them out again."""
+
+    def __init__(self, run: Run, monitor: Monitor) -> None:
+        self._folder = run.folder / ASIDE
+        self._monitor = monitor
+        self._last: dict[str, str] = {}  # unit -> how it failed last
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._last
+
+    def add(self, unit: Unit, failures: list[Failure]) -> None:
+        """Write what its workers said into its log."""
+        self._last[unit.name] = failures[-1].text
+        parts = [f"attempt {n}: {f.text}\n\n{f.log}\n" for n, f in enumerate(failures, 1)]
+        file = self._folder / f"{re.sub(r'[^a-z0-9-]+', '-', unit.name.lower())}.log"
+        try:
+            with whole_file(file) as beside:
+                beside.write_text("".join(parts), encoding="utf-8")
+        except EnfiladeError as error:  # the run goes on without its log
+            self._monitor.say(str(error))
+
+    def drop(self, unit: Unit) -> None:
+        """Strike out a unit that another command has finished."""
+        self._last.pop(unit.name, None)
+
+    def check(self, left: int) -> None:
+        """Raise an error if there is one; `left` more need them."""
+        names = tuple(self._last)
+        if not names:
+            return
+        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+        raise UnfinishedError(
+            f"{len(names)} of the run's units failed again and again: {shown} ({self._last[names[0]]}); "
+            f"their logs are in {self._folder}. The rest is done but for {left} that need them; "
+            "the same command tries them again",
+            names,
+        )
 
 
 class _Here:
@@ -236,6 +284,7 @@ class _Here:
         from enfilade.pipeline.worker import Worker, smaller
 
         del tell
+        check_identity(self._job, self._run)
         return Worker(smaller(self._job, share), self._run, self._monitor).do
 
 

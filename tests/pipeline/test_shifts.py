@@ -1,0 +1,170 @@
+"""What a command keeps in mind from one pass over its units to the next, and what it leaves behind."""
+
+import os
+import signal
+from types import SimpleNamespace
+
+import pytest
+
+from enfilade.errors import DamagedFileError, NoSpaceError, RunFolderError, UnfinishedError
+from enfilade.executors.inprocess import InProcess
+from enfilade.monitor import Silence
+from enfilade.pipeline import crew, worker
+from enfilade.pipeline.crew import Crew
+from enfilade.pipeline.walkthrough import render
+from enfilade.store import Run
+from scenes_analytic import room, room_walk
+from small_runs import Told, Watcher, children, job_of
+
+COUNT = 6
+DAMAGED = "frames/0001.exr"
+PARTIAL = "frames/.0001.writing-1-a.exr"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    Run.open(tmp_path / "run", {}).close()
+    (tmp_path / "run" / "frames").mkdir()
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def trace(monkeypatch):
+    """Have a stub trace the frames of a run; what it does with each, a test says."""
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
+    job = SimpleNamespace(method="reference", path=room_walk(COUNT, size=(8, 6)))
+
+    def carry_out(run, do):
+        begun, monitor = [], Told()
+
+        def trace(_kind, facts):
+            begun.append(facts["frame"] + 1)
+            do(begun[-1])
+
+        maker = SimpleNamespace(make=lambda _tell, **_: trace)
+        monkeypatch.setattr(crew, "_open", lambda *_: InProcess(maker, print))
+        carry_out.begun, carry_out.said = begun, monitor.said
+        return crew.carry_out(job, run, Crew(), monitor, is_wanted=lambda unit: unit.kind == "reference")
+
+    return carry_out
+
+
+def finish(run, number):
+    run.finish(f"frame {number}", files=[], facts={})
+
+
+def test_what_is_set_aside_stays_so_when_a_damaged_file_is_found(folder, trace):
+    (folder / DAMAGED).write_text("x")
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            if number == 2:
+                raise ZeroDivisionError
+            if number == 4 and (folder / DAMAGED).exists():
+                raise DamagedFileError("it is damaged", DAMAGED)
+            finish(run, number)
+
+        with pytest.raises(UnfinishedError, match=r"1 of the run's units .* frame 2 \(Zero.*for 0 ") as error:
+            trace(run, do)
+        assert error.value.units == ("frame 2",)
+        assert {line["unit"] for line in run.lines()} == {f"frame {n}" for n in (1, 3, 4, 5, 6)}
+    assert trace.begun == [1, 2, 2, 2, 2, 3, 4, 4, 5, 6]
+    assert (folder / "failed" / "frame-2.log").read_text().count("Traceback") == 4
+    assert not (folder / DAMAGED).exists()
+
+
+def test_what_is_set_aside_has_its_log_when_the_disk_is_full(folder, trace):
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            if number == 2:
+                raise ZeroDivisionError
+            if number == 4:
+                raise NoSpaceError("no room")
+            finish(run, number)
+
+        with pytest.raises(NoSpaceError):
+            trace(run, do)
+    assert (folder / "failed" / "frame-2.log").read_text().count("Traceback") == 4
+
+
+def test_a_log_that_can_not_be_written_ends_nothing(folder, trace):
+    (folder / "failed").write_text("in its place")
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            if number == 2:
+                raise ZeroDivisionError
+            finish(run, number)
+
+        with pytest.raises(UnfinishedError, match="frame 2"):
+            trace(run, do)
+    assert trace.begun[-1] == COUNT
+    assert any("can't write" in text and "frame-2.log" in text for text in trace.said)
+
+
+def test_what_another_share_has_finished_meanwhile_is_finished(folder, trace):
+    with Run.sharing(folder, "here") as here, Run.sharing(folder, "there") as there:
+        assert trace(here, lambda number: finish(there if number == 3 else here, number)) == []
+    assert trace.begun == [1, 2, 3, 4, 5, 6]
+    assert trace.said == []
+
+
+@pytest.mark.parametrize("error", [None, NoSpaceError("no room"), KeyboardInterrupt()])
+def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, error):
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            (folder / PARTIAL).write_text("x")
+            if error is not None:
+                raise error
+            finish(run, number)
+
+        if error is None:
+            trace(run, do)
+        else:
+            with pytest.raises(type(error)):
+                trace(run, do)
+    assert not (folder / PARTIAL).exists()
+
+
+def test_files_that_other_shares_are_writing_stay(folder, trace):
+    with Run.sharing(folder, "here") as here:
+        (folder / PARTIAL).write_text("x")
+        trace(here, lambda number: finish(here, number))
+    assert (folder / PARTIAL).exists()
+
+
+def change(scene):
+    scene.write_text(scene.read_text().replace('"noise": 0.0', '"noise": 0.1'))
+    assert '"noise": 0.1' in scene.read_text()
+
+
+def test_a_scene_that_changed_is_refused_by_the_next_worker(tmp_path, monkeypatch):
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
+    job, really = (
+        job_of(tmp_path, room(), room_walk(COUNT, size=(8, 6)), method="reference"),
+        worker.trace_reference,
+    )
+
+    def scarce(workshop, frame):
+        if frame == 2:
+            change(job.scene)
+            raise MemoryError
+        really(workshop, frame)
+
+    monkeypatch.setattr(worker, "trace_reference", scarce)
+    with pytest.raises(RunFolderError, match=r"the scene, .* not the one with which the run began"):
+        render(job, tmp_path / "run", Silence())
+
+
+def test_a_scene_that_changed_is_refused_by_the_next_worker_process(tmp_path):
+    job = job_of(tmp_path, room(), room_walk(COUNT, size=(8, 6)), method="reference")
+
+    def change_and_kill():
+        change(job.scene)
+        os.kill(children()[0], signal.SIGKILL)
+
+    with pytest.raises(RunFolderError, match=r"the scene, .* not the one with which the run began"):
+        render(job, tmp_path / "run", Watcher(2, change_and_kill), Crew("processes", 1))
+    assert not children()
