@@ -69,6 +69,23 @@ def test_it_does_what_loops_do(scene):
     np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
 
 
+def test_what_is_left_of_the_noise_is_told():
+    size, flat = (96, 128), np.random.default_rng(7)
+    spread = flat.normal(0.5, 0.1, (*size, 1)).astype(np.float32) * np.ones(3, np.float32)
+    normal = np.zeros((*size, 3), np.float32)
+    normal[..., 2] = 1.0
+    guide = Guide(
+        lanes(np.full(size, 4.0, np.float32)), lanes(normal), lanes(np.ones(size, np.uint32)),
+        matrix3(Camera(look_at((0, 0, 4), (0, 0, 0)), 40, *size[::-1]).direction_from_pixel), *size[::-1],
+    )  # fmt: skip
+    for levels in (1, 2, 4):
+        options = {**OPTIONS, "levels": levels, "deviations": 100.0}
+        color, variance = smooth(lanes(spread), lanes(np.full(size, 0.01, np.float32)), guide, **options)
+        inside = slice(20, -20), slice(20, -20)
+        left, told = image(color, *size)[inside].std(), np.sqrt(image(variance, *size)[inside].mean())
+        assert 0.8 < told / left < 1.25
+
+
 def test_noise_goes_and_edges_stay(scene):
     color, variance = scene.smoothed(levels=4)
     inside = color[2:10, 1:4]

@@ -8,9 +8,22 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 def smooth(color, variance, depth, normal, item, direction_from_pixel, *, levels, **limits):
     seen = depth, normal, item, direction_from_pixel
+    related = np.ones_like(variance)
     for level in range(levels):
-        color, variance = _pass(color, variance, seen, step=1 << level, **limits)
-    return color, variance
+        color, variance, share = _pass(color, variance, seen, step=1 << level, **limits)
+        related *= share ** (_independent(level) - 1.0)
+    return color, variance * related
+
+
+def _independent(level):
+    """Logarithm of the noise that a level leaves of a flat image, by that of independent pixels."""
+    kernels = [np.ones(1)]
+    for step in 2 ** np.arange(level + 1):
+        taps = np.zeros(4 * step + 1)
+        taps[::step] = SPLINE
+        kernels.append(np.convolve(kernels[-1], taps))
+    before, after = (np.sum(kernel**2) ** 2 for kernel in kernels[-2:])
+    return np.log(after / before) / np.log(np.sum(SPLINE**2) ** 2)
 
 
 def _pass(color, variance, seen, *, step, deviations, plane, exponent):
@@ -22,11 +35,11 @@ def _pass(color, variance, seen, *, step, deviations, plane, exponent):
         for i, wx in enumerate((0.25, 0.5, 0.25)):
             spread += wy * wx * padded[j : j + height, i : i + width]
     luminance = color @ LUMINANCE
-    out, out_variance = np.zeros_like(color), np.zeros_like(variance)
+    out, out_variance, shares = np.zeros_like(color), np.zeros_like(variance), np.zeros_like(variance)
     for y in range(height):
         for x in range(width):
             here = depth[y, x] * (p @ (x + 0.5, y + 0.5, 1.0))
-            total, total_variance, weight = np.zeros(3), 0.0, 0.0
+            total, total_variance, weight, squares = np.zeros(3), 0.0, 0.0, 0.0
             for j, wy in zip(range(-2, 3), SPLINE, strict=True):
                 for i, wx in zip(range(-2, 3), SPLINE, strict=True):
                     v, u = y + j * step, x + i * step
@@ -45,5 +58,7 @@ def _pass(color, variance, seen, *, step, deviations, plane, exponent):
                     total += share * color[v, u]
                     total_variance += share**2 * variance[v, u]
                     weight += share
+                    squares += share**2
             out[y, x], out_variance[y, x] = total / weight, total_variance / weight**2
-    return out, out_variance
+            shares[y, x] = squares / weight**2
+    return out, out_variance, shares

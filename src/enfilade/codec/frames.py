@@ -99,7 +99,7 @@ def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
 
 
 def write_parts(file: Path, seen: F32, scattered: Shading, source: U8) -> tuple[F32, Shading]:
-    """Write the two parts of a frame's light, as half floats.
+    """Write the two parts of a frame's light, as half floats; of the variance, its root.
 
     Parameters
     ----------
@@ -121,11 +121,11 @@ def write_parts(file: Path, seen: F32, scattered: Shading, source: U8) -> tuple[
     RunFolderError
         The file can't be written.
     """
-    halves = _half(seen), _half(scattered.color), _half(scattered.variance)
+    halves = _half(seen), _half(scattered.color), _half(np.sqrt(scattered.variance))
     layers: dict[str, Array] = {
         "RGB": halves[0],
         "scattered": halves[1],
-        "variance": halves[2],
+        "deviation": halves[2],
         "source": source.astype(np.uint32),
     }
     write_exr(file, layers, attributes={"dropped": str(int(scattered.dropped))})
@@ -140,16 +140,16 @@ def read_parts(file: Path) -> tuple[F32, Shading, U8]:
     ImageError
         The file is missing, damaged, or holds no such parts.
     """
-    kinds = {"RGB": np.float16, "scattered": np.float16, "variance": np.float16, "source": np.uint32}
+    kinds = {"RGB": np.float16, "scattered": np.float16, "deviation": np.float16, "source": np.uint32}
     layers = _required(file, kinds)
-    halves = layers["RGB"], layers["scattered"], layers["variance"]
+    halves = layers["RGB"], layers["scattered"], layers["deviation"]
     return *_parts(*halves, dropped=_dropped(file)), layers["source"].astype(np.uint8)
 
 
-def _parts(seen: Array, color: Array, variance: Array, *, dropped: int) -> tuple[F32, Shading]:
+def _parts(seen: Array, color: Array, deviation: Array, *, dropped: int) -> tuple[F32, Shading]:
     from enfilade.arrays import widened  # here, not above: who only reads pictures needs no Dr.Jit
 
-    return widened(seen), Shading(widened(color), widened(variance), dropped)
+    return widened(seen), Shading(widened(color), np.square(widened(deviation)), dropped)
 
 
 def _dropped(file: Path) -> int:

@@ -25,6 +25,7 @@ EVEN = 0.5  # of the spread of rays that share out their directions evenly count
 SPECKLE = 2.0  # times the brightest of its neighbours that a pixel may be
 LEVELS = 4  # of the wavelet that smooths a page
 DEVIATIONS = 3.0  # of the luminance, across which it smooths
+APART = 3.0  # deviations by which frames may differ that are averaged
 NORMAL_EXPONENT = 64.0  # light on surfaces that are turned by 12 degrees mixes by a quarter
 
 
@@ -177,7 +178,7 @@ def over_time(geometry: Geometry, here: Page, others: Sequence[Page], shares: Se
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
         apart = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)
-        counts = dr.exp(-apart * dr.rcp(DEVIATIONS * dr.sqrt(noise + variance) + 1e-8))
+        counts = dr.exp(-apart * dr.rcp(APART * dr.sqrt(noise + variance) + 1e-8))
         counts = dr.select(found.weight > KNOWN, opaque(share) * counts, 0.0)
         total += counts * value
         weight += counts
