@@ -94,9 +94,10 @@ class Watcher(Silence):
         self.left, self.act, self.said = after, act, []
 
     def advance(self, count=1):
-        self.left -= count
-        if self.left == 0:
-            self.act()
+        if count > 0:  # and nothing is taken back
+            self.left -= count
+            if self.left == 0:
+                self.act()
 
     def say(self, text):
         self.said.append(text)

@@ -13,11 +13,11 @@ class Monitor(Protocol):
         ...
 
     def advance(self, count: int = 1) -> None:
-        """Say that units of the present stage are done."""
+        """Say that units of the present stage are done; less than 0: that so many were lost."""
         ...
 
     def extend(self, count: int) -> None:
-        """Say that the present stage has grown by that many units (a segment was split)."""
+        """Say that the present stage has grown by that many units (a segment was split), or shrunk."""
         ...
 
     def say(self, text: str) -> None:

@@ -76,7 +76,8 @@ def test_all_is_done_also_what_follows(work, name):
     assert not ending.stopped
     assert not failures
     assert done(work) == ["a", "ax", "axx", "b", "bx", "bxx"]
-    assert sorted(line["unit"] for _, line in told) == done(work)
+    assert sorted(line["unit"] for _, _, line in told) == done(work)
+    assert all(unit.name == line["unit"] for unit, _, line in told)
 
 
 @pytest.mark.parametrize("kind", ["killed", "exits"])

@@ -9,7 +9,7 @@ import pytest
 from enfilade.errors import DamagedFileError, NoSpaceError, RunFolderError, UnfinishedError
 from enfilade.executors.inprocess import InProcess
 from enfilade.monitor import Silence
-from enfilade.pipeline import crew, worker
+from enfilade.pipeline import crew, finish, worker
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
@@ -49,7 +49,7 @@ def trace(monkeypatch):
     return carry_out
 
 
-def finish(run, number):
+def finished(run, number):
     run.finish(f"frame {number}", files=[], facts={})
 
 
@@ -62,7 +62,7 @@ def test_what_is_set_aside_stays_so_when_a_damaged_file_is_found(folder, trace):
                 raise ZeroDivisionError
             if number == 4 and (folder / DAMAGED).exists():
                 raise DamagedFileError("it is damaged", DAMAGED)
-            finish(run, number)
+            finished(run, number)
 
         with pytest.raises(UnfinishedError, match=r"1 of the run's units .* frame 2 \(Zero.*for 0 ") as error:
             trace(run, do)
@@ -81,7 +81,7 @@ def test_what_is_set_aside_has_its_log_when_the_disk_is_full(folder, trace):
                 raise ZeroDivisionError
             if number == 4:
                 raise NoSpaceError("no room")
-            finish(run, number)
+            finished(run, number)
 
         with pytest.raises(NoSpaceError):
             trace(run, do)
@@ -95,7 +95,7 @@ def test_a_log_that_can_not_be_written_ends_nothing(folder, trace):
         def do(number):
             if number == 2:
                 raise ZeroDivisionError
-            finish(run, number)
+            finished(run, number)
 
         with pytest.raises(UnfinishedError, match="frame 2"):
             trace(run, do)
@@ -105,7 +105,7 @@ def test_a_log_that_can_not_be_written_ends_nothing(folder, trace):
 
 def test_what_another_share_has_finished_meanwhile_is_finished(folder, trace):
     with Run.sharing(folder, "here") as here, Run.sharing(folder, "there") as there:
-        assert trace(here, lambda number: finish(there if number == 3 else here, number)) == []
+        assert trace(here, lambda number: finished(there if number == 3 else here, number)) == []
     assert trace.begun == [1, 2, 3, 4, 5, 6]
     assert trace.said == []
 
@@ -118,7 +118,7 @@ def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, 
             (folder / PARTIAL).write_text("x")
             if error is not None:
                 raise error
-            finish(run, number)
+            finished(run, number)
 
         if error is None:
             trace(run, do)
@@ -131,7 +131,7 @@ def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, 
 def test_files_that_other_shares_are_writing_stay(folder, trace):
     with Run.sharing(folder, "here") as here:
         (folder / PARTIAL).write_text("x")
-        trace(here, lambda number: finish(here, number))
+        trace(here, lambda number: finished(here, number))
     assert (folder / PARTIAL).exists()
 
 
@@ -168,3 +168,42 @@ def test_a_scene_that_changed_is_refused_by_the_next_worker_process(tmp_path):
     with pytest.raises(RunFolderError, match=r"the scene, .* not the one with which the run began"):
         render(job, tmp_path / "run", Watcher(2, change_and_kill), Crew("processes", 1))
     assert not children()
+
+
+class Counts(Silence):
+    """What bars would show: how many of how many, by stage."""
+
+    def __init__(self):
+        self.stages, self.now = {}, ""
+
+    def stage(self, name, total):
+        self.now = name
+        self.stages.setdefault(name, [0, 0])
+        self.extend(total)
+
+    def advance(self, count=1):
+        self.stages[self.now][0] += count
+
+    def extend(self, count):
+        self.stages[self.now][1] += count
+
+
+@pytest.mark.parametrize("error", [MemoryError(), DamagedFileError("it is damaged", "frames/0003.exr")])
+def test_a_unit_that_counts_itself_is_counted_once_however_often_it_is_tried(tmp_path, monkeypatch, error):
+    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
+    really, errors = finish.encode_video, [error]
+
+    def encode(file, frames, **how):
+        if errors:
+            next(frames), next(frames), next(frames)
+            raise errors.pop()
+        really(file, frames, **how)
+
+    monkeypatch.setattr(finish, "encode_video", encode)
+    job = job_of(tmp_path, room(), room_walk(COUNT, size=(8, 6)), method="reference")
+    monitor = Counts()
+    render(job, tmp_path / "run", monitor)
+    assert not errors
+    # The damaged frame is traced again: that is one more than there are.
+    again = int(isinstance(error, DamagedFileError))
+    assert monitor.stages == {"trace": [COUNT + again] * 2, "plan": [COUNT] * 2, "video": [COUNT] * 2}

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from typing import Any
 
 from enfilade.errors import EnfiladeError
-from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell, Worker
+from enfilade.executors.executor import Event, Failure, FailureKind, Hear, Recipe, Worker
 from enfilade.executors.unit import Unit
 
 KEPT: dict[str, Worker] = {}  # in a Ray worker: what it has loaded, by recipe
@@ -26,7 +26,7 @@ class Cluster:
     Parameters
     ----------
     recipe
-    tell
+    hear
         Takes the reports of a unit when it ends.
     workers
         Units in hand at once. None: as many as the cluster has CPUs.
@@ -39,7 +39,7 @@ class Cluster:
         Ray is not installed, or the cluster does not answer.
     """
 
-    def __init__(self, recipe: Recipe, tell: Tell, *, workers: int | None, address: str) -> None:
+    def __init__(self, recipe: Recipe, hear: Hear, *, workers: int | None, address: str) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
             import ray
@@ -48,9 +48,9 @@ class Cluster:
                 "--executor ray needs Ray: install it with: pip install 'enfilade[cluster]'"
             ) from error
         self._ray = ray
-        self._tell = tell
+        self._hear = hear
         self._recipe = json.dumps(asdict(recipe))
-        self._slots: dict[Any, int] = {}
+        self._in_hand: dict[Any, tuple[int, Unit]] = {}
         try:
             self._connect(workers, address)
         except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
@@ -62,21 +62,21 @@ class Cluster:
     def begin(self, slot: int, unit: Unit, *, share: int) -> None:
         """Hand a unit to Ray."""
         order = json.dumps({"kind": unit.kind, "facts": dict(unit.facts), "share": share})
-        self._slots[self._do.remote(self._recipe, order)] = slot
+        self._in_hand[self._do.remote(self._recipe, order)] = slot, unit
 
     def wait(self, timeout_s: float | None) -> list[Event]:
         """Wait until Ray has finished a unit or has lost its worker or node."""
-        if not self._slots:
+        if not self._in_hand:
             return []
-        ready, _ = self._ray.wait(list(self._slots), num_returns=1, timeout=timeout_s)
+        ready, _ = self._ray.wait(list(self._in_hand), num_returns=1, timeout=timeout_s)
         return [self._ended(reference) for reference in ready]
 
     def close(self) -> None:
         """Cancel what is in hand and leave the cluster; a local one ends."""
-        for reference in self._slots:
+        for reference in self._in_hand:
             with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
                 self._ray.cancel(reference, force=True)
-        self._slots.clear()
+        self._in_hand.clear()
         self._ray.shutdown()
 
     def _connect(self, workers: int | None, address: str) -> None:
@@ -88,7 +88,7 @@ class Cluster:
             self._ray.init(address="local", num_cpus=workers, **quiet)
 
     def _ended(self, reference: Any) -> Event:
-        slot = self._slots.pop(reference)
+        slot, unit = self._in_hand.pop(reference)
         try:
             reports = json.loads(self._ray.get(reference))
         except self._ray.exceptions.RayError as error:
@@ -100,7 +100,7 @@ class Cluster:
             if what == "failed":
                 failure = Failure.from_json(value)
             else:
-                self._tell(what, value)
+                self._hear(unit, what, value)
         return Event(slot, failure)
 
 

@@ -12,6 +12,7 @@ from enfilade import errors
 from enfilade.executors.unit import Unit
 
 Tell = Callable[[str, Any], None]
+Hear = Callable[[Unit, str, Any], None]
 Worker = Callable[[str, Mapping[str, Any]], None]
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import traceback
+from typing import Any
 
-from enfilade.executors.executor import Event, Failure, Maker, Tell, Worker
+from enfilade.executors.executor import Event, Failure, Hear, Maker, Worker
 from enfilade.executors.unit import Unit
 
 
@@ -14,15 +15,15 @@ class InProcess:
     Parameters
     ----------
     recipe
-    tell
-        Takes the reports.
+    hear
+        Takes the reports, each with the unit in hand.
     """
 
     slots = 1
 
-    def __init__(self, recipe: Maker, tell: Tell) -> None:
+    def __init__(self, recipe: Maker, hear: Hear) -> None:
         self._recipe = recipe
-        self._tell = tell
+        self._hear = hear
         self._worker: Worker | None = None
         self._share = 1
         self._unit: Unit | None = None
@@ -37,7 +38,7 @@ class InProcess:
     def wait(self, timeout_s: float | None) -> list[Event]:
         """Do the unit that was begun."""
         del timeout_s
-        unit, self._unit = self._unit, None
+        unit = self._unit
         if unit is None:
             return []
         try:
@@ -47,8 +48,14 @@ class InProcess:
         except Exception as error:  # noqa: BLE001  (whatever it is, the rest goes on)
             self._worker = None
             return [Event(0, Failure.of(error, traceback.format_exc()))]
+        finally:
+            self._unit = None
         return [Event(0)]
 
     def close(self) -> None:
         """Forget the worker."""
         self._worker = None
+
+    def _tell(self, what: str, value: Any) -> None:
+        if self._unit is not None:
+            self._hear(self._unit, what, value)

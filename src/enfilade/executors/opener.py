@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from enfilade.errors import SettingsError
-from enfilade.executors.executor import Executor, Recipe, Tell
+from enfilade.executors.executor import Executor, Hear, Recipe
 
 EXECUTORS = ("in-process", "processes", "ray", "ray:ADDRESS")
 
@@ -22,7 +22,7 @@ def check_executor(name: str) -> None:
         raise SettingsError(f"there is no executor {name!r}; choose one of {', '.join(EXECUTORS)}")
 
 
-def open_executor(name: str, recipe: Recipe, tell: Tell, *, workers: int | None, logs: Path) -> Executor:
+def open_executor(name: str, recipe: Recipe, hear: Hear, *, workers: int | None, logs: Path) -> Executor:
     """Open an executor.
 
     Parameters
@@ -31,8 +31,8 @@ def open_executor(name: str, recipe: Recipe, tell: Tell, *, workers: int | None,
         One of :data:`EXECUTORS`.
     recipe
         How its workers are made.
-    tell
-        Takes their reports.
+    hear
+        Takes their reports, each with its unit.
     workers
         How many; None: one for each CPU core. One in process, whatever is asked.
     logs
@@ -50,13 +50,13 @@ def open_executor(name: str, recipe: Recipe, tell: Tell, *, workers: int | None,
         case ("in-process", _, _):
             from enfilade.executors.inprocess import InProcess
 
-            return InProcess(recipe, tell)
+            return InProcess(recipe, hear)
         case ("processes", _, _):
             from enfilade.executors.processes import Processes
 
             count = workers or len(os.sched_getaffinity(0))
-            return Processes(recipe, tell, workers=count, logs=logs)
+            return Processes(recipe, hear, workers=count, logs=logs)
         case (_, _, address):
             from enfilade.executors.cluster import Cluster
 
-            return Cluster(recipe, tell, workers=workers, address=address)
+            return Cluster(recipe, hear, workers=workers, address=address)

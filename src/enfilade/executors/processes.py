@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.codec.whole import unwritable
-from enfilade.executors.executor import Event, Failure, FailureKind, Recipe, Tell
+from enfilade.executors.executor import Event, Failure, FailureKind, Hear, Recipe
 from enfilade.executors.unit import Unit
 
 CHILD = "enfilade.executors.child"
@@ -42,16 +42,16 @@ class Processes:
     Parameters
     ----------
     recipe
-    tell
-        Takes the reports.
+    hear
+        Takes the reports, each with its unit.
     workers
     logs
         Folder for what they print.
     """
 
-    def __init__(self, recipe: Recipe, tell: Tell, *, workers: int, logs: Path) -> None:
+    def __init__(self, recipe: Recipe, hear: Hear, *, workers: int, logs: Path) -> None:
         self._recipe = recipe
-        self._tell = tell
+        self._hear = hear
         self._logs = logs
         self._children: dict[int, _Child] = {}
         self._selector = selectors.DefaultSelector()
@@ -82,7 +82,7 @@ class Processes:
         if not any(child.unit for child in self._children.values()):
             return events
         for key, _ in self._selector.select(timeout_s):
-            events += self._hear(key.data)
+            events += self._receive(key.data)
         return events
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class Processes:
         self._selector.register(ours, selectors.EVENT_READ, slot)
         return child
 
-    def _hear(self, slot: int) -> list[Event]:
+    def _receive(self, slot: int) -> list[Event]:
         child = self._children[slot]
         try:
             data = child.line.recv(RECEIVED)
@@ -125,7 +125,8 @@ class Processes:
     def _said(self, slot: int, child: _Child, message: list[Any]) -> list[Event]:
         what, value = message
         if what not in ("done", "failed"):
-            self._tell(what, value)
+            if child.unit is not None:
+                self._hear(child.unit, what, value)
             return []
         child.unit = None
         return [Event(slot, None if what == "done" else Failure.from_json(value))]

@@ -27,7 +27,9 @@ from enfilade.executors import (
 )
 from enfilade.executors.inprocess import InProcess
 from enfilade.monitor import Monitor
+from enfilade.pipeline.hire import Distant
 from enfilade.pipeline.job import Job, check_identity
+from enfilade.pipeline.progress import Progress
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.store.lock import sign_workers
@@ -103,19 +105,20 @@ def carry_out(
 def _carry_out(
     job: Job, run: Run, crew: Crew, monitor: Monitor, is_wanted: Callable[[Unit], bool]
 ) -> list[str]:
-    progress, aside = _Progress(monitor), _Aside(run, monitor)
+    progress, aside = Progress(monitor), _Aside(run, monitor)
     for _ in range(REPAIRS):
         shift, damaged = _Shift(job, run, progress, aside, is_wanted), None
         if shift.left:
             progress.tell_before()
             # Workers of their own for each shift: those of the last have what was damaged in memory, and
             # would not write it again.
-            with closing(_open(job, run, crew, monitor)) as executor:
+            with closing(_open(job, run, crew, progress)) as executor:
                 sign_workers(run.folder, executor.slots)
                 damaged = shift.work(executor)
         if damaged is None:
             aside.check(len(shift.left))
             return shift.left
+        progress.take_back()
         run.forget(damaged)
         monitor.say(f"{damaged} is missing or damaged: what made it is done again")
     raise EnfiladeError(f"more than {REPAIRS} files of {run.folder} were damaged while it was worked on")
@@ -125,28 +128,27 @@ def _everything(_unit: Unit) -> bool:
     return True
 
 
-def _open(job: Job, run: Run, crew: Crew, monitor: Monitor) -> Executor:
-    def told(what: str, value: Any) -> None:
-        match what:
-            case "line":
-                run.record(value)
-            case "stage" | "advance" | "extend" | "say":
-                getattr(monitor, what)(*value)
+def _open(job: Job, run: Run, crew: Crew, progress: Progress) -> Executor:
+    def hear(unit: Unit, what: str, value: Any) -> None:
+        if what == "line":
+            run.record(value)
+        else:
+            progress.hear(unit, what, value)
 
     if crew.executor == "in-process":
-        return InProcess(_Here(job, run, monitor), told)
+        return InProcess(_Here(job, run), hear)
     cores = len(os.sched_getaffinity(0))
     threads = crew.threads or max(cores // (crew.workers or cores), 1)
     spec = {"folder": str(run.folder.resolve()), "device": active().backend, "threads": threads}
     recipe = Recipe("enfilade.pipeline.hire:open_worker", spec)
-    return open_executor(crew.executor, recipe, told, workers=crew.workers, logs=run.folder / LOGS)
+    return open_executor(crew.executor, recipe, hear, workers=crew.workers, logs=run.folder / LOGS)
 
 
 class _Shift:
     """One pass over the units, until all are done or a damaged file is found."""
 
     def __init__(
-        self, job: Job, run: Run, progress: _Progress, aside: _Aside, is_wanted: Callable[[Unit], bool]
+        self, job: Job, run: Run, progress: Progress, aside: _Aside, is_wanted: Callable[[Unit], bool]
     ) -> None:
         self._blueprint = Blueprint(job, run)
         self._run = run
@@ -211,6 +213,7 @@ class _Shift:
         return ()
 
     def _failed(self, unit: Unit, failures: list[Failure]) -> None:
+        self._progress.take_back(unit)
         failure, attempt = failures[-1], len(failures)
         after = "it is tried again" if attempt < ATTEMPTS else "it is set aside"
         is_scarce = failure.kind is FailureKind.MEMORY or (failure.kind is FailureKind.DIED and attempt > 1)
@@ -274,73 +277,16 @@ class _Aside:
 class _Here:
     """The recipe of the worker that is this process: it writes in the run itself."""
 
-    def __init__(self, job: Job, run: Run, monitor: Monitor) -> None:
+    def __init__(self, job: Job, run: Run) -> None:
         self._job = job
         self._run = run
-        self._monitor = monitor
 
     def make(self, tell: Any, *, share: int = 1) -> Callable[[str, Mapping[str, Any]], None]:
         """Make the worker."""
         from enfilade.pipeline.worker import Worker, smaller
 
-        del tell
         check_identity(self._job, self._run)
-        return Worker(smaller(self._job, share), self._run, self._monitor).do
-
-
-class _Progress:
-    """Counts this command's units for a monitor, by stage, over all shifts.
-
-    Units that were done before are told of and not counted: they took none of the time that has passed.
-    """
-
-    def __init__(self, monitor: Monitor) -> None:
-        self.monitor = monitor
-        self._before: dict[str, int] | None = {}  # None once they are told of
-        self._open: set[str] = set()  # units that are counted and not finished
-        self._totals: dict[str, int] = {}
-        self._begun: set[str] = set()
-        self._now = ""
-
-    def add(self, unit: Unit, *, is_done: bool) -> None:
-        """Take up a unit; one of an earlier shift is counted already."""
-        if not unit.stage:
-            return
-        if is_done:
-            if unit.name in self._open:
-                self.finish(unit)
-            elif self._before is not None:
-                self._before[unit.stage] = self._before.get(unit.stage, 0) + 1
-            return
-        if unit.name in self._open:
-            return
-        self._open.add(unit.name)
-        if unit.stage in self._begun and unit.stage == self._now:
-            self.monitor.extend(1)
-        else:
-            self._totals[unit.stage] = self._totals.get(unit.stage, 0) + 1
-
-    def tell_before(self) -> None:
-        """Say what was done before this command began; a second call does nothing."""
-        counts = [
-            f"{stage} {count} of {count + self._totals.get(stage, 0)}"
-            for stage, count in (self._before or {}).items()
-        ]
-        self._before = None
-        if counts:
-            self.monitor.say(f"done before: {', '.join(counts)}")
-
-    def finish(self, unit: Unit) -> None:
-        """Count a unit as done."""
-        if not unit.stage:
-            self._now = ""
-            return
-        self._now = unit.stage
-        self._begun.add(unit.stage)
-        self._open.discard(unit.name)
-        # Each time: what workers say of their clips comes in between.
-        self.monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
-        self.monitor.advance()
+        return Worker(smaller(self._job, share), self._run, Distant(tell)).do
 
 
 def bytes_needed(run: Run, names: list[str]) -> float:

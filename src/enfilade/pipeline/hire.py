@@ -43,23 +43,27 @@ def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
     job = read_job(folder)
     run = Run.joining(folder, lambda line: tell("line", line))
     check_identity(job, run)
-    return Worker(smaller(job, spec["share"]), run, _Distant(tell)).do
+    return Worker(smaller(job, spec["share"]), run, Distant(tell)).do
 
 
-class _Distant:
-    """A monitor elsewhere."""
+class Distant:
+    """A monitor elsewhere: what it is called with becomes reports."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell
 
     def stage(self, name: str, total: int) -> None:
+        """Report it."""
         self._tell("stage", [name, total])
 
     def advance(self, count: int = 1) -> None:
+        """Report it."""
         self._tell("advance", [count])
 
     def extend(self, count: int) -> None:
+        """Report it."""
         self._tell("extend", [count])
 
     def say(self, text: str) -> None:
+        """Report it."""
         self._tell("say", [text])
