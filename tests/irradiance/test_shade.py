@@ -209,6 +209,23 @@ def test_light_seen_from_one_side_is_shown_from_another(tmp_path):
     assert {name: ratio for name, ratio in ratios.items() if np.abs(ratio - 1.0).max() > 0.04} == {}
 
 
+@pytest.mark.parametrize("name", ["plastic", "roughplastic"])
+def test_light_under_a_coat_seen_at_a_slant_is_shown_from_above(tmp_path, name):
+    """A coat lets out a fifth less at a slant: light that is kept may not be without it."""
+    table = (
+        '</shape><shape type="rectangle" id="table"><transform name="to_world"><rotate x="1" angle="-90"/>'
+    )
+    renderer = _opened(tmp_path, {"ball": f'{table}<translate y="1.5"/></transform>{MATERIALS[name]}'})
+    flat = Camera(look_at((0, 1.75, 2.5), (0, 1.5, 0)), 36, 96, 36)
+    steep = Camera(look_at((0, 3.6, 0.8), (0, 1.5, 0)), 25, 32, 24)
+    where = find_geometry(renderer, steep).item.ravel() == renderer.describe().items.index("table") + 1
+    assert where.sum() > 200
+    ours = _shaded(renderer, _opened_cache([_page(renderer, flat)]), steep, 64)
+    reference = _traced(renderer, steep, 256)
+    ratio = (ours.color @ LUMINANCE)[where].sum() / (reference.color @ LUMINANCE)[where].sum()
+    assert abs(ratio - 1.0) < 0.03
+
+
 def test_a_page_knows_its_own_pixels(diffuse):
     renderer, pages = diffuse
     page = pages[0]

@@ -1,10 +1,11 @@
 """Mitsuba's BSDFs as a diffuse lobe times an albedo, and the rest.
 
-Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when asked to. Some do not
+Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when asked to. Their albedo is what
+that component sends straight ahead: a coat that lets less light out the more obliquely it is seen is part of
+it, so that the light by the albedo is the same whoever looks. Some BSDFs do not divide themselves
 (``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
 diffuse lobe is Lambert's with their own albedo, and the rest is what the whole BSDF has beyond it, which may
-be negative. Some have a diffuse component and don't say its albedo (``blendbsdf`` answers for all of itself,
-seen from where it is): theirs is what the component sends straight ahead.
+be negative.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
-UNTOLD = ("BlendBSDF", "PolarizedPlastic")  # their albedo
 LEAST_ALBEDO = 1e-4  # below it the diffuse lobe counts as none
 
 
@@ -39,16 +39,15 @@ class Lobes:
         materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
         numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
         registry = [int(number[0]) for number in numbers]
-        marks = np.zeros((2, max(registry, default=0) + 1), bool)
-        for mark, classes in zip(marks, (UNDIVIDED, UNTOLD), strict=True):
-            mark[registry] = [_has_any(material, classes) for material in materials]
-        self._is_undivided, self._is_untold = Bool(marks[0]), Bool(marks[1])
-        self._has_untold = bool(marks[1].any())
+        is_undivided = np.zeros(max(registry, default=0) + 1, bool)
+        is_undivided[registry] = [_has_undivided(material) for material in materials]
+        self._is_undivided = Bool(is_undivided)
+        self._has_undivided = bool(is_undivided.any())
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._is_undivided, self._is_untold
+        return self._is_undivided
 
     def is_undivided(self, seen: Any, material: Any) -> Any:
         """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
@@ -57,17 +56,13 @@ class Lobes:
 
     def albedo(self, seen: Any, material: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1: what light is multiplied with, and what the rest is without."""
-        # Of materials without a diffuse lobe Mitsuba would answer with their value straight ahead.
         is_diffuse = active & has_lobe(material.flags(), "DiffuseReflection", "DiffuseTransmission")
-        if self._has_untold:
-            number: Any = dr.reinterpret_array(UInt, material)
-            untold = dr.gather(Bool, self._is_untold, number, is_diffuse)
-            ahead = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), seen.wi.z))
-            sent = dr.pi * material.eval(self._diffuse, seen, ahead, is_diffuse & untold)
-            told = material.eval_diffuse_reflectance(seen, is_diffuse & ~untold)
-            albedo = dr.select(untold, sent, told)
-        else:
-            albedo = material.eval_diffuse_reflectance(seen, is_diffuse)
+        undivided = self.is_undivided(seen, material)
+        ahead = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), seen.wi.z))
+        albedo = dr.pi * material.eval(self._diffuse, seen, ahead, is_diffuse & ~undivided)
+        if self._has_undivided:
+            own = material.eval_diffuse_reflectance(seen, is_diffuse & undivided)
+            albedo = dr.select(undivided, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
 
@@ -137,10 +132,10 @@ class Lobes:
         return self.albedo(seen, material, active) * pdf, pdf
 
 
-def _has_any(material: Any, classes: tuple[str, ...]) -> bool:
-    """Whether a material, or one nested in it, is of some classes."""
+def _has_undivided(material: Any) -> bool:
+    """Whether a material, or one nested in it, does not divide itself."""
     nodes = mi.traverse(material).hierarchy
-    return any(isinstance(n, mi.BSDF) and n.class_name() in classes for n in nodes)
+    return any(isinstance(n, mi.BSDF) and n.class_name() in UNDIVIDED for n in nodes)
 
 
 def has_lobe(flags: Any, *lobes: str) -> Any:
