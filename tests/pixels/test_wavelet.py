@@ -86,6 +86,24 @@ def test_what_is_left_of_the_noise_is_told():
         assert 0.8 < told / left < 1.25
 
 
+def test_no_light_is_lost():
+    """One path in eight finds a lot: what it found counts as much when it is spread."""
+    size, found = (96, 128), np.random.default_rng(8)
+    light = (found.random((*size, 4)) < 0.125).mean(axis=2)
+    variance = light * (1.0 - light) / 3.0
+    normal = np.zeros((*size, 3), np.float32)
+    normal[..., 2] = 1.0
+    guide = Guide(
+        lanes(np.full(size, 4.0, np.float32)), lanes(normal), lanes(np.ones(size, np.uint32)),
+        matrix3(Camera(look_at((0, 0, 4), (0, 0, 0)), 40, *size[::-1]).direction_from_pixel), *size[::-1],
+    )  # fmt: skip
+    color = (light[..., None] * np.ones(3)).astype(np.float32)
+    smoothed, _ = smooth(lanes(color), lanes(variance.astype(np.float32)), guide, **{**OPTIONS, "levels": 4})
+    smoothed = image(smoothed, *size)
+    assert abs(smoothed.mean() / color.mean() - 1.0) < 0.005
+    assert smoothed.std() < 0.35 * color.std()
+
+
 def test_noise_goes_and_edges_stay(scene):
     color, variance = scene.smoothed(levels=4)
     inside = color[2:10, 1:4]

@@ -40,25 +40,31 @@ def _pass(color, variance, seen, *, step, deviations, plane, exponent):
         for x in range(width):
             here = depth[y, x] * (p @ (x + 0.5, y + 0.5, 1.0))
             total, total_variance, weight, squares = np.zeros(3), 0.0, 0.0, 0.0
+            own = 0.0  # what differs too much in luminance keeps its own value in the place of the other's
             for j, wy in zip(range(-2, 3), SPLINE, strict=True):
                 for i, wx in zip(range(-2, 3), SPLINE, strict=True):
                     v, u = y + j * step, x + i * step
                     if not (0 <= v < height and 0 <= u < width):
                         continue
-                    share = wy * wx
-                    if i or j:
-                        if item[v, u] != item[y, x]:
-                            continue
-                        there = depth[v, u] * (p @ (u + 0.5, v + 0.5, 1.0))
-                        away = abs(normal[y, x] @ (there - here)) / (plane * depth[y, x] + 1e-8)
-                        apart = abs(luminance[v, u] - luminance[y, x])
-                        apart /= deviations * np.sqrt(spread[v, u] + spread[y, x]) + 1e-8
-                        cosine = np.clip(normal[y, x] @ normal[v, u], 0.0, 1.0)
-                        share *= np.exp(-away - apart) * cosine**exponent
+                    surface = wy * wx
+                    if not i and not j:
+                        weight, own = weight + surface, own + surface
+                        continue
+                    if item[v, u] != item[y, x]:
+                        continue
+                    there = depth[v, u] * (p @ (u + 0.5, v + 0.5, 1.0))
+                    away = abs(normal[y, x] @ (there - here)) / (plane * depth[y, x] + 1e-8)
+                    cosine = np.clip(normal[y, x] @ normal[v, u], 0.0, 1.0)
+                    surface *= np.exp(-away) * cosine**exponent
+                    apart = abs(luminance[v, u] - luminance[y, x])
+                    apart /= deviations * np.sqrt(spread[v, u] + spread[y, x]) + 1e-8
+                    share = surface * np.exp(-apart)
                     total += share * color[v, u]
                     total_variance += share**2 * variance[v, u]
-                    weight += share
+                    weight, own = weight + surface, own + surface - share
                     squares += share**2
+            total, total_variance = total + own * color[y, x], total_variance + own**2 * variance[y, x]
+            squares += own**2
             out[y, x], out_variance[y, x] = total / weight, total_variance / weight**2
             shares[y, x] = squares / weight**2
     return out, out_variance, shares

@@ -105,29 +105,39 @@ def _pass(
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
     nearness = dr.rcp(plane * depth + TINY)
 
-    total, total_variance, weight, squares = Array3f(0), Float(0), Float(0), Float(0)
+    total, total_variance, squares = Array3f(0), Float(0), Float(0)
+    weight, taken = Float(0), Float(0)
     for down, weight_y in zip(range(-2, 3), SPLINE, strict=True):
         for across, weight_x in zip(range(-2, 3), SPLINE, strict=True):
             i, j = column + across * step, row + down * step
             is_inside = (i >= 0) & (j >= 0) & (i < width) & (j < height)
+            if not across and not down:
+                weight += Float(weight_x * weight_y)
+                continue
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.items, tap) == item)
             other = dr.gather(Array3f, color, tap)
-            # By the deviation of the difference: the same seen from both sides, so that no light is lost
-            # where what is noisy meets what is not.
+            # By the deviation of the difference: the same seen from both sides.
             deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
             difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) / deviation
             beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
-            difference += dr.abs(beyond - offset) * nearness
             cosine: Any = dr.clip(dr.dot(normal, dr.gather(Array3f, guide.normals, tap)), 0.0, 1.0)
-            share = dr.select(is_same, dr.exp(-difference) * cosine**exponent, 0.0) if across or down else 1.0
-            share = share * Float(weight_x * weight_y)
+            surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**exponent
+            surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
+            share = surface * dr.exp(-difference)
             total += share * other
             total_variance += share * share * dr.gather(Float, variance, tap)
-            weight += share
             squares += share * share
+            weight += surface
+            taken += share
+    # What differs too much is not left out of a mean, which would lose the light that few pixels have found:
+    # both keep what they have.
+    own = weight - taken
+    total += own * color
+    total_variance += own * own * variance
+    squares += own * own
     whole = weight * weight
     return total / weight, total_variance / whole, squares / whole
 
