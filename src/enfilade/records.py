@@ -169,7 +169,7 @@ class Geometry:
     normal : (H, W, 3) float32
         Shading normal in the world, unit length, towards the camera; 0 where nothing is hit.
     albedo : (H, W, 3) float32
-        Diffuse reflectance, 0..1.
+        Diffuse reflectance seen from there, a coat included, 0..1.
     item : (H, W) uint32
         Number of the shape that is seen, from 1; 0 where nothing is hit (the item buffer, §4.3).
     surface : (H, W) uint8

@@ -85,7 +85,7 @@ class Surfaces:
     normal : Array3f
         Shading normal in the world, unit length, on the side of the ray's origin.
     albedo : Array3f
-        Diffuse reflectance, 0..1.
+        Diffuse reflectance seen from there, a coat included, 0..1.
     item : UInt
         Number of the shape, from 1.
     surface : UInt
