@@ -69,39 +69,39 @@ def test_it_does_what_loops_do(scene):
     np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
 
 
-def test_what_is_left_of_the_noise_is_told():
-    size, flat = (96, 128), np.random.default_rng(7)
-    spread = flat.normal(0.5, 0.1, (*size, 1)).astype(np.float32) * np.ones(3, np.float32)
-    normal = np.zeros((*size, 3), np.float32)
+def on_a_wall(light, variance, **options):
+    """Smooth grey light on a plain wall, (H, W); with the variance that is left."""
+    height, width = light.shape
+    normal = np.zeros((height, width, 3), np.float32)
     normal[..., 2] = 1.0
     guide = Guide(
-        lanes(np.full(size, 4.0, np.float32)), lanes(normal), lanes(np.ones(size, np.uint32)),
-        matrix3(Camera(look_at((0, 0, 4), (0, 0, 0)), 40, *size[::-1]).direction_from_pixel), *size[::-1],
-    )  # fmt: skip
+        lanes(np.full(light.shape, 4.0, np.float32)),
+        lanes(normal),
+        lanes(np.ones(light.shape, np.uint32)),
+        matrix3(Camera(CAMERA.world_from_camera, 40, width, height).direction_from_pixel),
+        width,
+        height,
+    )
+    color = lanes((light[..., None] * np.ones(3)).astype(np.float32))
+    color, variance = smooth(color, lanes(variance.astype(np.float32)), guide, **{**OPTIONS, **options})
+    return image(color, height, width)[..., 0], image(variance, height, width)
+
+
+def test_what_is_left_of_the_noise_is_told():
+    light = np.random.default_rng(7).normal(0.5, 0.1, (96, 128))
+    inside = slice(20, -20), slice(20, -20)
     for levels in (1, 2, 4):
-        options = {**OPTIONS, "levels": levels, "deviations": 100.0}
-        color, variance = smooth(lanes(spread), lanes(np.full(size, 0.01, np.float32)), guide, **options)
-        inside = slice(20, -20), slice(20, -20)
-        left, told = image(color, *size)[inside].std(), np.sqrt(image(variance, *size)[inside].mean())
-        assert 0.8 < told / left < 1.25
+        smoothed, variance = on_a_wall(light, np.full(light.shape, 0.01), levels=levels, deviations=100.0)
+        told = np.sqrt(variance[inside].mean())
+        assert 0.8 < told / smoothed[inside].std() < 1.25
 
 
 def test_no_light_is_lost():
     """One path in eight finds a lot: what it found counts as much when it is spread."""
-    size, found = (96, 128), np.random.default_rng(8)
-    light = (found.random((*size, 4)) < 0.125).mean(axis=2)
-    variance = light * (1.0 - light) / 3.0
-    normal = np.zeros((*size, 3), np.float32)
-    normal[..., 2] = 1.0
-    guide = Guide(
-        lanes(np.full(size, 4.0, np.float32)), lanes(normal), lanes(np.ones(size, np.uint32)),
-        matrix3(Camera(look_at((0, 0, 4), (0, 0, 0)), 40, *size[::-1]).direction_from_pixel), *size[::-1],
-    )  # fmt: skip
-    color = (light[..., None] * np.ones(3)).astype(np.float32)
-    smoothed, _ = smooth(lanes(color), lanes(variance.astype(np.float32)), guide, **{**OPTIONS, "levels": 4})
-    smoothed = image(smoothed, *size)
-    assert abs(smoothed.mean() / color.mean() - 1.0) < 0.005
-    assert smoothed.std() < 0.35 * color.std()
+    light = (np.random.default_rng(8).random((96, 128, 4)) < 0.125).mean(axis=2)
+    smoothed, _ = on_a_wall(light, light * (1.0 - light) / 3.0, levels=4)
+    assert abs(smoothed.mean() / light.mean() - 1.0) < 0.005
+    assert smoothed.std() < 0.35 * light.std()
 
 
 def test_noise_goes_and_edges_stay(scene):
