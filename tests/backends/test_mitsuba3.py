@@ -4,6 +4,8 @@ import dataclasses
 import gc
 import math
 import re
+import subprocess
+import sys
 
 import drjit as dr
 import mitsuba as mi
@@ -428,8 +430,41 @@ def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
     direct = of_integrator(tmp_path, '<integrator type="direct"/>')
     with pytest.raises(SceneError, match="DirectIntegrator, has no longest path: leave --trace"):
         opened(direct, max_depth=7)
-    with pytest.raises(SceneError, match="can't be asked for single pixels"):
-        opened(of_integrator(tmp_path, '<integrator type="ptracer"/>'))
+    for name in ("ptracer", "prb", "prbvolpath"):
+        with pytest.raises(SceneError, match="can't be asked for single pixels"):
+            opened(of_integrator(tmp_path, f'<integrator type="{name}"/>'))
+
+
+def test_fog_around_the_camera_is_that_of_the_scenes_camera(tmp_path):
+    fog = '<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/></medium>'
+    around = '<bsdf type="null"/><ref name="exterior" id="fog"/>'
+    file = tmp_path / "scene.xml"
+    file.write_text(
+        f'<scene version="3.0.0"><integrator type="volpath"/>{fog}'
+        '<sensor type="perspective"><ref name="medium" id="fog"/></sensor>'
+        f"{placed('sphere', 'ball', (0, 0, 0), around)}"
+        '<emitter type="point"><rgb name="intensity" value="9"/><point name="position" y="3"/></emitter>'
+        "</scene>"
+    )
+    renderer, camera = opened(file), Camera(look_at((0, 0.2, 3), (0, 0, 0)), 40.0, 16, 12)
+    ours = traced(renderer, camera, spp=64)
+    assert (ours.color @ REC709).min() > 0.001  # beside the ball nothing but fog is lit
+
+
+def test_one_thread_opens_a_scene_with_openexr_files(tmp_path):
+    write_holes(tmp_path)
+    sky = '<emitter type="envmap"><string name="filename" value="holes.exr"/></emitter>'
+    file = write(tmp_path, placed("sphere", "ball", (0, 0, 0), DIFFUSE), sky=sky)
+    script = (
+        "import sys; from pathlib import Path; import drjit as dr\n"
+        "from enfilade.backends.mitsuba3 import MitsubaRenderer\n"
+        "from enfilade.settings import TraceSettings\n"
+        "dr.set_thread_count(1); MitsubaRenderer(Path(sys.argv[1]), TraceSettings())\n"
+        "print(dr.thread_count())"
+    )
+    line = [sys.executable, "-c", script, file]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=120, check=True)  # noqa: S603
+    assert done.stdout.strip() == "1"
 
 
 def compiled_since():
@@ -465,6 +500,7 @@ def test_no_kernel_is_compiled_from_frame_to_frame(corner):
             "gone",
         ),
         ("<scene version='3.0.0'></scene>", "no shapes"),
+        ("<scene version='3.0.0'><shape type='sphere'/></scene>", "no light"),
         ("", "scene.xml"),
         ("just words", "scene.xml"),
     ],

@@ -27,9 +27,10 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
         It does not compute what arrives along a ray, or knows no limit of edges.
     """
     own = scene.integrator() or mi.load_dict({"type": "path"})
-    if not isinstance(own, mi.SamplingIntegrator):
+    # Those for derivatives are sampling integrators by their class alone: they take other arguments.
+    if not isinstance(own, mi.SamplingIntegrator) or isinstance(own, mi.CppADIntegrator):
         raise SceneError(
-            f"the scene's integrator, {own.class_name()}, can't be asked for single pixels; "
+            f"the scene's integrator, {type(own).__name__}, can't be asked for single pixels; "
             'write <integrator type="path"/> in its place'
         )
     if not max_depth:

@@ -7,6 +7,8 @@ since changing its size or crop compiles anew and its Gaussian filter adds in no
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +73,8 @@ class MitsubaRenderer:
         mi.set_log_level(mi.LogLevel.Error)
         try:
             # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
-            scene = mi.load_file(str(file), optimize=False)
+            with _several_threads():
+                scene = mi.load_file(str(file), optimize=False)
         except MemoryError:
             raise
         except Exception as error:
@@ -82,10 +85,14 @@ class MitsubaRenderer:
             raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
         if not scene.shapes():
             raise SceneError(f"{file} has no shapes: there is nothing to render")
+        if not scene.emitters():
+            raise SceneError(f"{file} has no light, every frame would be black: add an <emitter>")
         self._scene = scene
         self._chunk = settings.chunk
         self._integrator = scene_integrator(scene, settings.max_depth)
         self._onward = [shortened(self._integrator, edges) for edges in range(1, MOST_EDGES + 1)]
+        # What cameras stand in is said by the scene's own; poses are the path's.
+        self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
         self._light = Light(scene, self._radiance_onward)
         self._items = _items(scene)
@@ -93,8 +100,7 @@ class MitsubaRenderer:
         self._surfaces = recorded(lambda rays: self._find(rays)[0], lambda: self.state)
         # Mitsuba prepares the sampling of a mesh that emits when it is first asked for: now, and not while a
         # kernel is recorded.
-        if scene.emitters():
-            dr.eval(scene.sample_emitter_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5)))
+        dr.eval(scene.sample_emitter_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5)))
 
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""
@@ -216,7 +222,7 @@ class MitsubaRenderer:
         self._sampler.rng = rng
         integrator = integrator or self._integrator
         radiance, _, _ = integrator.sample(
-            self._scene, self._sampler, mi.RayDifferential3f(ray), None, active
+            self._scene, self._sampler, mi.RayDifferential3f(ray), self._medium, active
         )
         # Nothing may be kept that holds NumPy's memory: it can't be let go while a kernel is recorded.
         self._sampler.rng = None
@@ -246,11 +252,23 @@ class MitsubaRenderer:
         return seen, distance
 
     def _lets_pass(self, seen: Any, passed: float) -> Any:
+        """Whether a surface is looked through: one that emits never is, its light would be lost."""
         material = seen.bsdf()
         number: Any = dr.reinterpret_array(mi.UInt32, material)
         is_passable = dr.gather(Bool, self._items.is_passable, number, seen.is_valid())
         through = material.eval_null_transmission(seen, is_passable)
-        return is_passable & (mi.luminance(through) > passed)
+        return is_passable & ~seen.shape.is_emitter() & (mi.luminance(through) > passed)
+
+
+@contextmanager
+def _several_threads() -> Iterator[None]:
+    """With one thread Mitsuba waits forever for an OpenEXR file, which it reads by tasks of its own."""
+    threads = dr.thread_count()
+    dr.set_thread_count(max(threads, 2))
+    try:
+        yield
+    finally:
+        dr.set_thread_count(threads)
 
 
 @dataclass(frozen=True)
