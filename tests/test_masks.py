@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis.extra.numpy import arrays
 
 from enfilade.camera import Camera, look_at
-from enfilade.masks import item_pixels, slow_pixels, sources, visible_items
+from enfilade.masks import slow_pixels, sources, specular_pixels, unseen_items
 from enfilade.records import Geometry, Source, SurfaceClass
 from enfilade.settings import MaskSettings
 
@@ -34,8 +34,10 @@ def two_panes():
 
 
 def seen(jnd, item=None, *, is_judged=EVERYWHERE, surface=SurfaceClass.GLOSSY, settings=SETTINGS):
+    """Items of which something must be traced."""
     geometry = scene(two_panes() if item is None else item, surface)
-    return visible_items(jnd.astype(np.float32), is_judged, geometry, settings)
+    unseen = unseen_items(jnd.astype(np.float32), is_judged, geometry, settings)
+    return frozenset(geometry.item[specular_pixels(geometry, unseen)].tolist())
 
 
 def differences(*places):
@@ -69,12 +71,13 @@ def test_each_pixel_is_counted_once_in_the_papers_order(is_slow, is_specular, is
     assert np.bincount(got.ravel(), minlength=5).sum() == got.size
 
 
-def test_items_of_a_frame():
-    item = np.array([[0, 1, 2], [3, 2, 0]], np.uint32)
-    np.testing.assert_array_equal(
-        item_pixels(item, frozenset({2, 3})), [[False, False, True], [True, True, False]]
-    )
-    assert not item_pixels(item, frozenset()).any()
+def test_what_was_not_judged_unseen_is_traced():
+    # Item 4 comes into view in another frame than the one that was judged.
+    item = two_panes()
+    item[0:3, 0:3] = 4
+    geometry = scene(item)
+    np.testing.assert_array_equal(specular_pixels(geometry, frozenset({2, 3})), item == 4)
+    np.testing.assert_array_equal(specular_pixels(geometry, frozenset()), item > 1)
 
 
 def test_nothing_differs():
@@ -144,16 +147,24 @@ def test_other_surfaces_are_not_judged():
         assert seen(group, surface=surface) == {2, 3}
 
 
-def test_what_was_not_judged_does_not_count():
+def test_differences_that_were_not_judged_do_not_count():
     group = differences((slice(6, 8), slice(4, 6), 2.5))
     hidden = EVERYWHERE.copy()
     hidden[6:8, 4:6] = False
     assert seen(group, is_judged=hidden) == frozenset()
-    assert seen(group, is_judged=~EVERYWHERE) == frozenset()
     # A quarter is of the judged pixels: 20 of 60.
+    most = EVERYWHERE.copy()
+    most[11:15] = False
+    assert seen(differences((slice(5, 7), slice(3, 13), 1.5)), is_judged=most) == {2}
+
+
+def test_an_item_of_which_less_than_half_is_judged_is_traced():
     half = EVERYWHERE.copy()
-    half[11:15] = False
-    assert seen(differences((slice(5, 7), slice(3, 13), 1.5)), is_judged=half) == {2}
+    half[10:15, 3:13] = False
+    assert seen(differences(), is_judged=half) == frozenset()
+    half[9, 3] = False
+    assert seen(differences(), is_judged=half) == {2}
+    assert seen(differences(), is_judged=~EVERYWHERE) == {2, 3}
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])

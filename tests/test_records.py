@@ -130,9 +130,16 @@ def test_segments_split_until_nothing_is_between(first, length):
         assert segment.depth <= 5  # log2 of 24, rounded up
         if len(segment.inbetweens):
             middle = segment.inbetweens[len(segment.inbetweens) // 2]
-            assert 0 < segment.progress(middle) < 1
             todo.extend(segment.split(middle))
     assert seen == set(range(first, first + length + 1))
+
+
+def test_progress_counts_views_and_no_rests():
+    # Thirty frames at rest, then thirty steps: the first step is near the view of the rest.
+    cameras = [Camera(look_at((max(step, 0), 0, 1), (0, 0, 0)), 50.0, W, H) for step in range(-29, 31)]
+    path, segment = CameraPath(tuple(cameras), tuple(range(60)), 24.0), Segment(0, 38)
+    assert path.moving(segment) == list(range(30, 38))
+    assert [path.progress(segment, frame) for frame in (30, 37)] == pytest.approx([1 / 9, 8 / 9])
 
 
 def test_neighbours_and_rest_end_at_a_cut():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.records import F32, U8, U32, Geometry, Mask, Source
+from enfilade.records import F32, U8, Geometry, Mask, Source
 from enfilade.settings import MaskSettings
 
+JUDGED_SHARE = 0.5  # of an item's pixels: with fewer judged nothing is known of the item
 GROUP = 4  # fewest connected pixels that count as a group: less is an outlier, not a feature
 EIGHT_CONNECTED = np.ones((3, 3), bool)
 
@@ -16,12 +17,12 @@ def slow_pixels(speed_deg_s: F32, settings: MaskSettings) -> Mask:
     return speed_deg_s < settings.slow_deg_s
 
 
-def visible_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings) -> frozenset[int]:
-    """Specular items whose reuse would be seen (§4.3 step 4b, thresholds of §6).
+def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings) -> frozenset[int]:
+    """Specular items whose reuse is not seen (§4.3 step 4b, thresholds of §6).
 
     Each connected region of a specular item is judged by itself: when a group of its pixels differs
     by more than 2 JND, or when more than a quarter of them differ by more than 1 JND, its item is
-    selected, for the whole segment.
+    seen. What can't be judged is taken for seen: an item of which both keyframes show less than half.
 
     Parameters
     ----------
@@ -31,21 +32,32 @@ def visible_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskS
         Pixels at which both of them see the surface.
     geometry
         Of the frame itself.
+
+    Returns
+    -------
+    frozenset of int
+        All others, also those that the frame does not show, must be traced in the whole segment.
     """
     import scipy.ndimage
 
     is_candidate = geometry.is_specular & is_judged
-    selected: set[int] = set()
+    unseen: set[int] = set()
     for item in np.unique(geometry.item[is_candidate]).tolist():
-        regions, count = scipy.ndimage.label(is_candidate & (geometry.item == item), EIGHT_CONNECTED)
-        if any(_is_seen(jnd, regions == r, settings) for r in range(1, count + 1)):
-            selected.add(int(item))
-    return frozenset(selected)
+        shown = geometry.is_specular & (geometry.item == item)
+        judged = shown & is_judged
+        if np.count_nonzero(judged) < JUDGED_SHARE * np.count_nonzero(shown):
+            continue
+        regions, _ = scipy.ndimage.label(judged, EIGHT_CONNECTED)
+        boxes = enumerate(scipy.ndimage.find_objects(regions), 1)
+        if not any(_is_seen(jnd[box], regions[box] == region, settings) for region, box in boxes):
+            unseen.add(int(item))
+    return frozenset(unseen)
 
 
-def item_pixels(item: U32, items: frozenset[int]) -> Mask:
-    """Pixels that show one of these items, (H, W)."""
-    return np.isin(item, list(items))
+def specular_pixels(geometry: Geometry, unseen: frozenset[int]) -> Mask:
+    """Pixels that must be traced since they shine, (H, W): all but those of `unseen_items`."""
+    must: Mask = geometry.is_specular & ~np.isin(geometry.item, list(unseen))
+    return must
 
 
 def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
@@ -66,8 +78,6 @@ def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
 def _is_seen(jnd: F32, region: Mask, settings: MaskSettings) -> bool:
     import scipy.ndimage
 
-    box = scipy.ndimage.find_objects(region.astype(np.uint8))[0]
-    region, jnd = region[box], jnd[box]
     if (region & (jnd > 1.0)).sum() * 100.0 > settings.specular_percent * region.sum():
         return True
     groups, count = scipy.ndimage.label(region & (jnd > settings.specular_jnd), EIGHT_CONNECTED)

@@ -69,10 +69,6 @@ class Segment:
         """Frames that are neither keyframe."""
         return range(self.first + 1, self.last)
 
-    def progress(self, frame: int) -> float:
-        """Where a frame lies between the keyframes, 0..1."""
-        return (frame - self.first) / (self.last - self.first)
-
     def split(self, frame: int) -> tuple[Segment, Segment]:
         """Two halves that share a frame."""
         return (
@@ -146,10 +142,19 @@ class CameraPath:
         moves = [int(original == frame) for frame, original in enumerate(self._originals)]
         return [place - 1 for place in itertools.accumulate(moves)]
 
+    def moving(self, segment: Segment) -> list[int]:
+        """The in-betweens of a segment that show a view of their own: those that are no copies."""
+        return [frame for frame in segment.inbetweens if self.original(frame) == frame]
+
     def middle(self, segment: Segment) -> int | None:
         """The in-between that stands for a segment (§4.3): the middle one of those that move."""
-        moving = [frame for frame in segment.inbetweens if self.original(frame) == frame]
+        moving = self.moving(segment)
         return moving[(len(moving) - 1) // 2] if moving else None
+
+    def progress(self, segment: Segment, frame: int) -> float:
+        """Where the view of a frame that moves lies between those of a segment's keyframes, in (0, 1)."""
+        first, last = self.place(segment.first), self.place(segment.last)
+        return (self.place(frame) - first) / (last - first)
 
     def shots(self) -> list[range]:
         """Runs of frames without a cut between them."""

@@ -443,7 +443,8 @@ def test_fog_around_the_camera_is_that_of_the_scenes_camera(tmp_path):
         f'<scene version="3.0.0"><integrator type="volpath"/>{fog}'
         '<sensor type="perspective"><ref name="medium" id="fog"/></sensor>'
         f"{placed('sphere', 'ball', (0, 0, 0), around)}"
-        '<emitter type="point"><rgb name="intensity" value="9"/><point name="position" y="3"/></emitter>'
+        '<emitter type="point"><rgb name="intensity" value="9"/>'
+        '<point name="position" x="0" y="3" z="0"/></emitter>'
         "</scene>"
     )
     renderer, camera = opened(file), Camera(look_at((0, 0.2, 3), (0, 0, 0)), 40.0, 16, 12)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from enfilade.errors import InputError
-from enfilade.metric import Aqm, Pursuit
+from enfilade.metric import Aqm, MetricOptions, Pursuit
 from enfilade.viewing import Viewing
 
 PAPER = Viewing(640, 480)
@@ -121,6 +121,18 @@ def test_a_uniform_shift_does_not_move(metric):
     moved = metric.compare(test, reference, velocity=moving((128, 160), 20.0, 5.0))
     assert 0 < still.score < 1
     assert moved.score == pytest.approx(still.score, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.45, 0.55])
+@pytest.mark.parametrize("speed", [0.0, 5.0])
+def test_where_most_of_a_frame_is_brighter_the_rest_is_not_seen(viewing, share, speed):
+    reference = np.full((128, 160), 50.0, np.float32)
+    test = reference.copy()
+    test[:, : int(160 * share)] = 55.0
+    velocity = moving(reference.shape, speed, 0.0)
+    for options in (MetricOptions.modern(), MetricOptions()):
+        jnd = Aqm(viewing, options=options).compare(test, reference, velocity=velocity).jnd
+        assert jnd[:, 150:].max() < 0.1 * jnd[:, :60].max()
 
 
 def test_both_hypotheses_take_the_larger_sensitivity(metric, textured):

@@ -17,7 +17,7 @@ from enfilade.metric.eye import Pursuit, held_smear, retinal_velocity
 from enfilade.metric.gathered import BandWeight, FixedWeight, Turning
 from enfilade.metric.inputs import check_luminance, check_map, check_valid
 from enfilade.metric.masking import MASK_SLOPE
-from enfilade.metric.noise import NOISE_SIGMAS
+from enfilade.metric.noise import NOISE_SIGMAS, Noise
 from enfilade.metric.observer import Observer
 from enfilade.metric.options import Fitted, MetricOptions
 from enfilade.metric.pair import ImagePair, Retina
@@ -141,6 +141,7 @@ class Aqm:
         velocity: Float32Array | None = None,
         valid: BoolArray | None = None,
         noise_variance: Float32Array | None = None,
+        noise_blur_px: Float32Array | None = None,
         change: Float32Array | None = None,
         pursuit: Pursuit | None = None,
     ) -> Comparison:
@@ -160,6 +161,9 @@ class Aqm:
             Variance of the Monte Carlo noise in test - reference, (cd/m2)^2, which is the sum of
             the two images' variances when their samples are independent. See `metric.noise` for
             how much of a difference is then not counted.
+        noise_blur_px : (H, W) float32, optional
+            Standard deviation of the Gaussian through which both images went after the variance was
+            told, pixels. None: none.
         change : (H, W) float32, optional
             How much test - reference has changed since the last frame, at the same point of the
             same surface, cd/m2 (`metric.transient`); 0 where not valid. None: it has not.
@@ -180,11 +184,14 @@ class Aqm:
         self.check(test, reference, velocity=velocity, valid=valid)
         if noise_variance is not None:
             check_map("noise_variance", noise_variance, self._shape, valid, is_signed=False)
+        if noise_blur_px is not None:
+            check_map("noise_blur_px", noise_blur_px, self._shape, None, is_signed=False)
         if change is not None:
             check_map("change", change, self._shape, None, is_signed=True)
         is_judged = np.ones(self._shape, dtype=np.bool_) if valid is None else valid.copy()
         test, reference = fill_undefined(test, reference, valid)
-        pair = self._retina.pair(test, reference, is_judged, noise_variance, change)
+        noise = None if noise_variance is None else Noise(noise_variance, noise_blur_px)
+        pair = self._retina.pair(test, reference, is_judged, noise, change)
         movements = (pursuit or self.pursuit).hypotheses
         plane = None if velocity is None else _every_second(velocity, is_judged)
         sensitivity = self._sensitivity(pair, plane, movements)
@@ -256,9 +263,10 @@ class Aqm:
         for orientation in self.cortex.orientations(band):
             channel = self.cortex.fan(ring, band, orientation)
             reference, difference = self._border.crop(channel, band.reduction, shape)
-            uniform = pair.uniform_part(difference, band.reduction) if band.is_base else 0.0
+            uniform = pair.uniform_part(difference, band.reduction) if band.is_base else None
             test = None if self.options.transducer else reference + difference
-            difference -= np.float32(uniform)
+            if uniform is not None:
+                difference -= uniform
             if pair.noise is not None:
                 deviation = pair.noise.deviation(band, orientation)
                 explained = np.float32(NOISE_SIGMAS) * self._border.crop(deviation, band.reduction, shape)
@@ -271,10 +279,8 @@ class Aqm:
                 test *= weight
             reference *= weight
             difference *= weight
-            if uniform:
-                still = _at_size(sensitivity.still(band) * contrast, band, shape)
-                still = still * np.float32(abs(uniform))
-                difference += np.copysign(still, difference)
+            if uniform is not None:
+                difference += uniform * _at_size(sensitivity.still(band) * contrast, band, shape)
             yield reference, test, difference
 
     def _is_raw(self, pair: ImagePair, band: Band) -> bool:

@@ -16,7 +16,11 @@ A channel's difference then counts only as far as it exceeds NOISE_SIGMAS standa
 is not counted, and of a larger one the part that noise may have added is taken off. Three standard
 deviations would leave 0.3 % of the samples in each of up to 31 channels; four leave 0.006 %.
 
-What it does not do: noise that is correlated between neighbouring pixels (after bilinear
+Images that were filtered by a Gaussian since have less noise in their fine channels, and less of any
+difference: given the Gaussian's deviation at each pixel, a channel's noise is taken to pass as much as
+that filter leaves of white noise in the channel's ring.
+
+What it does not do: noise that is otherwise correlated between neighbouring pixels (after bilinear
 resampling, splatting or a denoiser) has more power at low and less at high frequencies than its
 variance says, so that low bands may still count it; give such images the variance they had before,
 or larger. Fireflies are not Gaussian, and exceed four of their (badly known) standard deviations
@@ -25,6 +29,8 @@ more often. Noise remains a mask for the viewer: thresholds are elevated by the 
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -35,13 +41,31 @@ from enfilade.metric.amplitude import response
 from enfilade.metric.cortex import Band, CortexTransform
 from enfilade.metric.pyramid import halve_periodic
 
-__all__ = ["NOISE_SIGMAS", "ChannelNoise", "NoiseFilters", "response_noise"]
+__all__ = ["NOISE_SIGMAS", "ChannelNoise", "Noise", "NoiseFilters", "response_noise"]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Complex64Array: TypeAlias = npt.NDArray[np.complex64]
 
 NOISE_SIGMAS = 4.0  # no unit: our choice, see above
 LEAST_DEVIATION_CD_M2 = 1e-4  # keeps the slope finite where there is no noise
+BLUR_SIGMAS = 3.0  # the Gaussian filter ends after so many standard deviations to either side ...
+BLUR_STEPS = 12  # ... and is tabulated at so many widths a pixel
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Noise in the difference of two images.
+
+    Attributes
+    ----------
+    variance : (H, W) float32
+        (cd/m2)^2, before the images were filtered.
+    blur_px : (H, W) float32 or None
+        Standard deviation of the Gaussian that filtered both since, pixels.
+    """
+
+    variance: Float32Array
+    blur_px: Float32Array | None = None
 
 
 def response_noise(mean_cd_m2: Float32Array, variance: Float32Array) -> Float32Array:
@@ -99,6 +123,19 @@ class NoiseFilters:
             kernel /= np.float32(kernel.sum(dtype=np.float64))
             self._reaches[band.level] = cortex.spectra(kernel[None])[0].real.copy()
 
+    def passing(self, band: Band, blur_px: Float32Array) -> Float32Array:
+        """Share of the variance of a band's white noise that Gaussians of these deviations leave."""
+        widths = np.arange(math.ceil(float(blur_px.max()) * BLUR_STEPS) + 1) / BLUR_STEPS
+        spectrum = np.ones((1, self.cortex.height_px, self.cortex.width_px // 2 + 1), np.complex64)
+        power = np.square(np.abs(self.cortex.ring(spectrum, band)[0]))
+        power[:, 1:] *= np.float32(2.0)  # the other half of the spectrum
+        rows, columns = power.shape
+        down = _gaussian_response(np.fft.fftfreq(rows) / band.reduction, widths)
+        across = _gaussian_response(np.fft.rfftfreq(self.cortex.width_px)[:columns], widths)
+        left = np.einsum("kr,rc,kc->k", np.square(down), power, np.square(across), optimize=True)
+        passing: Float32Array = np.interp(blur_px, widths, left / left[0]).astype(np.float32)
+        return passing
+
     def gain(self, band: Band, orientation: int | None) -> float:
         """Variance of a channel's response to white noise of variance one."""
         return self._gains[band.level, orientation]
@@ -119,9 +156,13 @@ class ChannelNoise:
         Of the Cortex transform.
     variance : (padded height, padded width) float32
         Noise variance in the difference of the responses (`response_noise`), padded.
+    blur_px : (padded height, padded width) float32 or None
+        Of the Gaussian that filtered the images since, padded.
     """
 
-    def __init__(self, filters: NoiseFilters, variance: Float32Array) -> None:
+    def __init__(
+        self, filters: NoiseFilters, variance: Float32Array, blur_px: Float32Array | None = None
+    ) -> None:
         self._filters = filters
         self._averages: dict[int, Float32Array] = {}
         reduction = 1
@@ -130,10 +171,26 @@ class ChannelNoise:
             if band.reduction != reduction:
                 while reduction < band.reduction:
                     variance = halve_periodic(variance)
+                    blur_px = None if blur_px is None else halve_periodic(blur_px)
                     reduction *= 2
                 spectrum = filters.cortex.spectra(variance)
+            if blur_px is not None:
+                spectrum = filters.cortex.spectra(variance * filters.passing(band, blur_px))
             self._averages[band.level] = np.sqrt(filters.average(spectrum, band))
 
     def deviation(self, band: Band, orientation: int | None) -> Float32Array:
         """Standard deviation sigma_kl, a map at the band's padded reduced size."""
         return self._averages[band.level] * np.float32(self._filters.gain(band, orientation) ** 0.5)
+
+
+def _gaussian_response(
+    frequency_cpp: npt.NDArray[np.floating], widths_px: npt.NDArray[np.floating]
+) -> npt.NDArray[np.floating]:
+    """Transfer of Gaussians with taps at whole pixels, (widths, frequencies)."""
+    reach = np.floor(BLUR_SIGMAS * widths_px)
+    taps = np.arange(int(reach.max()) + 1)
+    weights = np.exp(-0.5 * np.square(taps / np.maximum(widths_px[:, None], 1e-9)))
+    weights *= (taps <= reach[:, None]) * np.where(taps > 0, 2.0, 1.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    transfer: npt.NDArray[np.floating] = weights @ np.cos(2.0 * np.pi * taps[:, None] * frequency_cpp)
+    return transfer

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -12,7 +13,7 @@ from enfilade.metric.adaptation import DARKEST_CD_M2, AdaptingLight, adapting_lu
 from enfilade.metric.amplitude import contrast_shrinkage, response
 from enfilade.metric.borders import MirrorBorder
 from enfilade.metric.cortex import Complex64Array, CortexTransform
-from enfilade.metric.noise import ChannelNoise, NoiseFilters, response_noise
+from enfilade.metric.noise import ChannelNoise, Noise, NoiseFilters, response_noise
 
 __all__ = ["ImagePair", "Retina"]
 
@@ -45,19 +46,23 @@ class ImagePair:
     noise: ChannelNoise | None
     is_judged: BoolArray
 
-    def uniform_part(self, difference: Float32Array, reduction: int) -> float:
-        """Median over the judged area of a coarse map of differences, 0 where nothing is judged.
+    def uniform_part(self, difference: Float32Array, reduction: int) -> Float32Array:
+        """The part of a coarse map of differences that is the same everywhere.
+
+        At each pixel what it has of the median over the judged area: all of it, or less where its own
+        difference is less or of the other sign. 0 where nothing is judged.
 
         The part of a difference that is the same everywhere has no frequency, so that it does not
         move over the retina however fast the image does, and it is seen as if it stood still. (As
         part of the base band it would be taken for a pattern of 0.2 cycles per degree, to which
         Eq. 4 is thirty times more sensitive at 20 deg/s than at rest.) The median rather than the mean
-        leaves a local defect local.
+        leaves a local defect local; and where most of an image differs, the rest that does not stays 0.
         """
         is_judged = self.is_judged[::reduction, ::reduction]
         rows, columns = is_judged.shape
         judged = difference[:rows, :columns][is_judged]
-        return float(np.median(judged)) if judged.size else 0.0
+        median = np.float32(np.median(judged) if judged.size else 0.0)
+        return np.clip(difference, np.minimum(median, 0.0), np.maximum(median, 0.0))
 
 
 class Retina:
@@ -83,22 +88,23 @@ class Retina:
         self._cortex = cortex
         self._pixels_per_degree = pixels_per_degree
         self._is_adaptive = is_adaptive
-        self._noise_filters: NoiseFilters | None = None
 
     def pair(
         self,
         test: Float32Array,
         reference: Float32Array,
         is_judged: BoolArray,
-        noise_variance: Float32Array | None,
+        noise: Noise | None,
         change: Float32Array | None,
     ) -> ImagePair:
         """Take two images in.
 
         Parameters
         ----------
-        test, reference, is_judged, noise_variance, change
+        test, reference, is_judged, change
             As in `Aqm.compare`; equal and finite where not judged.
+        noise : Noise or None
+            In test - reference.
         """
         mean_cd_m2 = max(_mean(reference, is_judged), DARKEST_CD_M2)
         respond = _as_it_is if self._is_adaptive else response
@@ -118,20 +124,18 @@ class Retina:
             darkest = response(np.asarray(DARKEST_CD_M2, dtype=np.float32))
             scale = 1.0 / (max(float(mean), float(darkest)) * contrast_shrinkage(mean_cd_m2))
             contrast = AdaptingLight(np.asarray(scale, dtype=np.float32))
-        noise = None
-        if noise_variance is not None:
-            variance = np.where(is_judged, noise_variance, np.float32(0.0))
-            noise = self._channel_noise(test, reference, variance)
-        return ImagePair(self._cortex.spectra(images), light, contrast, noise, is_judged)
+        channel_noise: ChannelNoise | None = None
+        if noise is not None:
+            variance = np.where(is_judged, noise.variance, np.float32(0.0))
+            if not self._is_adaptive:
+                variance = response_noise(np.float32(0.5) * (test + reference), variance)
+            blur_px = None if noise.blur_px is None else self._border.pad(noise.blur_px)
+            channel_noise = ChannelNoise(self._noise_filters, self._border.pad(variance), blur_px)
+        return ImagePair(self._cortex.spectra(images), light, contrast, channel_noise, is_judged)
 
-    def _channel_noise(
-        self, test: Float32Array, reference: Float32Array, variance: Float32Array
-    ) -> ChannelNoise:
-        if self._noise_filters is None:
-            self._noise_filters = NoiseFilters(self._cortex)
-        if not self._is_adaptive:
-            variance = response_noise(np.float32(0.5) * (test + reference), variance)
-        return ChannelNoise(self._noise_filters, self._border.pad(variance))
+    @cached_property
+    def _noise_filters(self) -> NoiseFilters:
+        return NoiseFilters(self._cortex)
 
 
 def _mean(image: Float32Array, is_judged: BoolArray) -> float:

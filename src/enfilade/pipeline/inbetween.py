@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from enfilade.codec import read_frame, write_frame
-from enfilade.masks import item_pixels, slow_pixels, sources
+from enfilade.masks import slow_pixels, sources, specular_pixels
 from enfilade.pipeline.refine import Verdict, warped_pair
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import Frame, Segment, Source
+from enfilade.records import F32, Frame, Mask, Segment, Source
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.warp import composite
 
@@ -26,12 +26,18 @@ def read_raw(workshop: Workshop, frame: int) -> Frame:
 
 
 def make_keyframe(workshop: Workshop, frame: int) -> None:
-    """Take a keyframe as it was traced."""
+    """Take a keyframe as it was traced, but for its slow pixels.
+
+    For them no filter will find new samples along the flow (§5.2): they are traced once more, with paths
+    that are spread over the pixel. What is warped keeps those through the pixels' centres.
+    """
     if workshop.run.done(raw_unit(workshop, frame)):
         return
-    shading = workshop.keyframe(frame).shading
-    source = np.full(shading.variance.shape, Source.KEYFRAME, np.uint8)
-    _write(workshop, frame, Frame(shading.color, source), dropped=0)
+    color = workshop.keyframe(frame).shading.color.copy()
+    is_slow = slow_pixels(workshop.views[frame].speed_deg_s, workshop.job.settings.masks)
+    dropped = _fill(workshop, frame, color, is_slow)
+    source = np.full(is_slow.shape, Source.KEYFRAME, np.uint8)
+    _write(workshop, frame, Frame(color, source), dropped)
 
 
 def make_inbetween(workshop: Workshop, segment: Segment, verdict: Verdict, frame: int) -> None:
@@ -40,20 +46,16 @@ def make_inbetween(workshop: Workshop, segment: Segment, verdict: Verdict, frame
         return
     view, settings = workshop.views[frame], workshop.job.settings
     is_slow = slow_pixels(view.speed_deg_s, settings.masks)
-    is_specular = item_pixels(view.geometry.item, frozenset(verdict.items))
+    is_specular = specular_pixels(view.geometry, frozenset(verdict.unseen))
 
     before, after = warped_pair(workshop, segment, frame)
+    progress = workshop.job.path.progress(segment, frame)
     with workshop.costs.of("warp"):
-        color, is_hole = composite(
-            before, after, view.geometry, progress=segment.progress(frame), settings=settings.warp
-        )
+        color, is_hole = composite(before, after, view.geometry, progress=progress, settings=settings.warp)
 
-    # Nothing warps these pixels again, so that their paths may antialias them.
     source = sources(is_slow, is_specular, is_hole)
-    where = source != Source.REUSED
-    filled = workshop.trace(frame, where, Purpose.FILL, PixelFilter.BOX)
-    color[where] = filled.color
-    _write(workshop, frame, Frame(color, source), filled.dropped)
+    dropped = _fill(workshop, frame, color, source != Source.REUSED)
+    _write(workshop, frame, Frame(color, source), dropped)
 
 
 def make_copy(workshop: Workshop, frame: int) -> None:
@@ -62,6 +64,18 @@ def make_copy(workshop: Workshop, frame: int) -> None:
         return
     color = read_raw(workshop, workshop.job.path.original(frame)).color
     _write(workshop, frame, Frame(color, np.full(color.shape[:2], Source.REUSED, np.uint8)), 0)
+
+
+def _fill(workshop: Workshop, frame: int, color: F32, where: Mask) -> int:
+    """Trace some pixels; how many samples were dropped.
+
+    Nothing warps them again, so that their paths may antialias them.
+    """
+    if not where.any():
+        return 0
+    filled = workshop.trace(frame, where, Purpose.FILL, PixelFilter.BOX)
+    color[where] = filled.color
+    return filled.dropped
 
 
 def _write(workshop: Workshop, frame: int, made: Frame, dropped: int) -> None:

@@ -127,9 +127,8 @@ def _expected_holes(job: Job, views: Views, segments: list[Segment], monitor: Mo
     monitor.stage("holes", len(segments))
     holes: dict[int, float] = {}
     for segment in segments:
-        length = segment.last - segment.first
-        probed = {segment.first + round(length * share) for share in HOLE_PROBES}
-        for frame in sorted(probed & set(segment.inbetweens)):
+        moving = job.path.moving(segment)
+        for frame in sorted({moving[int(len(moving) * share)] for share in HOLE_PROBES} if moving else ()):
             holes[frame] = hole_percent(job, views, segment, frame)
         monitor.advance()
     return holes
@@ -144,7 +143,7 @@ def hole_percent(job: Job, views: Views, segment: Segment, frame: int) -> float:
         before,
         after,
         views[frame].geometry,
-        progress=segment.progress(frame),
+        progress=job.path.progress(segment, frame),
         settings=settings,
     )
     return 100.0 * float(is_hole.mean())
@@ -182,9 +181,7 @@ def _shares(job: Job, survey: Survey, segments: list[Segment], holes: dict[int, 
     for segment in segments:
         known = [holes[f] for f in segment.inbetweens if f in holes]
         hole = sum(known) / len(known) if known else 0.0
-        for frame in segment.inbetweens:
-            if job.path.original(frame) != frame:
-                continue  # a copy
+        for frame in job.path.moving(segment):
             slow = survey.slow_percent[frame]
             rest = 1.0 - slow / 100.0  # taken as spread evenly over the image
             shares["slow"] += slow / count

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from enfilade.antialias import reconstruct
-from enfilade.masks import item_pixels, slow_pixels, visible_items
+from enfilade.masks import slow_pixels, specular_pixels, unseen_items
 from enfilade.metric import Pursuit
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
+from enfilade.pixels.convolve import SIGMAS
 from enfilade.records import F32, Mask, Segment, Warped
 from enfilade.warp import agrees, warp_keyframe
 
@@ -27,8 +28,8 @@ class Verdict:
     ----------
     middle : int or None
         The frame that was judged; None where there was none to judge.
-    items : tuple of int
-        Specular items that must be traced in the whole segment.
+    unseen : tuple of int
+        Specular items whose reuse is not seen; all others must be traced in the whole segment.
     percent_visible, percent_visible_no_pursuit : float
         Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
     is_split : bool
@@ -36,19 +37,19 @@ class Verdict:
     """
 
     middle: int | None
-    items: tuple[int, ...] = ()
+    unseen: tuple[int, ...] = ()
     percent_visible: float = 0.0
     percent_visible_no_pursuit: float = 0.0
     is_split: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """As a plain table, fit for JSON."""
-        return {**asdict(self), "items": list(self.items)}
+        return {**asdict(self), "unseen": list(self.unseen)}
 
     @staticmethod
     def from_dict(table: dict[str, Any]) -> Verdict:
         """Read back from :meth:`to_dict`."""
-        return Verdict(**{**table, "items": tuple(table["items"])})
+        return Verdict(**{**table, "unseen": tuple(table["unseen"])})
 
 
 def refine(workshop: Workshop, segment: Segment, whole: Verdict | None = None) -> None:
@@ -106,9 +107,9 @@ def judge(workshop: Workshop, segment: Segment) -> Verdict:
         jnd, jnd_no_pursuit = _differences(workshop, view, before, after, is_judged)
 
     # Mask out what will be traced: slow pixels, then specular items whose reuse would be seen.
-    items = visible_items(jnd, is_judged, view.geometry, settings.masks)
+    unseen = unseen_items(jnd, is_judged, view.geometry, settings.masks)
     is_slow = slow_pixels(view.speed_deg_s, settings.masks)
-    rest = is_judged & ~is_slow & ~item_pixels(view.geometry.item, items)
+    rest = is_judged & ~is_slow & ~specular_pixels(view.geometry, unseen)
     if (is_judged & ~rest).any() and rest.mean() >= JUDGED_SHARE:
         # Without it: the metric's filters spread a difference over what lies beside it.
         with workshop.costs.of("metric"):
@@ -116,7 +117,7 @@ def judge(workshop: Workshop, segment: Segment) -> Verdict:
     percent, percent_no_pursuit = (_percent_visible(j, rest) for j in (jnd, jnd_no_pursuit))
     return Verdict(
         middle=middle,
-        items=tuple(sorted(items)),
+        unseen=tuple(sorted(unseen)),
         percent_visible=percent,
         percent_visible_no_pursuit=percent_no_pursuit,
         is_split=percent > settings.masks.split_percent,
@@ -152,6 +153,7 @@ def _differences(
             velocity=view.velocity_deg_s,
             valid=is_judged,
             noise_variance=noise,
+            noise_blur_px=support / np.float32(SIGMAS),
             pursuit=pursuit,
         ).jnd
         for pursuit in pursuits

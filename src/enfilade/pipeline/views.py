@@ -62,7 +62,7 @@ class View:
 
     @cached_property
     def velocity_deg_s(self) -> F32:
-        """The same with its direction, (H, W, 2)."""
+        """Velocity for the metric, (H, W, 2): the mean of both flows, at the ends of a rest, too."""
         return np.ascontiguousarray(self._viewing.velocity_deg_s(self.flow.motion))
 
 

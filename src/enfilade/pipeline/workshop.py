@@ -12,7 +12,6 @@ from enfilade.antialias import spatial_support_px
 from enfilade.codec import read_shading, write_shading
 from enfilade.errors import SettingsError
 from enfilade.irradiance import Shader, VirtualImages
-from enfilade.masks import slow_pixels
 from enfilade.metric import Aqm, MetricOptions
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
@@ -136,29 +135,14 @@ class Workshop:
         self.run.finish(unit, files=files, facts={**facts, "cost": self.costs.take()})
 
     def _keyframe_shading(self, frame: int) -> Shading:
+        size = self.job.path.height, self.job.path.width
         unit, file = f"keyframe {self.number(frame)}", self.run.file("keyframes", self.number(frame))
         if self.run.done(unit):
             self.run.check(file)
             return read_shading(file)
-        shading = self._trace_keyframe(frame)
+        # Paths begin at the pixels' centres, where the geometry was found: what is warped has one surface.
+        traced = self.trace(frame, np.ones(size, np.bool_), Purpose.KEYFRAME, PixelFilter.CENTRE)
+        shading = Shading(traced.color.reshape(*size, 3), traced.variance.reshape(size), traced.dropped)
         write_shading(file, shading)
         self.finish(unit, [file], frame=self.number(frame), dropped=shading.dropped)
         return shading
-
-    def _trace_keyframe(self, frame: int) -> Shading:
-        """Trace a frame whole.
-
-        Paths begin at the pixels' centres, where the geometry was found: what is warped must lie on
-        one surface. Slow pixels are not warped (§4.1), and no later filter would find new samples for
-        them (§5.2): their paths are spread over the pixel.
-        """
-        is_slow = slow_pixels(self.views[frame].speed_deg_s, self.job.settings.masks)
-        color = np.zeros((*is_slow.shape, 3), np.float32)
-        variance = np.zeros(is_slow.shape, np.float32)
-        dropped = 0
-        for where, pixel_filter in ((~is_slow, PixelFilter.CENTRE), (is_slow, PixelFilter.BOX)):
-            if where.any():
-                part = self.trace(frame, where, Purpose.KEYFRAME, pixel_filter)
-                color[where], variance[where] = part.color, part.variance
-                dropped += part.dropped
-        return Shading(color, variance, dropped)

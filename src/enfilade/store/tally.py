@@ -114,5 +114,5 @@ def _segment(line: Mapping[str, Any]) -> dict[str, Any]:
         "percent_visible": verdict["percent_visible"],
         "percent_visible_no_pursuit": verdict["percent_visible_no_pursuit"],
         "is_split": verdict["is_split"],
-        "items": len(verdict["items"]),
+        "unseen_items": len(verdict["unseen"]),
     }

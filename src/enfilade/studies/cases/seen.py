@@ -56,6 +56,7 @@ class Viewer:
         *,
         valid: Mask | None = None,
         noise: F32 | None = None,
+        noise_blur_px: F32 | None = None,
     ) -> F32:
         """JND map by the paper's metric, with the worse of pursuit and none (§3.3).
 
@@ -69,6 +70,8 @@ class Viewer:
             Pixels to judge.
         noise : (H, W) float32, optional
             Variance of the difference of both, of linear luminance, which is not counted.
+        noise_blur_px : (H, W) float32, optional
+            Standard deviation of the spatial filter that both have passed since, pixels.
         """
         return self._paper.compare(
             self.shown(test),
@@ -76,6 +79,7 @@ class Viewer:
             velocity=velocity_deg_s,
             valid=valid,
             noise_variance=None if noise is None else self.shown_variance(noise),
+            noise_blur_px=noise_blur_px,
             pursuit=Pursuit.BOTH,
         ).jnd
 

@@ -106,7 +106,7 @@ def _judged(workshop: Workshop, segment: Segment, whole: Verdict | None) -> list
         raise RuntimeError(f"{segment} was judged and is not on record")
     verdict = Verdict.from_dict(line["verdict"])
     row = {key: line[key] for key in ("first", "last", "middle", "depth")}
-    row |= {"is_split": verdict.is_split, "items": len(verdict.items)}
+    row |= {"is_split": verdict.is_split, "unseen_items": len(verdict.unseen)}
     row |= {
         "percent_visible": verdict.percent_visible,
         "percent_visible_no_pursuit": verdict.percent_visible_no_pursuit,

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.antialias import spatial_support_px
 from enfilade.errors import SettingsError
 from enfilade.masks import slow_pixels
 from enfilade.monitor import Monitor
@@ -24,6 +25,7 @@ from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import LEAST_SPP
+from enfilade.pixels.convolve import SIGMAS
 from enfilade.records import F32, Mask
 from enfilade.renderer import Renderer
 from enfilade.settings import MaskSettings
@@ -49,8 +51,8 @@ class Calibration:
     thresholds_deg_s : tuple of float
         Candidates, rising.
     visible_percent : float
-        Pixels that were not traced may differ visibly up to this share, as segments may before they are
-        split (§6).
+        Pixels that were not traced may differ visibly up to this share: a tenth of what segments may before
+        they are split (§6).
     """
 
     thresholds_deg_s: tuple[float, ...] = field(
@@ -193,8 +195,12 @@ def _probe(
     view, settings = windows.view(frame), windows.job.settings.antialias
     speed, velocity = view.speed_deg_s, view.velocity_deg_s
     valid = view.geometry.is_hit & ~view.geometry.is_specular
-    # Noise of both, as if no filter had averaged it: that of warped pixels is the same in every frame.
-    noise = windows.traced(frame).variance + windows.reused(frame).variance
+    # Noise of both, as if none were averaged over time: that of warped pixels is the same in every frame.
+    support = spatial_support_px(speed, windows.job.viewing.pixels_per_degree, settings)
+    noise = {
+        "noise": windows.traced(frame).variance + windows.reused(frame).variance,
+        "noise_blur_px": support / np.float32(SIGMAS),
+    }
 
     def filtered(threshold_deg_s: float) -> F32:
         masks = MaskSettings(slow_deg_s=threshold_deg_s)
@@ -207,7 +213,7 @@ def _probe(
 
     rt = antialiased(windows, frame, lambda at: windows.traced(at).color, settings)
     ibr = antialiased(windows, frame, lambda at: windows.reused(at).color, settings)
-    classes.add(speed, viewer.paper(ibr, rt, velocity, valid=valid, noise=noise), valid)
+    classes.add(speed, viewer.paper(ibr, rt, velocity, valid=valid, **noise), valid)
     span = windows.around(frame, reach_of(settings))
     before: tuple[list[int], F32, F32] | None = None
     for threshold, count in counts.items():
@@ -217,8 +223,8 @@ def _probe(
             _, raised, lowered = before
         else:
             c = filtered(threshold)
-            raised = viewer.paper(c, rt, velocity, valid=valid, noise=noise)
-            lowered = viewer.paper(ibr, c, velocity, valid=valid, noise=noise)
+            raised = viewer.paper(c, rt, velocity, valid=valid, **noise)
+            lowered = viewer.paper(ibr, c, velocity, valid=valid, **noise)
         before = slow, raised, lowered
         reused = valid & ~is_slow
         count.pixels += int(valid.sum())

@@ -133,7 +133,7 @@ class Windows:
         before, after = (
             warp_keyframe(self._keyframe(k), camera, settings) for k in (segment.first, segment.last)
         )
-        geometry, progress = self.geometry(frame), segment.progress(frame)
+        geometry, progress = self.geometry(frame), self.job.path.progress(segment, frame)
         color, is_hole = composite(before, after, geometry, progress=progress, settings=settings)
         noisy = _with_variance_as_color(before), _with_variance_as_color(after)
         density, _ = composite(*noisy, geometry, progress=progress, settings=settings)
