@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,7 @@ def write_sequence(
     *,
     flow_px: float | None = None,
     layers: dict[str, Any] | None = None,
+    numbers: Sequence[int] | None = None,
 ) -> Path:
     folder.mkdir(parents=True)
     more = dict(layers or {})
@@ -45,8 +48,24 @@ def write_sequence(
         forward = np.zeros((*SIZE, 2), np.float32)
         forward[..., 0] = flow_px
         more |= {"forward": forward, "backward": -forward}
-    for i, image in enumerate(images, 1):
-        write_exr(folder / f"{i:04}.exr", {"RGB": image, **more})
+    for number, image in zip(numbers or range(1, len(images) + 1), images, strict=True):
+        write_exr(folder / f"{number:04}.exr", {"RGB": image, **more})
+    return folder
+
+
+def write_run(
+    folder: Path,
+    images: list[np.ndarray],
+    numbers: Sequence[int],
+    *,
+    selected: Sequence[int] | None = None,
+    cuts: Sequence[int] = (),
+    **options: Any,
+) -> Path:
+    """A run folder that has finished the frames of some numbers, of all those that were selected."""
+    write_sequence(folder / "frames", images, numbers=numbers, **options)
+    path = {"fps": 30.0, "frames": list(selected or numbers), "cuts": list(cuts)}
+    (folder / "run.json").write_text(json.dumps({"format": 2, "identity": {"path": path}}))
     return folder
 
 

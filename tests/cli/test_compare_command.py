@@ -13,13 +13,13 @@ from enfilade.pipeline.compare import FlowChoice
 from enfilade.viewing import DISPLAYS
 
 KEYS = {  # docs/compare.md
-    "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "worst_frame",
-    "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2", "persistence",
-    "mode", "departures", "flow", "bands_cpd", "per_frame",
+    "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
+    "worst_frame", "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2",
+    "persistence", "mode", "departures", "flow", "bands_cpd", "per_frame",
 }  # fmt: skip
 FRAME_KEYS = {
-    "name", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "psnr_db", "steady_bands_jnd",
-    "transient_bands_jnd", "velocity_deg_s",
+    "name", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
+    "steady_bands_jnd", "transient_bands_jnd", "velocity_deg_s",
 }  # fmt: skip
 FRAMES = 6
 
@@ -42,7 +42,7 @@ def test_a_table_and_heat_maps_in_a_folder(run, folders, tmp_path):
     result = run("compare", *folders, "--mode", "paper", "--display", "paper", "--heatmap", tmp_path / "maps")
     assert result.exit_code == 0, result.output
     assert f"{FRAMES} frames, 60x40, 27.9 pixels per degree" in result.stdout
-    assert "obvious at first sight" in result.stdout
+    assert "JND (strong on the whole; up to " in result.stdout
     assert "estimated from the reference" in result.stderr
     assert sorted(m.name for m in (tmp_path / "maps").iterdir()) == [f"{i}.png" for i in range(FRAMES)]
     with Image.open(tmp_path / "maps" / "1.png") as picture:
@@ -148,6 +148,9 @@ def test_nothing_to_compare_is_wrong_input(run, folders, tmp_path, what):
         (("--heatmap", "heat.gif"), "give a folder, or a file .mp4"),
         (("--graph", "graph.pdf"), "it is written as .png"),
         (("--fps", "0"), "fps"),
+        (("--device", "cpu", "--mode", "paper"), "--device cpu says nothing to this metric"),
+        (("--device", "auto", "--without", "transducer"), "transducer and spatial_pooling; leave it out"),
+        (("--device", "cpu", "--without", "spatial_pooling"), "says nothing to this metric"),
     ],
 )
 def test_wrong_options_are_refused_before_anything_is_judged(run, folders, options, message):

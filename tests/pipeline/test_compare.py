@@ -12,7 +12,9 @@ from scipy.ndimage import gaussian_filter
 from comparisons import SIZE, Notes, judged, terms, textured
 from enfilade.errors import ImageError, InputError
 from enfilade.metric import MetricOptions
-from enfilade.pipeline.compare import compare, metric_options
+from enfilade.metric.decision import Masking
+from enfilade.metric.options import Fitted
+from enfilade.pipeline.compare import compare, kernels_serve, metric_options
 from enfilade.viewing import display_named
 
 
@@ -193,3 +195,10 @@ def test_departures_by_name():
             metric_options("paper", **options)
     with pytest.raises(InputError, match="unknown mode 'new'"):
         metric_options("new")
+
+
+def test_kernels_serve_where_the_metric_hands_them_something():
+    modern = MetricOptions.modern()
+    for options in (modern, MetricOptions.paper(), *map(modern.without, modern.departures())):
+        masking = Masking(options, Fitted(), mask_slope=0.7, channel_exponent=2.0)
+        assert kernels_serve(options) == masking.weighs_gathered

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons import SIZE, Notes, judged, textured
+from comparisons import SIZE, Notes, judged, textured, write_run
 from enfilade.errors import ImageError
 from enfilade.pipeline.compare.motion import flow_of_layers
 
@@ -138,15 +138,51 @@ def test_motion_that_changes_the_whole_image_is_no_cut(sequence):
     assert [f.transient.score > 1.0 for f in found.frames] == [False, True, True]
 
 
-def test_what_flickers_at_a_cut_is_not_counted(sequence):
+STILL = np.zeros((*SIZE, 2), np.float32)
+
+
+@pytest.mark.parametrize("levels", [(0.1, 0.6), (0.2, 0.25), (0.004, 0.012)])
+def test_what_flickers_at_a_cut_is_not_counted(sequence, levels):
     """Across a cut the error changes altogether, and nobody sees that as flicker."""
-    still = np.zeros((*SIZE, 2), np.float32)
-    layers = {"forward": still, "backward": still}
-    shots = [textured(level=0.1)] * 2 + [textured(level=0.6)] * 2
+    layers = {"forward": STILL, "backward": STILL}
+    shots = [textured(level=level) for level in levels for _ in range(2)]
     faulty = [image.copy() for image in shots]
     for image in faulty:
-        image[10:30, 10:30] *= 0.8
+        image[10:30, 10:30] *= 0.5
     test, reference = sequence("t", faulty, layers=layers), sequence("r", shots, layers=layers)
     found = judged(test, reference)
     assert [f.transient.score for f in found.frames] == [0.0] * 4
     assert min(f.steady.score for f in found.frames) > 0.1
+
+
+def flickering(images):
+    """Every other frame has a dark square."""
+    faulty = [image.copy() for image in images]
+    for image in faulty[1::2]:
+        image[10:30, 10:30] *= 0.5
+    return faulty
+
+
+def test_noise_before_a_resting_camera_is_no_cut(sequence):
+    rng = np.random.default_rng(4)
+    still = textured()
+    noisy = [(still * rng.uniform(0.6, 1.4, (*SIZE, 1))).astype(np.float32) for _ in range(3)]
+    layers = {"forward": STILL, "backward": STILL}
+    test, reference = sequence("t", flickering(noisy), layers=layers), sequence("r", noisy, layers=layers)
+    transient = [f.transient.score for f in judged(test, reference).frames]
+    assert transient[0] == 0.0
+    assert min(transient[1:]) > 0.5
+
+
+@pytest.mark.parametrize("flow", ["layers", "estimate", "none"])
+def test_a_run_says_where_shots_begin_and_what_is_missing(tmp_path, flow):
+    """Frame 2 begins a shot that looks like the one before it; 4 and 5 are missing, or were left out."""
+    images = [textured()] * 4
+    transients = []
+    for name, selected in (("gap", range(1, 7)), ("step", (1, 2, 3, 6))):
+        options = {"selected": selected, "cuts": [2], "flow_px": 0.5}
+        test = write_run(tmp_path / name / "t", flickering(images), (1, 2, 3, 6), **options)
+        reference = write_run(tmp_path / name / "r", images, (1, 2, 3, 6), **options)
+        found = judged(test, reference, flow=flow)
+        transients.append([f.transient.score > 0.1 for f in found.frames])
+    assert transients == [[False, False, True, False], [False, False, True, True]]

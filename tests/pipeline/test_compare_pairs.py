@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons import SIZE, Notes, judged, terms, textured
+from comparisons import SIZE, Notes, judged, terms, textured, write_run
 from enfilade.errors import ImageError
 from enfilade.pipeline.compare import compare
 from enfilade.settings import VideoSettings
@@ -53,6 +53,40 @@ def test_sequences_that_differ_in_length_or_size(sequence, tmp_path):
     Image.fromarray(np.zeros((10, 20, 3), np.uint8)).save(tmp_path / "small.png")
     with pytest.raises(ImageError, match=r"20x10 .*small\.png.* and the reference's 64x48"):
         judged(tmp_path / "small.png", one)
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "message"),
+    [
+        (
+            (1, 2, 3),
+            (11, 12, 13),
+            r"test's run has the frame 1 \(.*t/frames/0001\.exr\).*first .*r/frames/0011",
+        ),
+        ((1, 3, 4), (1, 2, 3), r"reference's run has the frame 2 \(.*r/frames/0002\.exr\)"),
+        ((1, 2, 3, 4), (1, 2, 3), r"test's run has the frame 4 \(.*--frames"),
+    ],
+)
+def test_runs_of_other_frames_are_refused(tmp_path, ours, theirs, message):
+    test, reference = (
+        write_run(tmp_path / name, [textured()] * len(numbers), numbers, selected=range(1, 20))
+        for name, numbers in (("t", ours), ("r", theirs))
+    )
+    with pytest.raises(ImageError, match=message):
+        judged(test, reference)
+
+
+def test_numbers_that_differ_are_paired_in_order_and_that_is_said_once(sequence):
+    images = [textured()] * 3
+    one, other = sequence("one", images, numbers=(1, 2, 3)), sequence("other", images, numbers=(1, 3, 4))
+    notes = Notes()
+    assert judged(one, other, notes).score == 0.0
+    (said,) = [text for text in notes.said if "numbers differ" in text]
+    assert said.endswith(f"{one}/0002.exr with {other}/0003.exr, and so on")
+    for pair in ((one, one), (one / "0001.exr", other / "0003.exr")):
+        notes = Notes()
+        judged(*pair, notes)
+        assert not any("numbers differ" in text for text in notes.said)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

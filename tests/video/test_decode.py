@@ -107,6 +107,36 @@ def test_a_cut_off_or_foreign_file_is_refused_by_name(tmp_path):
             open_sequence(file)
 
 
+def trimmed(source, target, frames, fps):
+    """A copy that begins some frames later: by its edit list, without being encoded anew."""
+    with av.open(str(source)) as whole, av.open(str(target), "w", options={"movflags": "faststart"}) as part:
+        stream = whole.streams.video[0]
+        copy = part.add_stream_from_template(stream)
+        for packet in whole.demux(stream):
+            if packet.dts is not None:
+                shift = round(frames / (fps * stream.time_base))
+                packet.pts, packet.dts, packet.stream = packet.pts - shift, packet.dts - shift, copy
+                part.mux(packet)
+    return target
+
+
+@pytest.mark.parametrize(("codec", "suffix"), [("h264", ".mp4"), ("h264", ".mov"), ("prores", ".mov")])
+def test_a_trimmed_video_has_the_frames_that_are_shown(tmp_path, codec, suffix):
+    levels = np.linspace(0.1, 0.9, 24)
+    frames = [np.full((64, 64, 3), level, np.float32) for level in levels]
+    source, settings = tmp_path / f"a{video_suffix(codec)}", VideoSettings(codec=codec)
+    encode_video(source, frames, fps=24, width=64, height=64, settings=settings, exposure_ev=0)
+    file = trimmed(source, tmp_path / f"b{suffix}", 5, 24)
+    found = [float(frame.mean()) for frame in open_sequence(file)]
+    assert len(open_sequence(file)) == len(found) == 19
+    np.testing.assert_allclose(found, levels[5:], atol=0.02)
+    data = file.read_bytes()
+    for part in range(20):
+        file.write_bytes(data[: len(data) * part // 20])
+        with pytest.raises(ImageError, match=rf"b\{suffix}"):
+            list(open_sequence(file))
+
+
 @pytest.mark.parametrize("codec", ["h264", "ffv1", "av1", "prores"])
 def test_mutated_files_are_read_or_refused(tmp_path, codec):
     rng = np.random.default_rng(7)

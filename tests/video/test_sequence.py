@@ -83,6 +83,46 @@ def test_a_single_image_and_a_run_folder(tmp_path):
     assert (means(run), run.fps) == ([7], 23.976)
 
 
+@pytest.mark.parametrize(
+    ("names", "numbers"),
+    [
+        (("-0002", "-0001", "0000", "0003"), (-2, -1, 0, 3)),
+        (("shot2-0009", "shot2-0010"), (9, 10)),
+        (("0001-v2", "0002-v2"), None),
+        (("a7", "b6"), None),
+        (("1", "end"), None),
+    ],
+)
+def test_numbers_are_the_last_of_each_name_where_they_rise(tmp_path, names, numbers):
+    for name in names:
+        exr(tmp_path / f"{name}.exr")
+    for source in (tmp_path, tmp_path / "*.exr"):
+        sequence = open_sequence(source)
+        assert (sequence.numbers, sequence.starts) == (numbers, None)
+
+
+@pytest.mark.parametrize(
+    ("selected", "cuts", "starts"),
+    [
+        (range(1, 12), [], {2, 3}),
+        (range(1, 12), [2], {1, 2, 3}),
+        (range(1, 12), [6], {2, 3}),
+        ((1, 2, 5, 11), [5], {2}),
+        ((1, 2, 5, 11), [], set()),
+        (None, [], None),
+        ([1, [2], "5"], [], None),
+    ],
+)
+def test_a_run_says_which_frames_do_not_follow_the_one_before(tmp_path, selected, cuts, starts):
+    (tmp_path / "frames").mkdir()
+    for number in (1, 2, 5, 11):
+        exr(tmp_path / "frames" / f"{number:04}.exr")
+    path = {"fps": 30.0, "frames": None if selected is None else list(selected), "cuts": cuts}
+    (tmp_path / "run.json").write_text(json.dumps({"identity": {"path": path}}))
+    run = open_sequence(tmp_path)
+    assert (run.numbers, run.starts) == ((1, 2, 5, 11), starts)
+
+
 def test_display_referred_images_are_decoded(tmp_path):
     eight = RNG.integers(0, 256, (4, 6, 3), np.uint8)
     png(tmp_path / "a.png", eight)

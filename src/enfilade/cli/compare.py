@@ -94,7 +94,8 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     default="none",
     show_default=True,
     help="Where the modern mode's per-pixel part runs: in NumPy (none), or in Dr.Jit kernels, which are "
-    "faster and take a second to start; auto is the GPU where there is one.",
+    "faster and take a second to start; auto is the GPU where there is one. They need the departures "
+    "transducer and spatial_pooling.",
 )
 @click.option(
     "--heatmap",
@@ -124,8 +125,9 @@ def command(
     Each is a run folder, a folder of images (OpenEXR, PNG, JPEG), a pattern such as frames/%04d.exr, or a
     video.
 
-    The score is in just noticeable differences (JND): up to 0.25 nobody notices anything, at 1 three
-    viewers of four find it when they look for it, from 3 on it is obvious.
+    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical, 1
+    a difference that three viewers of four find when they look for it, everywhere and all the time. What is
+    small or brief has a lower score than its own JND; where that is visible, the largest is said, too.
     """
     show = None if heatmap is None else _painted(heatmap)
     if graph is not None and graph.suffix.lower() != ".png":
@@ -160,18 +162,24 @@ def _terms(
     flow: str,
     device: str,
 ) -> Terms:
+    from enfilade.pipeline.compare import FlowChoice, Terms, kernels_serve, metric_options
+
     settings = settings_of(ctx)
+    options = metric_options(mode, include=include, leave_out=leave_out)
     if device != "none":
+        if not kernels_serve(options):
+            raise SettingsError(
+                f"--device {device} says nothing to this metric: the kernels need the departures transducer "
+                "and spatial_pooling; leave it out, or have both"
+            )
         from enfilade.device import activate
 
         activate(cast('Literal["auto", "cpu", "gpu"]', device))
-    from enfilade.pipeline.compare import FlowChoice, Terms, metric_options
-
     return Terms(
         viewing=settings.viewing,
         metric=settings.metric,
         display=None if display is None else _display(ctx, display),
-        options=metric_options(mode, include=include, leave_out=leave_out),
+        options=options,
         flow=FlowChoice(flow),
         fps=fps,
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,

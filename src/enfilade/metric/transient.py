@@ -6,7 +6,9 @@ difference between the error of this frame and that of the last, fetched from wh
 
 What it does not do: the error of the frame itself counts as steady besides, as if the film were
 stopped there, so that an error that comes and goes is never scored below one that stays. The eye is
-taken to follow the surface, and nothing masks the change.
+taken to follow the surface, and nothing masks the change. Between pixels the last error is fetched
+bilinearly, which blurs it, so that a steady fine error on a surface that moves by fractions of a pixel
+counts a little as change.
 """
 
 from __future__ import annotations

@@ -46,6 +46,8 @@ class _Decoder:
             "height": found.height,
             "fps": found.fps,
             "exposure_ev": found.exposure_ev,
+            "numbers": found.numbers,
+            "starts": None if found.starts is None else sorted(found.starts),
             "count": len(found),
         }
 

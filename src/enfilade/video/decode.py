@@ -61,6 +61,8 @@ class VideoFile:
     """
 
     exposure_ev: float | None = None  # frames are as shown
+    numbers: tuple[int, ...] | None = None
+    starts: frozenset[int] | None = None
 
     def __init__(self, file: Path) -> None:
         self.file = file
@@ -76,13 +78,16 @@ class VideoFile:
             self.width, self.height = int(stream.width), int(stream.height)
             rate: Fraction | None = stream.average_rate
             self.fps = float(rate) if rate else None
-            self._count = int(stream.frames) or _counted(file, container, stream)
+            announced = int(stream.frames)
+            self._count = announced or _counted(file, container, stream)
             self._is_linear = context.color_trc == LINEAR
             _check_colors(file, int(context.color_trc), int(context.color_primaries))
         if self.width * self.height > MAX_PIXELS:
             raise ImageError(f"{file} has {self.width}x{self.height} pixels; at most {MAX_PIXELS} are read")
         if not 0 < self._count <= file.stat().st_size:  # a frame has a byte at least
             raise ImageError(f"{file} announces {self._count} frames: it is damaged; write or copy it again")
+        if announced and DEMUXERS[file.suffix.lower()] == "mov":
+            self._count = _shown(file, announced)
 
     def __len__(self) -> int:
         return self._count
@@ -103,10 +108,7 @@ class VideoFile:
                 yield encoded if self._is_linear else srgb_decode(encoded)
                 done += 1
         if done != self._count:
-            raise ImageError(
-                f"{self.file} announces {self._count} frames, but {done} can be decoded: it is cut off or "
-                "damaged; write or copy it again"
-            )
+            raise _incomplete(self.file, self._count, done)
 
     def name(self, index: int) -> str:
         """Name of a frame, for messages."""
@@ -145,11 +147,26 @@ def deep_png(file: Path) -> F32:
     return values
 
 
+def _shown(file: Path, announced: int) -> int:
+    # The table of samples has those that an edit list leaves out, too
+    shown = _packets(file, {})
+    there = shown if shown >= announced else _packets(file, {"ignore_editlist": "1"})
+    if not shown or there < announced:
+        raise _incomplete(file, announced, min(shown, there))
+    return shown
+
+
+def _packets(file: Path, options: dict[str, str]) -> int:
+    with _failures(file), _opened(file, options) as container:
+        packets = container.demux(container.streams.video[0])
+        return sum(1 for packet in packets if packet.size and not packet.is_discard)
+
+
 def _counted(file: Path, container: Any, stream: Any) -> int:
     # Matroska doesn't say how many frames it has, but FFmpeg writes how long each stream is
     count, last = 0, 0.0
     for packet in container.demux(stream):
-        if packet.size and packet.pts is not None:
+        if packet.size and packet.pts is not None and not packet.is_discard:
             count, last = count + 1, max(last, float(packet.pts * stream.time_base))
     stated = re.fullmatch(r"(\d+):(\d\d):(\d\d\.\d+)", stream.metadata.get("DURATION", "").strip("\0 "))
     if stated and stream.average_rate:
@@ -231,5 +248,13 @@ def _failures(file: Path) -> Iterator[None]:
         raise ImageError(f"can't decode {file}: {reason}; write or copy it again") from error
 
 
-def _opened(file: Path) -> Any:
-    return av.open(str(file), format=DEMUXERS[file.suffix.lower()], metadata_errors="replace")
+def _incomplete(file: Path, announced: int, found: int) -> ImageError:
+    return ImageError(
+        f"{file} announces {announced} frames, but {found} can be decoded: it is cut off or damaged; "
+        "write or copy it again"
+    )
+
+
+def _opened(file: Path, options: dict[str, str] | None = None) -> Any:
+    kind = DEMUXERS[file.suffix.lower()]
+    return av.open(str(file), format=kind, options=options or {}, metadata_errors="replace")

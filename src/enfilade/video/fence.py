@@ -29,7 +29,7 @@ __all__ = ["FencedSequence", "receive", "send"]
 
 MB = 1 << 20
 SIZE_BYTES = 8  # of the number that says how long a message is
-LONGEST_HEAD = 1 << 20  # bytes of a message but for its pixels
+LONGEST_HEAD = 1 << 24  # bytes of a message but for its pixels: it may list the numbers of a million frames
 DTYPES = ("float16", "float32", "uint32")  # of pixels
 REFUSALS = {of.__name__: of for of in (InputError, ImageError, RunFolderError)}  # that come from there
 PATIENCE_S = 1.0  # before the process is killed
@@ -52,6 +52,8 @@ class FencedSequence:
     width, height : int
         Pixels.
     fps, exposure_ev : float or None
+    numbers : tuple of int or None
+    starts : frozenset of int or None
 
     Raises
     ------
@@ -79,6 +81,9 @@ class FencedSequence:
         self.width, self.height = int(opened["width"]), int(opened["height"])
         self.fps: float | None = opened["fps"]
         self.exposure_ev: float | None = opened["exposure_ev"]
+        numbers, starts = opened["numbers"], opened["starts"]
+        self.numbers: tuple[int, ...] | None = None if numbers is None else tuple(numbers)
+        self.starts: frozenset[int] | None = None if starts is None else frozenset(starts)
         self._count = int(opened["count"])
 
     def __len__(self) -> int:

@@ -43,6 +43,10 @@ class ImageFiles:
         Frames per second, None if unknown.
     exposure_ev
         Stops with which a run's frames are shown, None if it is no run.
+    numbers
+        Of the frames, rising; None if unknown.
+    starts
+        Indices of frames that do not follow the one before, None if unknown.
 
     Attributes
     ----------
@@ -50,6 +54,8 @@ class ImageFiles:
     width, height : int
         Of the first image, pixels.
     fps, exposure_ev : float or None
+    numbers : tuple of int or None
+    starts : frozenset of int or None
 
     Raises
     ------
@@ -57,10 +63,20 @@ class ImageFiles:
         The first image can't be read.
     """
 
-    def __init__(self, files: list[Path], fps: float | None = None, exposure_ev: float | None = None) -> None:
+    def __init__(
+        self,
+        files: list[Path],
+        fps: float | None = None,
+        exposure_ev: float | None = None,
+        *,
+        numbers: tuple[int, ...] | None = None,
+        starts: frozenset[int] | None = None,
+    ) -> None:
         self.files = files
         self.fps = fps
         self.exposure_ev = exposure_ev
+        self.numbers = numbers
+        self.starts = starts
         self._held: tuple[Path, dict[str, Any]] | None = None  # of the frame last read, once layers are used
         if files[0].suffix.lower() == ".exr":
             _check_primaries(files[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,6 +26,8 @@ class Sequence(Protocol):
     height: int
     fps: float | None
     exposure_ev: float | None  # of a run, whose frames are scene-linear
+    numbers: tuple[int, ...] | None  # by which the user knows the frames, rising
+    starts: frozenset[int] | None  # of a run: indices of frames that do not follow the one before
 
     def __len__(self) -> int:
         """Count the frames."""
@@ -79,12 +82,12 @@ def open_sequence(source: Path | str) -> Sequence:
     files = _matching(path)
     if not files:
         raise ImageError(f"there is no file, folder or pattern with files {path}")
-    return ImageFiles(files)
+    return ImageFiles(files, numbers=_numbers(files))
 
 
 def _from_folder(folder: Path) -> ImageFiles:
     run = folder / "run.json"
-    fps, exposure_ev = _shown_by_run(run) if run.is_file() else (None, None)
+    identity = read_json(run) if run.is_file() else None
     place = folder / "frames" if run.is_file() else folder
     files = _images(place.iterdir()) if place.is_dir() else []
     if not files:
@@ -95,7 +98,15 @@ def _from_folder(folder: Path) -> ImageFiles:
             f"{place} has images of several kinds ({', '.join(sorted(kinds))}); give a pattern such as "
             f"{place}/*{min(kinds)}"
         )
-    return ImageFiles(files, fps, exposure_ev)
+    numbers = _numbers(files)
+    fps = _number_at(identity, "identity", "path", "fps")
+    return ImageFiles(
+        files,
+        fps if fps is not None and fps > 0 else None,
+        _number_at(identity, "identity", "settings", "viewing", "exposure_ev"),
+        numbers=numbers,
+        starts=None if numbers is None else _starts(numbers, _at(identity, "identity", "path")),
+    )
 
 
 def _matching(pattern: Path) -> list[Path]:
@@ -121,15 +132,34 @@ def _natural(file: Path) -> tuple[list[tuple[int, int, str]], str]:
     return key, file.name
 
 
-def _shown_by_run(file: Path) -> tuple[float | None, float | None]:
-    """Frames per second and stops of exposure with which a run is shown."""
-    identity = read_json(file)
-    fps = _number_at(identity, "identity", "path", "fps")
-    exposure_ev = _number_at(identity, "identity", "settings", "viewing", "exposure_ev")
-    return (fps if fps is not None and fps > 0 else None), exposure_ev
+def _numbers(files: list[Path]) -> tuple[int, ...] | None:
+    """Last number of each name; None unless all have one and they rise."""
+    found = [re.findall(r"^-?\d+|\d+", file.stem) for file in files]
+    numbers = tuple(int(of_name[-1]) for of_name in found if of_name)
+    rises = len(numbers) == len(files) and all(before < now for before, now in pairwise(numbers))
+    return numbers if rises else None
+
+
+def _starts(numbers: tuple[int, ...], path: Any) -> frozenset[int] | None:
+    """Where a run's finished frames begin a shot, or follow one that is not finished."""
+    selected, cuts = _at(path, "frames"), _at(path, "cuts")
+    if not (_are_whole(selected) and _are_whole(cuts)):
+        return None
+    following = dict(pairwise(selected))
+    steps = enumerate(pairwise(numbers), 1)
+    return frozenset(i for i, (before, now) in steps if following.get(before) != now or now in cuts)
+
+
+def _are_whole(values: Any) -> bool:
+    return isinstance(values, list) and all(isinstance(value, int) for value in values)
 
 
 def _number_at(value: Any, *keys: str) -> float | None:
+    found = _at(value, *keys)
+    return float(found) if isinstance(found, int | float) else None
+
+
+def _at(value: Any, *keys: str) -> Any:
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
-    return float(value) if isinstance(value, int | float) else None
+    return value

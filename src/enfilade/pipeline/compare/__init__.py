@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enfilade.pipeline.compare.judge import JudgedFrame, Terms, compare, metric_options
+from enfilade.pipeline.compare.judge import JudgedFrame, Terms, compare, kernels_serve, metric_options
 from enfilade.pipeline.compare.motion import FlowChoice
 from enfilade.pipeline.compare.verdict import FrameDifference, SequenceDifference, meaning, psnr_db
 
@@ -13,6 +13,7 @@ __all__ = [
     "SequenceDifference",
     "Terms",
     "compare",
+    "kernels_serve",
     "meaning",
     "metric_options",
     "psnr_db",

@@ -20,7 +20,7 @@ from enfilade.records import F32
 from enfilade.settings import LimitSettings, MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
-__all__ = ["JudgedFrame", "Terms", "compare", "metric_options"]
+__all__ = ["JudgedFrame", "Terms", "compare", "kernels_serve", "metric_options"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,8 @@ class Terms:
     exposure_ev
         Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
     has_kernels
-        Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active.
+        Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active; see
+        :func:`kernels_serve`.
     limits
         Memory and time of the processes that decode.
     """
@@ -126,13 +127,15 @@ def compare(
     Raises
     ------
     ImageError
-        A sequence can't be read, the two differ in length, size or frame rate, or pixels are NaN or
-        infinite. The message names the frame.
+        A sequence can't be read, the two differ in length, size or frame rate, they are runs of other
+        frames, or pixels are NaN or infinite. The message names the frame.
     """
     pairs = open_pairs(test, reference, terms.limits, fps=terms.fps, exposure_ev=terms.exposure_ev)
     conditions = terms.conditions(pairs.size, pairs.fps)
-    motion = open_motion(pairs.test, pairs.reference, terms.flow)
+    motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
     monitor.say(motion.text)
+    if pairs.note:
+        monitor.say(pairs.note)
     if pairs.exposure_ev:
         monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     if terms.display is None:
@@ -186,6 +189,17 @@ def metric_options(mode: str, *, include: Iterable[str] = (), leave_out: Iterabl
     return options
 
 
+def kernels_serve(options: MetricOptions) -> bool:
+    """Whether there is a part of the metric that the kernels can run, with some departures from the paper.
+
+    Parameters
+    ----------
+    options
+        Without the transducer or without spatial pooling all runs in NumPy.
+    """
+    return options.transducer and options.spatial_pooling
+
+
 class _Judge:
     def __init__(self, viewing: Viewing, terms: Terms) -> None:
         self._viewing = viewing
@@ -221,5 +235,12 @@ class _Judge:
 def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
     steady, transient = (Part(part.score, part.band_jnd) for part in (found.steady, found.transient))
     return FrameDifference(
-        pair.name, found.percent_visible, found.score, steady, transient, pair.squared_error, speed_deg_s
+        pair.name,
+        found.percent_visible,
+        found.score,
+        steady,
+        transient,
+        pair.squared_error,
+        speed_deg_s,
+        largest_jnd=float(found.jnd.max()),
     )

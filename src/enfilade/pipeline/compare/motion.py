@@ -22,7 +22,8 @@ __all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
 
 Layers = Mapping[str, npt.NDArray[Any]]
 
-CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, that means a cut where no flow leads back
+CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, that means a cut where flow back is made up
+RESTING_DIFFERENCE = 0.02  # ... where layers know none: in a shot the camera rests, and little changes
 BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 
@@ -74,7 +75,9 @@ class Motion(Protocol):
         ...
 
 
-def open_motion(test: Sequence, reference: Sequence, choice: FlowChoice) -> Motion:
+def open_motion(
+    test: Sequence, reference: Sequence, choice: FlowChoice, starts: frozenset[int] | None = None
+) -> Motion:
     """Choose the source of flow: layers of the reference, of the test, else an estimate.
 
     Parameters
@@ -82,6 +85,8 @@ def open_motion(test: Sequence, reference: Sequence, choice: FlowChoice) -> Moti
     test, reference
     choice
         ``AUTO`` takes layers where there are some and estimates otherwise.
+    starts
+        Indices of the frames that do not follow the one before; None: the flow and the images tell.
 
     Raises
     ------
@@ -92,17 +97,18 @@ def open_motion(test: Sequence, reference: Sequence, choice: FlowChoice) -> Moti
         for sequence, role in ((reference, "reference"), (test, "test")):
             kind = _kind_of(sequence)
             if kind is not None:
-                return _FromLayers(sequence, kind, role)
+                return _FromLayers(sequence, kind, role, starts)
     if choice is FlowChoice.LAYERS:
         raise ImageError(
             f"neither {reference.name(0)} nor {test.name(0)} has layers of image flow; known are: "
             f"{'; '.join(kind.text for kind in KINDS)}. --flow estimate needs none"
         )
+    known = frozenset[int]() if starts is None else starts
     if choice is FlowChoice.NONE:
-        return _Still("image flow: none, as asked; all is judged as if it stood still")
+        return _Still("image flow: none, as asked; all is judged as if it stood still", known)
     if len(reference) == 1:
-        return _Still("image flow: none in a single image; it is judged as if it stood still")
-    return _Estimated(reference.width, reference.height)
+        return _Still("image flow: none in a single image; it is judged as if it stood still", known)
+    return _Estimated(reference.width, reference.height, known)
 
 
 @dataclass(frozen=True)
@@ -194,27 +200,32 @@ def _change(image: F32, before: F32, backward: F32) -> float:
 class _FromLayers:
     kind = "layers"
 
-    def __init__(self, sequence: Sequence, kind: _Kind, role: str) -> None:
+    def __init__(self, sequence: Sequence, kind: _Kind, role: str, starts: frozenset[int] | None) -> None:
         self._sequence = sequence
         self._kind = kind
+        self._starts = starts
         self.text = f"image flow: from the {role}'s layers {kind.text}"
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
         """Pairs with the flow of their layers.
 
-        Where no layer tells the flow to the last frame, a cut is where the image changes altogether.
+        Where neither a run nor a layer tells which frame is the last one, a cut is where the image changes
+        altogether.
         """
         before: F32 | None = None
         for pair in pairs:
             flow = self._read(pair.index)
             now = srgb_encode(pair.reference_relative)
-            is_cut = (
-                before is not None
-                and (self._kind.is_forward_only or not flow.has_backward)
-                and _change(now, before, flow.backward) > CUT_DIFFERENCE
-            )
+            is_cut = before is not None and self._is_cut(pair.index, flow, now, before)
             yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
             before = now
+
+    def _is_cut(self, index: int, flow: Flow, now: F32, before: F32) -> bool:
+        if self._starts is not None:
+            return index in self._starts
+        if self._kind.is_forward_only:
+            return _change(now, before, flow.backward) > CUT_DIFFERENCE
+        return not flow.has_backward and _change(now, before, flow.backward) > RESTING_DIFFERENCE
 
     def _read(self, index: int) -> Flow:
         name = self._sequence.name(index)
@@ -231,8 +242,9 @@ class _FromLayers:
 class _Estimated:
     kind = "estimate"
 
-    def __init__(self, width: int, height: int) -> None:
+    def __init__(self, width: int, height: int, starts: frozenset[int]) -> None:
         self._estimator = FlowEstimator(width, height)
+        self._starts = starts
         self.text = (
             "image flow: no layers of it, so it is estimated from the reference (dense inverse search); "
             "--flow none judges all as if it stood still"
@@ -251,7 +263,9 @@ class _Estimated:
             yield waiting, self._moved(waiting.index, now, before, None)
 
     def _moved(self, index: int, now: U8, before: U8 | None, after: U8 | None) -> Moved:
-        flow = self._estimator.flow(now, before, after)
+        previous = None if index in self._starts else before
+        following = None if index + 1 in self._starts else after
+        flow = self._estimator.flow(now, previous, following)
         is_cut = index > 0 and not flow.has_backward
         return Moved(flow.motion, flow.backward if flow.has_backward else None, is_cut)
 
@@ -259,10 +273,11 @@ class _Estimated:
 class _Still:
     kind = "none"
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, starts: frozenset[int]) -> None:
         self.text = text
+        self._starts = starts
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
         """Pairs of which nothing moves."""
         for pair in pairs:
-            yield pair, Moved()
+            yield pair, Moved(is_cut=pair.index in self._starts)

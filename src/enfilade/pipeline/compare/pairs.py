@@ -63,11 +63,16 @@ class Pairs:
     ----------
     test, reference : Sequence
     fps, exposure_ev : float
+    starts : frozenset of int or None
+        Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
+        says so.
+    note : str
+        What to know of how the frames are paired; empty where there is nothing.
 
     Raises
     ------
     ImageError
-        They differ in length, size or frame rate, or are runs of different exposure.
+        They differ in length, size or frame rate, or are runs of other frames or of different exposure.
     """
 
     def __init__(
@@ -77,6 +82,9 @@ class Pairs:
         self.test, self.reference = test, reference
         self.fps = _common_fps(test, reference) if fps is None else fps
         self.exposure_ev = _common_exposure_ev(test, reference) if exposure_ev is None else exposure_ev
+        known = [s.starts for s in (test, reference) if s.starts is not None]
+        self.starts = frozenset[int]().union(*known) if known else None
+        self.note = _note_on_numbers(test, reference)
         self._exposures_ev = [self.exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
 
     def __len__(self) -> int:
@@ -146,7 +154,8 @@ def open_pairs(
     Raises
     ------
     ImageError
-        One can't be read, they differ in length, size or frame rate, or are runs of different exposure.
+        One can't be read, they differ in length, size or frame rate, or are runs of other frames or of
+        different exposure.
     """
     sequences = [FencedSequence(source, limits) for source in (test, reference)]
     return Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
@@ -172,6 +181,8 @@ def _checked(image: F32, name: str) -> float:
 
 
 def _check_alike(test: Sequence, reference: Sequence) -> None:
+    if test.starts is not None and reference.starts is not None:
+        _check_same_frames(test, reference)
     if len(test) != len(reference):
         raise ImageError(
             f"the test has {len(test)} frames (first {test.name(0)}) and the reference {len(reference)} "
@@ -183,6 +194,32 @@ def _check_alike(test: Sequence, reference: Sequence) -> None:
             f"the test's images are {sizes[0]} ({test.name(0)}) and the reference's {sizes[1]} "
             f"({reference.name(0)}); give equal ones"
         )
+
+
+def _check_same_frames(test: Sequence, reference: Sequence) -> None:
+    ours, theirs = test.numbers or (), reference.numbers or ()
+    differing = set(ours) ^ set(theirs)
+    if not differing:
+        return
+    number = min(differing)
+    roles = (("test", test, ours), ("reference", reference, theirs))
+    (role, has, numbers), (other, lacks, _) = roles if number in ours else roles[::-1]
+    raise ImageError(
+        f"the {role}'s run has the frame {number} ({has.name(numbers.index(number))}), and the {other}'s "
+        f"(first {lacks.name(0)}) does not: give runs of the same --frames, finish the one that lacks it, or "
+        "give patterns of frames that both have"
+    )
+
+
+def _note_on_numbers(test: Sequence, reference: Sequence) -> str:
+    if test.numbers is None or reference.numbers is None or test.numbers == reference.numbers:
+        return ""
+    pairs = enumerate(zip(test.numbers, reference.numbers, strict=True))
+    index = next(i for i, (ours, theirs) in pairs if ours != theirs)
+    return (
+        f"frames: their numbers differ, so they are paired in order: {test.name(index)} with "
+        f"{reference.name(index)}, and so on"
+    )
 
 
 def _common_fps(test: Sequence, reference: Sequence) -> float:

@@ -11,13 +11,13 @@ from enfilade.viewing import Viewing
 
 __all__ = ["Band", "FrameDifference", "Part", "SequenceDifference", "meaning", "psnr_db"]
 
-MEANINGS = (  # up to which score, JND; 1 JND is found in three of four cases (§6)
+MEANINGS = (  # up to which score, JND: of all pixels and frames together, so not of whether one spot is found
     (0.0, "identical"),
-    (0.25, "nobody notices it"),
-    (0.75, "hardly noticed: a viewer who looks for it finds it in half of the cases"),
-    (1.5, "noticed: a viewer who looks for it finds it in three of four cases"),
-    (3.0, "plain: nearly every viewer sees it"),
-    (math.inf, "obvious at first sight"),
+    (0.25, "next to none on the whole"),
+    (0.75, "faint on the whole"),
+    (1.5, "noticeable on the whole"),
+    (3.0, "plain on the whole"),
+    (math.inf, "strong on the whole"),
 )
 
 
@@ -56,6 +56,8 @@ class FrameDifference:
         Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
     velocity_deg_s : float
         Mean image velocity that was assumed.
+    largest_jnd : float
+        Of the map: what is seen where most is, JND.
     """
 
     name: str
@@ -65,6 +67,7 @@ class FrameDifference:
     transient: Part
     squared_error: float
     velocity_deg_s: float
+    largest_jnd: float
 
     def to_dict(self) -> dict[str, Any]:
         """Figures as plain values for JSON; the PSNR of identical images is None."""
@@ -74,6 +77,7 @@ class FrameDifference:
             "steady_jnd": self.steady.score,
             "transient_jnd": self.transient.score,
             "percent_visible": self.percent_visible,
+            "largest_jnd": self.largest_jnd,
             "steady_bands_jnd": list(self.steady.bands),
             "transient_bands_jnd": list(self.transient.bands),
             "psnr_db": _finite(psnr_db(self.squared_error)),
@@ -118,6 +122,14 @@ class SequenceDifference:
         return sequence_score([f.score for f in self.frames])
 
     @property
+    def meaning(self) -> str:
+        """The score in words, and the frame with the most visible pixel, if any pixel is visible."""
+        words, worst = meaning(self.score), max(self.frames, key=lambda f: f.largest_jnd)
+        if not any(f.percent_visible for f in self.frames):
+            return words
+        return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
+
+    @property
     def mode(self) -> str:
         """``paper``, ``modern``, or ``custom`` for anything between."""
         known = {"paper": MetricOptions.paper(), "modern": MetricOptions.modern()}
@@ -136,10 +148,11 @@ class SequenceDifference:
         viewing = self.viewing
         return {
             "score_jnd": self.score,
-            "meaning": meaning(self.score),
+            "meaning": self.meaning,
             "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
             "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
             "percent_visible": _spread([f.percent_visible for f in self.frames]),
+            "largest_jnd": max(f.largest_jnd for f in self.frames),
             "psnr_db": _finite(self.psnr_db),
             "worst_frame": max(range(len(self.frames)), key=lambda i: self.frames[i].score),
             "frames": len(self.frames),
@@ -159,7 +172,9 @@ class SequenceDifference:
 
 
 def meaning(score: float) -> str:
-    """A score in words.
+    """A score in words: how much the sequences differ, all pixels and frames taken together.
+
+    A defect that is small or brief has a low score, however plain it is itself.
 
     Parameters
     ----------
@@ -172,6 +187,11 @@ def meaning(score: float) -> str:
 def psnr_db(squared_error: float) -> float:
     """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
     return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
+
+
+def _short(name: str) -> str:
+    # "frame 3 of walk.mp4", or the path of an image
+    return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
 
 
 def _spread(values: list[float]) -> dict[str, float]:
