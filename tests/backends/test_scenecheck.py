@@ -14,7 +14,7 @@ from enfilade.backends.trial import try_scene
 from enfilade.codec import write_exr
 from enfilade.errors import SceneError
 from enfilade.scenes import write_scene
-from enfilade.settings import LimitSettings
+from enfilade.settings import LimitSettings, TraceSettings
 
 
 @pytest.fixture
@@ -237,15 +237,46 @@ def test_large_files(scene):
     refused(file, "at most 3 are taken: raise --limits-file-mb", file_mb=3)
 
 
+def tried(file, max_depth=0, **limits):
+    return try_scene(file, TraceSettings(max_depth=max_depth), LimitSettings(**limits), "llvm_ad_rgb")
+
+
+def test_a_trial_says_why_there_is_no_light_to_ask_for(scene):
+    ball = '<shape type="sphere"/><emitter type="constant"/>'
+    assert tried(scene(ball)) == ""
+    assert tried(scene(ball), max_depth=3) == "its paths end after 3 edges, fewer than 4"
+    assert "DirectIntegrator, not a path tracer" in tried(scene(f'<integrator type="direct"/>{ball}'))
+
+
+def test_a_trial_loads_with_the_settings_of_the_run(scene):
+    file = scene('<integrator type="direct"/><shape type="sphere"/><emitter type="constant"/>')
+    with pytest.raises(SceneError, match="leave --trace-max-depth out"):
+        tried(file, max_depth=7)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("room.blend", "mitsuba-blender add-on .*docs/camera-paths"),
+        ("walk.json", "camera path is given by --path"),
+    ],
+)
+def test_what_is_no_scene_says_what_to_do(tmp_path, name, words):
+    (tmp_path / name).write_bytes(b"BLENDER-v402")
+    refused(tmp_path / name, words)
+    (tmp_path / name).unlink()
+    refused(tmp_path / name, "No such file")
+
+
 def test_a_trial_says_why_a_scene_can_not_be_loaded(scene):
     with pytest.raises(SceneError, match=r"can't load .*scene\.xml"):
-        try_scene(scene('<shape type="nonesuch"/>'), LimitSettings(), "llvm_ad_rgb")
+        tried(scene('<shape type="nonesuch"/>'))
 
 
 def test_a_trial_that_needs_too_much_is_refused(scene):
     file = scene(f'<shape type="sphere"><bsdf type="diffuse">{texture("large.png")}</bsdf></shape>')
     Image.new("L", (12_000, 12_000)).save(file.parent / "large.png", compress_level=1)
     with pytest.raises(SceneError, match=r"was too much for the process|can't load"):
-        try_scene(file, LimitSettings(trial_mb=512), "llvm_ad_rgb")
+        tried(file, trial_mb=512)
     with pytest.raises(SceneError, match=r"was not loaded in 0\.1 s"):  # in which no Mitsuba starts
-        try_scene(file, LimitSettings(trial_s=0.1), "llvm_ad_rgb")
+        tried(file, trial_s=0.1)

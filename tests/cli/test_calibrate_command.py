@@ -92,6 +92,16 @@ def test_flags_that_change_nothing_are_unknown(run, inputs, flag):
     assert f"No such option '{flag}'" in result.stderr
 
 
+def test_only_what_has_a_folder_is_said_to_stay(run, inputs, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(threshold, "calibrate_job", interrupted)
+    line = ("calibrate", "threshold", *inputs, "--device", "cpu")
+    assert run(*line).stderr.strip() == "Interrupted."
+    assert "to continue:" in run(*line, "--out", tmp_path / "kept").stderr
+
+
 def test_no_threshold_is_said(run, inputs):
     result = run(
         "calibrate", "threshold", *inputs, "--visible-percent", "0", "--light", "plain", "--device", "cpu"

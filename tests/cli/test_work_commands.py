@@ -8,6 +8,8 @@ import scenes_analytic
 from enfilade.backends.analytic_scene import scene_text
 from enfilade.pipeline.crew import Crew
 
+PAPER = ("--method", "paper")
+
 
 @pytest.fixture
 def begun(run, camera_path, tmp_path):
@@ -64,6 +66,39 @@ def test_a_scene_that_can_not_be_loaded_begins_no_run(run, camera_path, tmp_path
     assert not out.exists()
 
 
+def test_what_is_begun_is_told_as_json(run, begun, tmp_path):
+    result = run(*begun, "--prepare", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told == {"folder": str(tmp_path / "run"), "method": "paper", "frames": 3}
+
+
+@pytest.mark.parametrize(
+    ("integrator", "wrong", "words", "right"),
+    [
+        ("path", ("--viewing-black-cd-m2", "200"), "less than peak_cd_m2", ()),
+        ("path", ("--trace-max-depth", "3"), "3 edges, fewer than 4; take --method paper", ()),
+        ("direct", (), "not a path tracer; take --method paper", PAPER),
+        ("direct", (*PAPER, "--trace-max-depth", "7"), "leave --trace-max-depth out", PAPER),
+    ],
+)
+def test_what_is_refused_leaves_the_folder_to_the_corrected_command(
+    run, camera_path, tmp_path, integrator, wrong, words, right
+):
+    scene, out = tmp_path / "scene.xml", tmp_path / "run"
+    scene.write_text(
+        f'<scene version="3.0.0"><integrator type="{integrator}"/><shape type="sphere"/>'
+        '<emitter type="constant"/></scene>'
+    )
+    line = ("render", scene, "--path", camera_path, "--out", out, "--device", "cpu")
+    refused = run(*line, *wrong)
+    assert refused.exit_code == 2, refused.output
+    assert words in refused.stderr
+    assert run(*line, *wrong, "--prepare").exit_code == 2
+    corrected = run(*line, *right, "--prepare")
+    assert corrected.exit_code == 0, corrected.output
+
+
 def test_a_farm_gets_a_template(run, begun, tmp_path):
     result = run("farm", tmp_path / "run", "--chunks", "2")
     assert result.exit_code == 0, result.output
@@ -81,6 +116,10 @@ def test_what_is_no_run_is_refused(run, tmp_path, command):
     result = run(command, tmp_path)
     assert result.exit_code == 2
     assert "job.json" in result.stderr
+    assert "--prepare" in result.stderr
+    result = run(command, tmp_path / "nope")
+    assert result.exit_code == 2
+    assert "there is no such folder; begin one with `enfilade render" in result.stderr
 
 
 def test_farm_options_are_pairs(run, begun, tmp_path):

@@ -6,14 +6,16 @@ from enfilade.camera import Camera, look_at
 from enfilade.errors import SettingsError
 from enfilade.monitor import Silence
 from enfilade.pipeline import rehearsal
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.kept import nearest
 from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.rehearsal import excerpt_of, forecast_decoupled
 from enfilade.records import CameraPath, Segment
+from enfilade.settings import Settings
 from enfilade.store import Run
 from scenes_analytic import room_walk, slide, wall
-from small_runs import job_of
+from small_runs import Told, job_of
 
 PIXELS = 8 * 6
 JND, QUALITY = 8.0, 1.0  # of the pilot; asked for
@@ -23,6 +25,18 @@ def test_too_few_paths_to_know_their_noise_are_refused(tmp_path):
     job = job_of(tmp_path, wall(), slide(3), trace={"spp": 1})
     with pytest.raises(SettingsError, match="--method paper needs --spp 2 or more"):
         plan(job, Silence())
+
+
+def test_a_scene_unfit_for_the_method_is_refused_before_its_frames_are_looked_at(tmp_path):
+    file = tmp_path / "scene.xml"
+    file.write_text(
+        '<scene version="3.0.0"><integrator type="direct"/><shape type="sphere"/>'
+        '<emitter type="constant"/></scene>'
+    )
+    told = Told()
+    with pytest.raises(SettingsError, match=r"not a path tracer; take --method paper"):
+        plan(Job(file, slide(3), Settings(), "decoupled"), told)
+    assert told.stages == []
 
 
 def test_a_rest_is_not_rehearsed():

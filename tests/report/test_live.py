@@ -1,5 +1,6 @@
 """The live report: on loopback, behind its token, following the run."""
 
+import errno
 import json
 import os
 import shutil
@@ -87,6 +88,26 @@ def test_it_follows_the_run(copied):
         ledger.write_text("".join(lines[:-1]))
         assert "run.json" in state(served)["problem"]
         assert get(served.address, "page")[0]  # the last one that could be made
+
+
+@pytest.mark.usefixtures("no_rest")
+def test_what_fails_on_this_machine_is_tried_again(copied, monkeypatch):
+    ledger = copied / "ledger.jsonl"
+    lines = ledger.read_text().splitlines(keepends=True)
+    ledger.write_text("".join(lines[:-4]))
+    with Live(copied, Wishes(has_metric=False)) as served:
+        ledger.write_text("".join(lines))
+        for name in ("write_page", "_progress"):
+            with monkeypatch.context() as patch:
+                patch.setattr(live, name, full)
+                assert "No space left" in state(served)["problem"]
+                assert get(served.address, "page")[0]
+            assert state(served)["problem"] == ""
+        assert state(served)["version"] >= 2
+
+
+def full(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
 @pytest.mark.usefixtures("no_rest")

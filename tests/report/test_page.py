@@ -22,6 +22,7 @@ from enfilade.report.page import Wishes, write_page
 from enfilade.report.seen import SeenRun
 from enfilade.report.tables import percent
 from enfilade.settings import Settings, VideoSettings
+from enfilade.store.ledger import sealed
 from enfilade.store.lock import Lock
 from enfilade.video.view import open_view
 from small_runs import TABLES
@@ -236,6 +237,57 @@ def test_chosen_frames(runs, tmp_path):
     assert [frame["number"] for frame in data["frames"]] == [2, 5]
     with pytest.raises(SettingsError, match="has no frame 11"):
         written(runs / "paper", tmp_path, numbers=(2, 11))
+
+
+def decoupled(folder):
+    """Make a run one of the method that counts rays, as its ledger has it before any were sent."""
+    change_identity(folder, lambda table: table["identity"].update(method="decoupled"))
+    keep_lines(folder, lambda unit: unit == "survey")
+
+
+def send_rays(folder):
+    """One for each pixel of each frame."""
+    path = json.loads((folder / "run.json").read_text())["identity"]["path"]
+    count = path["size"][0] * path["size"][1] * len(path["frames"])
+    with (folder / "ledger.jsonl").open("ab") as ledger:
+        ledger.write(sealed({"unit": "draft 1", "files": {}, "frame": 1, "rays": {"drafts": count}}))
+
+
+def test_a_method_that_counts_rays_traces_no_paths_also_before_it_has_counted_any(copied, tmp_path):
+    decoupled(copied)
+    _, text, data = written(copied, tmp_path)
+    assert "<dt>paths a pixel</dt>" not in text
+    assert "Pixels traced" not in text
+    assert "<h2>Rays per pixel and frame</h2>" in text
+    assert '<td class="sum">–</td>' in text
+    assert data["unit"] == ""
+    send_rays(copied)
+    assert "<dt>rays a pixel</dt><dd>1.0</dd>" in written(copied, tmp_path)[1]
+
+
+def test_a_reference_that_counts_rays_is_told_by_them(runs, tmp_path):
+    reference = shutil.copytree(runs / "reference", tmp_path / "reference")
+    change_identity(reference, lambda table: table["identity"].update(method="decoupled"))
+    send_rays(reference)
+    _, text, _ = written(runs / "paper", tmp_path, reference=reference, has_metric=False)
+    assert "its paths a pixel" not in text
+    assert re.search(r"its rays a pixel</th>\s*<td[^>]*>1\.0<", text)
+
+
+def test_keyframes_are_named_where_other_frames_are_made_of_them(runs, tmp_path):
+    kinds = [frame["kind"] for frame in written(runs / "paper", tmp_path)[2]["frames"]]
+    assert (kinds[0], kinds[-1]) == ("keyframe", "keyframe")
+    assert "in-between" in kinds
+    _, _, data = written(runs / "reference", tmp_path)
+    assert {frame["kind"] for frame in data["frames"]} == {""}
+
+
+def test_a_page_that_can_not_be_kept_small_says_so(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr("enfilade.report.page.LEAST_MB", 1.0)
+    notes, text, _ = written(runs / "paper", tmp_path, max_mb=4.0)
+    assert any("MB, more than the 4 that --max-mb asks for" in note for note in notes)
+    assert "more than the 4 that --max-mb asks for" in text
+    assert not any("--max-mb asks" in note for note in written(runs / "paper", tmp_path)[0])
 
 
 def test_a_page_too_small_for_anything_is_refused(runs, tmp_path):

@@ -107,6 +107,7 @@ def assert_in_step(page, number):
 def test_the_scrubber_moves_the_charts(open_page):
     page = open_page()
     assert_in_step(page, 1)
+    assert page.locator("#fact-frame").text_content() == "1, keyframe"
     page.locator("#scrubber").fill("6")
     shown(page, 7, "result")
     assert_in_step(page, 7)

@@ -19,6 +19,12 @@ PARAMETER = re.compile(r"\$(\w+)")
 MB = 1_000_000
 XML_MB = 256  # of a scene file itself: meshes stand in files of their own
 DEEPEST = 16  # includes within includes, and parameters within parameters
+ADVICE = {  # by the suffix of what is no scene
+    ".blend": "is Blender's own file; export it with the mitsuba-blender add-on (File > Export > Mitsuba) "
+    "and give the XML that it writes: docs/camera-paths.md",
+    ".json": "is JSON, and a scene is Mitsuba's XML, or planes and spheres in a file *.analytic.json; "
+    "a camera path is given by --path",
+}
 
 
 class SceneFile:
@@ -145,6 +151,8 @@ def fingerprint(scene: Path) -> str:
 def _parsed(file: Path) -> Element:
     try:
         size = file.stat().st_size
+        if advice := ADVICE.get(file.suffix.lower()):
+            raise SceneError(f"{file} {advice}")
         if size > XML_MB * MB:
             raise SceneError(f"{file} has {size / MB:.0f} MB; a scene file may have {XML_MB}")
         root: Element = parse(file, forbid_dtd=True).getroot()

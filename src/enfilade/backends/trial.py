@@ -2,36 +2,47 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
 from enfilade.confined import limit_memory
 from enfilade.errors import SceneError
-from enfilade.settings import LimitSettings, TraceSettings
+from enfilade.settings import LimitSettings, Settings, TraceSettings
 
 __all__ = ["try_scene"]
 
 REFUSED = 3  # exit code of a trial whose renderer said no
+UNLIT = 4  # ... and of one whose scene was loaded, but can't be asked for light
 
 
-def try_scene(scene: Path, limits: LimitSettings, variant: str) -> None:
+def try_scene(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> str:
     """Let another process load a Mitsuba scene.
 
     Parameters
     ----------
     scene
+    trace
+        With which the scene will be rendered.
     limits
         Memory and time.
     variant
         Mitsuba's.
+
+    Returns
+    -------
+    str
+        See :meth:`enfilade.renderer.LightRenderer.why_no_light`.
 
     Raises
     ------
     SceneError
         It crashed, took too long, or Mitsuba refused the scene.
     """
-    line = [sys.executable, "-P", "-m", "enfilade.backends.trial", str(scene), str(limits.trial_mb), variant]
+    table = json.dumps(Settings(trace=trace).to_tables()["trace"])
+    line = [sys.executable, "-P", "-m", "enfilade.backends.trial"]
+    line += [str(scene), table, str(limits.trial_mb), variant]
     try:
         done = subprocess.run(  # noqa: S603
             line, capture_output=True, text=True, errors="replace", check=False, timeout=limits.trial_s
@@ -42,14 +53,17 @@ def try_scene(scene: Path, limits: LimitSettings, variant: str) -> None:
         ) from error
     if done.returncode == REFUSED:
         raise SceneError(done.stdout.strip())
+    if done.returncode == UNLIT:
+        return done.stdout.strip()
     if done.returncode:
         raise SceneError(
             f"{scene} was too much for the process that tried to load it (exit code {done.returncode}, "
             f"{limits.trial_mb} MB of memory): it is damaged, or needs more --limits-trial-mb"
         )
+    return ""
 
 
-def _load(scene: str, megabytes: int, variant: str) -> int:
+def _load(scene: str, trace: str, megabytes: int, variant: str) -> int:
     from enfilade.device import activate
 
     is_gpu = variant.startswith("cuda")
@@ -59,12 +73,13 @@ def _load(scene: str, megabytes: int, variant: str) -> int:
     if not is_gpu:  # CUDA maps all of the GPU's memory
         limit_memory(megabytes)
     try:
-        MitsubaRenderer(Path(scene), TraceSettings())
+        why_no_light = MitsubaRenderer(Path(scene), TraceSettings.from_table(json.loads(trace))).why_no_light
     except SceneError as error:
         sys.stdout.write(str(error))
         return REFUSED
-    return 0
+    sys.stdout.write(why_no_light)
+    return UNLIT if why_no_light else 0
 
 
 if __name__ == "__main__":
-    sys.exit(_load(sys.argv[1], int(sys.argv[2]), sys.argv[3]))
+    sys.exit(_load(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]))

@@ -82,7 +82,8 @@ def threshold(
     A few frames are rendered with every pixel traced, and from keyframes; the metric says up to which
     velocity the one must replace the other. The result is for --masks-slow-deg-s.
     """
-    mark_resumable(ctx)
+    if folder is not None:
+        mark_resumable(ctx)
     job = job_of(ctx, method="paper", **inputs)
     from enfilade.cli.progress import watch
     from enfilade.studies.cases.threshold import Calibration, calibrate_job

@@ -63,7 +63,8 @@ def command(
 
     if is_prepared:
         prepare(job, folder, is_tried=True)
-        click.echo(f"run     {folder}")
+        begun = {"folder": str(folder), "method": job.method, "frames": len(job.path)}
+        click.echo(json.dumps(begun, indent=2) if as_json else f"run     {folder}")
         return
     before = ledger_bytes(folder)
     with watch(quiet=quiet) as monitor:

@@ -44,7 +44,7 @@ PAGE = "report.html"
     type=float,
     default=30.0,
     show_default=True,
-    help="Size of the page that is not exceeded: pictures are scaled, then frames left out. At least 8.",
+    help="Size that the page keeps to where it can: pictures are scaled, then frames left out. At least 8.",
 )
 @click.option(
     "--serve",

@@ -132,7 +132,27 @@ class Job:
 
         check_scene(self.scene, self.settings.limits)
         if is_tried:
-            try_scene(self.scene, self.settings.limits, active().variant)
+            self.check_light(
+                try_scene(self.scene, self.settings.trace, self.settings.limits, active().variant)
+            )
+
+    def check_light(self, why_no_light: str) -> None:
+        """Refuse a scene that can't be asked for light, where the method asks for it.
+
+        Parameters
+        ----------
+        why_no_light
+            What :meth:`enfilade.renderer.LightRenderer.why_no_light` says of the scene.
+
+        Raises
+        ------
+        SettingsError
+        """
+        if self.method == "decoupled" and why_no_light:
+            raise SettingsError(
+                f"--method decoupled can't render {self.scene}: {why_no_light}; "
+                "take --method paper or --method reference"
+            )
 
     def to_json(self) -> dict[str, Any]:
         """All of it, fit for JSON, for workers elsewhere; :meth:`from_json` reads back the very same."""
@@ -182,6 +202,12 @@ def read_job(folder: Path) -> Job:
     RunFolderError
         It has none, or it is damaged.
     """
+    if not (folder / JOB_FILE).exists():
+        what = f"it has no {JOB_FILE}" if folder.is_dir() else "there is no such folder"
+        raise RunFolderError(
+            f"{folder} holds no run to work on: {what}; begin one with "
+            f"`enfilade render ... --out {folder} --prepare`"
+        )
     try:
         return Job.from_json(read_json(folder / JOB_FILE))
     except (KeyError, TypeError, ValueError, SettingsError, CameraPathError) as error:

@@ -18,7 +18,7 @@ from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import LEAST_SPP
 from enfilade.records import Keyframe, Segment, Shading
-from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.warp import composite, warp_keyframe
 
 HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
@@ -84,6 +84,8 @@ def plan(job: Job, monitor: Monitor) -> Plan:
             "what is noise and what is a difference"
         )
     renderer = open_renderer(job.scene, job.settings.trace)
+    if isinstance(renderer, LightRenderer):
+        job.check_light(renderer.why_no_light)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
     shots = segments_of(job, survey)

@@ -159,6 +159,7 @@ def _try(job: Job, folder: Path) -> None:
 def _check(job: Job, crew: Crew) -> None:
     """Refuse now what would fail, or mislead, after a night of rendering."""
     check_executor(crew.executor)
+    _ = job.viewing  # what is wrong with it raises here
     job.check_scene()
     if job.method not in METHODS:
         raise ValueError(f"there is no method {job.method!r}")

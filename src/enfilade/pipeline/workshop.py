@@ -58,11 +58,7 @@ class Workshop:
         if not isinstance(self.renderer, LightRenderer):
             name = self.renderer.describe().renderer
             raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
-        if reason := self.renderer.why_no_light:
-            raise SettingsError(
-                f"--method decoupled can't render {self.job.scene}: {reason}; "
-                "take --method paper or --method reference"
-            )
+        self.job.check_light(self.renderer.why_no_light)
         return self.renderer
 
     def shader(self, pixel_angle: float) -> Shader:

@@ -11,7 +11,7 @@ from enfilade.metric import sequence_score
 from enfilade.report.film import Film
 from enfilade.report.forecast import Forecast, forecast
 from enfilade.report.layers import LAYERS
-from enfilade.report.panels import PURPOSES, panels
+from enfilade.report.panels import PURPOSES, counts_rays, panels
 from enfilade.report.seen import SeenRun
 from enfilade.report.tables import SOURCES, percent, seconds
 from enfilade.settings import Settings
@@ -35,6 +35,7 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         "name": seen.name,
         "folder": str(seen.run.folder.resolve()),
         "figures": seen.figures,
+        "counts_rays": counts_rays(seen.figures),
         "state": _state(seen),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "has_frames": bool(film.frames),
@@ -56,15 +57,17 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
 
 def _effort(figures: Mapping[str, Any]) -> dict[str, Any]:
     """What was traced, and why: rays where the method counts them, and pixels (Table 1) otherwise."""
-    if rays := figures["rays"]:
+    if counts_rays(figures):
+        rays = figures["rays"]
+        sent = {**rays, "total": sum(rays.values())} if rays else {}
+        named = [*((kind, name) for kind, (name, _) in PURPOSES.items()), ("total", "total")]
         return {
             "title": "Rays per pixel and frame",
             "table": "",
-            "columns": [*((name, f"{rays[kind]:.2f}") for kind, (name, _) in PURPOSES.items()),
-                        ("total", f"{sum(rays.values()):.2f}")],
+            "columns": [(name, f"{sent[kind]:.2f}" if sent else "–") for kind, name in named],
             "text": "Drafts are what tells where light comes from, and how many paths it takes.",
             "headings": [name for name, _ in PURPOSES.values()] + ["rays"],
-        }  # fmt: skip
+        }
     known, count = len(figures["per_frame"]), figures["frames"]
     return {
         "title": "Pixels traced",
@@ -77,7 +80,7 @@ def _effort(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 def _efforts(figures: Mapping[str, Any]) -> dict[int, list[float]]:
     """By frame, what stands under the headings of :func:`_effort`."""
-    if figures["rays"]:
+    if counts_rays(figures):
         rows, keys = figures["rays_per_frame"], tuple(PURPOSES)
         return {row["frame"]: [*(row[k] for k in keys), sum(row[k] for k in keys)] for row in rows}
     keys = ("slow", "specular", "hole", "keyframe", "traced")
@@ -139,7 +142,7 @@ def _beside(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, A
     psnr = [f["psnr_db"] for f in found if f["psnr_db"] is not None]
     rows = [
         ("frames compared", f"{len(found)}", ""),
-        ("its paths a pixel", str(reference.figures["spp"]), "its noise counts as a difference too"),
+        (*_effort_of_a_pixel(reference.figures), "its noise counts as a difference too"),
     ]
     if scores:
         rows += [
@@ -156,6 +159,12 @@ def _beside(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, A
             ("", f"{other / max(own, 1e-9):.2f} : 1", "reference : this run; fair on one machine alone"),
         ]
     return {"name": reference.name, "folder": str(reference.run.folder.resolve()), "rows": rows}
+
+
+def _effort_of_a_pixel(figures: Mapping[str, Any]) -> tuple[str, str]:
+    if counts_rays(figures):
+        return "its rays a pixel", f"{sum(figures['rays'].values()):.1f}"
+    return "its paths a pixel", str(figures["spp"])
 
 
 def _settings(tables: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -235,6 +244,8 @@ def _rows(seen: SeenRun, film: Film) -> list[dict[str, Any]]:
 def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, Any]:
     by_number = {row["frame"]: row for row in seen.figures["per_frame"]}
     efforts = _efforts(seen.figures)
+    # By method reference no frame is made of others: all are traced alike.
+    kinds = ("", "") if seen.figures["method"] == "reference" else ("in-between", "keyframe")
     frames = []
     for frame in film.frames:
         row = by_number.get(frame["number"], {})
@@ -246,7 +257,7 @@ def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, An
                 "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[frame["index"]],
                 "effort": efforts.get(frame["number"], [None])[-1],
                 "isRaw": frame["is_raw"],
-                "isKeyframe": row.get("keyframe", 0.0) > 0.0,
+                "kind": kinds[row.get("keyframe", 0.0) > 0.0],
                 "score": found.get("score_jnd"),
                 "psnr": found.get("psnr_db"),
                 "layers": frame["layers"],
@@ -263,5 +274,5 @@ def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, An
             for n in film.layers
         ],
         "panels": made,
-        "unit": "" if seen.figures["rays"] else "%",
+        "unit": "" if counts_rays(seen.figures) else "%",
     }

@@ -190,6 +190,9 @@ class _Pages:
             return
         try:
             self._renew_if_due()
+        except OSError as error:  # of this machine, and not of the run: it is tried again, which may help
+            self._problem = f"the page can't be renewed: {error}"
+            self._progress, self._ended_s = None, monotonic()
         finally:
             self._lock.release()
 

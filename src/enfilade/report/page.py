@@ -102,7 +102,14 @@ def write_page(folder: Path, file: Path, wishes: Wishes, monitor: Monitor) -> li
     if dropped := seen.figures["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
     template = _environment().get_template("report.html.j2")
-    text = template.render(**contents(seen, reference, film), notes=notes, parts=parts, version=__version__)
+    said = {**contents(seen, reference, film), "parts": parts, "version": __version__}
+    text = template.render(said, notes=notes)
+    if (size := len(text.encode())) > wishes.max_mb * MB:
+        notes.append(
+            f"the page has {size / MB:.1f} MB, more than the {wishes.max_mb:g} that --max-mb asks for: "
+            "charts and tables show all frames, and one frame stays in the player"
+        )
+        text = template.render(said, notes=notes)
     with whole_file(file) as beside:
         beside.write_text(text, encoding="utf-8")
     return notes

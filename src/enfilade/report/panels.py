@@ -12,7 +12,7 @@ from typing import Any
 from enfilade.records import Source
 from enfilade.report.layers import SOURCE_COLORS
 
-__all__ = ["PURPOSES", "panels"]
+__all__ = ["PURPOSES", "counts_rays", "panels"]
 
 Panel = dict[str, Any]
 BLUE, VERMILION, GREEN = "#3D8FC6", "#D55E00", "#009E73"
@@ -30,6 +30,11 @@ PURPOSES = {  # sent for: name, colour
     "light": ("light of keyframes", SOURCE_COLORS[Source.KEYFRAME]),
     "drafts": ("drafts of it", SOURCE_COLORS[Source.HOLE]),
 }
+
+
+def counts_rays(figures: Mapping[str, Any]) -> bool:
+    """Whether the method of a run counts rays, not traced pixels; it may have counted none yet."""
+    return bool(figures["method"] == "decoupled")
 
 
 def panels(
@@ -54,7 +59,7 @@ def panels(
     rows = figures["per_frame"]
     made = [
         _velocity(numbers, speed_deg_s, rows) if speed_deg_s else None,
-        _sent(figures) if figures["rays"] else _traced(rows, figures["table1"]) if rows else None,
+        _sent(figures) if counts_rays(figures) else _traced(rows, figures["table1"]) if rows else None,
         _predictions(figures["segments"], figures["split_percent"]),
         _score(beside) or _psnr(beside),
     ]
@@ -85,8 +90,10 @@ def _traced(rows: Sequence[Mapping[str, Any]], table1: Mapping[str, float]) -> P
     return {**panel, "ticks": [0, 50, 100], "level": {"value": total, "name": f"mean {total:.1f} %"}}
 
 
-def _sent(figures: Mapping[str, Any]) -> Panel:
+def _sent(figures: Mapping[str, Any]) -> Panel | None:
     rows, rays = figures["rays_per_frame"], figures["rays"]
+    if not rows:
+        return None
     traces = [
         _bars(name, rows, kind, color, "%{y:.1f}")
         for kind, (name, color) in PURPOSES.items()

@@ -114,13 +114,13 @@
     at.frame = Math.min(Math.max(frame, 0), frames.length - 1);
     at.layer = layer;
     const here = frames[at.frame];
-    const kind = (here.isKeyframe ? "keyframe" : "in-between") + (here.isRaw ? ", not antialiased" : "");
+    const name = [`${here.number}`, here.kind, here.isRaw && "not antialiased"].filter(Boolean).join(", ");
     const title = data.layers.find((one) => one.name === layer).title;
     scrubber.value = at.frame;
-    scrubber.setAttribute("aria-valuetext", `frame ${here.number}, ${kind}`);
+    scrubber.setAttribute("aria-valuetext", `frame ${name}`);
     counter.textContent = `${here.number} / ${data.range[1]}`;
-    canvas.setAttribute("aria-label", `Frame ${here.number}, ${kind}: ${title}`);
-    fact("frame", `${here.number}, ${kind}`);
+    canvas.setAttribute("aria-label", `Frame ${name}: ${title}`);
+    fact("frame", name);
     fact("velocity", number(here.velocity, 2, "deg/s"));
     fact("effort", number(here.effort, 1, data.unit));
     fact("score", number(here.score, 2, "JND"));
