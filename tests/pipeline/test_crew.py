@@ -23,7 +23,7 @@ NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 
 
 def make_job(folder):
-    tables = {"masks": {"split_percent": 10.0}, "trace": {"spp": 8}, "viewing": {"diagonal_m": 0.02}}
+    tables = {"masks": {"split_percent": 20.0}, "trace": {"spp": 8}, "viewing": {"diagonal_m": 0.02}}
     return job_of(folder, NOISY, room_walk(13, size=(48, 36)), **tables)
 
 
