@@ -408,6 +408,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         ('<integrator type="path"><integer name="max_depth" value="3"/></integrator>', DIFFUSE, "3 edges"),
         (HIDDEN.format("path"), DIFFUSE, "hides"),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "media"),
+        ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
     ],
 )  # fmt: skip
 def test_what_has_no_light_of_its_own_says_why(tmp_path, integrator, inside, words):

@@ -62,7 +62,8 @@ def why_undivided(scene: Any, integrator: Any) -> str:
     longest, _ = _limits(integrator)
     if longest < MOST_EDGES:
         return f"its paths end after {longest} edges, fewer than {MOST_EDGES}"
-    if any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
+    sees_media = PATHS[integrator.class_name()] != "path"
+    if sees_media and any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
         return "there are media in it"
     return ""
 
