@@ -7,12 +7,13 @@ import pytest
 
 from enfilade.arrays import image, lanes, matrix3
 from enfilade.camera import Camera, look_at
-from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, without_speckles
+from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, with_spread_speckles, without_speckles
 from twins import wavelet as twin
 
 HEIGHT, WIDTH = 18, 24
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
-OPTIONS = {"levels": 3, "deviations": 3.0, "plane_tolerance": 0.01, "normal_exponent": 64.0}
+OPTIONS = {"levels": 3, "deviations": 3.0}
+SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64.0}
 
 
 @dataclasses.dataclass
@@ -33,6 +34,7 @@ class Scene:
             matrix3(CAMERA.direction_from_pixel),
             WIDTH,
             HEIGHT,
+            **SURFACE,
         )
         color, variance = smooth(lanes(self.color), lanes(self.variance), guide, **{**OPTIONS, **options})
         return image(color, HEIGHT, WIDTH), image(variance, HEIGHT, WIDTH)
@@ -69,22 +71,30 @@ def test_it_does_what_loops_do(scene):
     np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
 
 
-def on_a_wall(light, variance, **options):
-    """Smooth grey light on a plain wall, (H, W); with the variance that is left."""
-    height, width = light.shape
+def wall(height, width):
+    """A plain wall that fills the image."""
     normal = np.zeros((height, width, 3), np.float32)
     normal[..., 2] = 1.0
-    guide = Guide(
-        lanes(np.full(light.shape, 4.0, np.float32)),
+    return Guide(
+        lanes(np.full((height, width), 4.0, np.float32)),
         lanes(normal),
-        lanes(np.ones(light.shape, np.uint32)),
+        lanes(np.ones((height, width), np.uint32)),
         matrix3(Camera(CAMERA.world_from_camera, 40, width, height).direction_from_pixel),
         width,
         height,
+        **SURFACE,
     )
-    color = lanes((light[..., None] * np.ones(3)).astype(np.float32))
-    color, variance = smooth(color, lanes(variance.astype(np.float32)), guide, **{**OPTIONS, **options})
-    return image(color, height, width)[..., 0], image(variance, height, width)
+
+
+def grey(light):
+    return (light[..., None] * np.ones(3)).astype(np.float32)
+
+
+def on_a_wall(light, variance, **options):
+    """Smooth grey light on a plain wall, (H, W); with the variance that is left."""
+    color, variance = lanes(grey(light)), lanes(variance.astype(np.float32))
+    color, variance = smooth(color, variance, wall(*light.shape), **{**OPTIONS, **options})
+    return image(color, *light.shape)[..., 0], image(variance, *light.shape)
 
 
 def test_what_is_left_of_the_noise_is_told():
@@ -137,6 +147,42 @@ def test_a_speckle_is_cut_to_its_brightest_neighbour():
     np.testing.assert_allclose(cut[2, 3], 3.0, rtol=1e-5)
     color[2, 3] = cut[2, 3]
     np.testing.assert_array_equal(cut, color)
+
+
+def spread(light, variance, **options):
+    options = {"times": 2.0, "levels": 4, **options}
+    color, variance = with_spread_speckles(
+        lanes(grey(light)), lanes(variance.astype(np.float32)), wall(*light.shape), **options
+    )
+    return image(color, *light.shape)[..., 0], image(variance, *light.shape)
+
+
+def test_speckles_of_a_page_are_spread_and_their_light_stays():
+    """One pixel in a hundred glares: alone, in pairs, at the border."""
+    rng = np.random.default_rng(11)
+    light = np.ones((96, 128))
+    light.ravel()[rng.choice(light.size, light.size // 100, replace=False)] = 60.0
+    variance = np.where(light > 1.0, 900.0, 0.0)
+    got, left = spread(light, variance)
+    assert got.mean() == pytest.approx(light.mean(), rel=0.02)
+    assert np.percentile(got, 99.9) < 4.0
+    assert left.max() < 0.01 * variance.max()
+
+
+def test_what_is_bright_beside_bright_pixels_is_no_speckle():
+    light = np.ones((24, 32))
+    light[10, 4:20] = light[15:17, 9:11] = 50.0  # a thin line, and a spot of four pixels
+    got, _ = spread(light, np.zeros_like(light))
+    line, spot = got[10, 5:19], got[15:17, 9:11]
+    np.testing.assert_allclose(line, 50.0, rtol=0.02)
+    np.testing.assert_allclose(spot, 50.0, rtol=0.02)
+
+
+def test_a_speckle_at_the_border_is_one():
+    color = np.ones((5, 6, 3), np.float32)
+    color[0, 0] = color[2, 5] = 50.0
+    cut = image(without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)
+    np.testing.assert_allclose(cut[[0, 2], [0, 5]], 2.0, rtol=1e-5)
 
 
 def test_edges_between_items_are_as_soft_as_the_filter():

@@ -14,7 +14,7 @@ from enfilade.irradiance.cells import Cells
 from enfilade.pixels.estimate import GAUSSIAN_SIGMA_PX, LUMINANCE
 from enfilade.pixels.lookup import Page, footprint, lookup, packed
 from enfilade.pixels.rays import pinhole_directions
-from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, without_speckles
+from enfilade.pixels.wavelet import Guide, smooth, with_soft_edges, with_spread_speckles, without_speckles
 from enfilade.records import F32, U32, Geometry, LightPage, Mask, Shading
 
 BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror or through glass
@@ -22,7 +22,8 @@ PLANE_TOLERANCE = 0.01  # of the depth
 KNOWN = 0.02  # least weight of all taps together at which a surface counts as known
 
 EVEN = 0.5  # of the spread of rays that share out their directions evenly counts as noise
-SPECKLE = 2.0  # times the brightest of its neighbours that a pixel may be
+SPECKLE = 2.0  # times the brightest of its neighbours, of a page the second brightest, that a pixel may be
+SPECKLE_LEVELS = 5  # of the wavelet that spreads what is more in a page
 LEVELS = 4  # of the wavelet that smooths a page
 DEVIATIONS = 3.0  # of the luminance, across which it smooths
 APART = 3.0  # deviations by which frames may differ that are averaged
@@ -78,8 +79,11 @@ def open_cache(pages: Sequence[Page], shares: Sequence[float], cells: Cells | No
 
 def open_page(page: LightPage) -> Page:
     """Make a page ready to be looked up."""
-    layers = [(lanes(of.color), lanes(of.variance)) for of in (page.direct, page.indirect)]
-    return _page(page.geometry, lanes(page.is_known), layers)
+    guide = _guide(page.geometry, np.where(page.is_known, page.geometry.item, np.uint32(0)))
+    indirect = lanes(page.indirect.color), lanes(page.indirect.variance)
+    indirect = with_spread_speckles(*indirect, guide, times=SPECKLE, levels=SPECKLE_LEVELS)
+    direct = lanes(page.direct.color), lanes(page.direct.variance)
+    return _page(page.geometry, lanes(page.is_known), [direct, indirect])
 
 
 def pooled(page: LightPage, around: Sequence[Page], denoised: Callable[[F32], F32] | None = None) -> Page:
@@ -198,20 +202,17 @@ def _without_speckles(shading: Shading) -> Any:
 
 
 def _smooth(geometry: Geometry, groups: U32, light: Any, variance: Any) -> tuple[Any, Any]:
-    guide = Guide(
+    return smooth(light, variance, _guide(geometry, groups), levels=LEVELS, deviations=DEVIATIONS)
+
+
+def _guide(geometry: Geometry, groups: U32) -> Guide:
+    return Guide(
         depths=lanes(geometry.depth),
         normals=lanes(geometry.normal),
         items=lanes(groups),
         direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
         width=geometry.camera.width,
         height=geometry.camera.height,
-    )
-    return smooth(
-        light,
-        variance,
-        guide,
-        levels=LEVELS,
-        deviations=DEVIATIONS,
         plane_tolerance=PLANE_TOLERANCE,
         normal_exponent=NORMAL_EXPONENT,
     )

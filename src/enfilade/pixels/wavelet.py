@@ -13,6 +13,7 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, opaque, pixel_grid
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 TINY = 1e-8
+ALL = 1e12  # deviations: no difference is too much
 # Neighbours of a later level have been averaged over the same pixels: of what independent ones would take off
 # the logarithm of the variance, they take off this part (exact for a flat image), 0.535 from the fifth on.
 INDEPENDENT = (1.0, 0.613, 0.552, 0.539)
@@ -31,6 +32,10 @@ class Guide:
     direction_from_pixel : Matrix3f
         Of the camera.
     width, height : int
+    plane_tolerance : float
+        Distance from the tangent plane, by depth, at which a neighbour's weight falls to 1/e.
+    normal_exponent : float
+        Of the cosine between two normals.
     """
 
     depths: Any
@@ -39,18 +44,11 @@ class Guide:
     direction_from_pixel: Any
     width: int
     height: int
+    plane_tolerance: float
+    normal_exponent: float
 
 
-def smooth(
-    color: Any,
-    variance: Any,
-    guide: Guide,
-    *,
-    levels: int,
-    deviations: float,
-    plane_tolerance: float,
-    normal_exponent: float,
-) -> tuple[Any, Any]:
+def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: float) -> tuple[Any, Any]:
     """Smooth an image along its surfaces, as far as its noise asks for.
 
     Edge-avoiding a-trous wavelets (Dammertz et al. 2010), guided by the variance (Schied et al. 2017).
@@ -65,10 +63,6 @@ def smooth(
         Of the wavelet: the last one reaches 2 ** levels pixels to each side.
     deviations
         Difference of luminance, in standard deviations, at which a pixel's weight falls to 1/e.
-    plane_tolerance
-        Distance from the tangent plane, by depth, at which the weight falls to 1/e.
-    normal_exponent
-        Of the cosine between two normals.
 
     Returns
     -------
@@ -78,18 +72,14 @@ def smooth(
     """
     related = Float(1)  # variance that is left, by what it would be if all pixels were independent
     for level in range(levels):
-        color, variance, share = _pass(
-            color, variance, guide, opaque(1 << level, Int), deviations, plane_tolerance, normal_exponent
-        )
+        color, variance, share = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
         part = INDEPENDENT[level] if level < len(INDEPENDENT) else 0.535
         related *= share ** (part - 1.0)
         dr.eval(color, variance, related)
     return color, variance * related
 
 
-def _pass(
-    color: Any, variance: Any, guide: Guide, step: Any, deviations: float, plane: float, exponent: float
-) -> tuple[Any, Any, Any]:
+def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float) -> tuple[Any, Any, Any]:
     """Colour, variance as if all pixels were independent, and what part of it such a mean leaves."""
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
@@ -103,7 +93,7 @@ def _pass(
     item = dr.gather(UInt, guide.items, lane)
     slope = guide.direction_from_pixel.T @ normal
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
-    nearness = dr.rcp(plane * depth + TINY)
+    nearness = dr.rcp(guide.plane_tolerance * depth + TINY)
 
     total, total_variance, squares = Array3f(0), Float(0), Float(0)
     weight, taken = Float(0), Float(0)
@@ -124,7 +114,7 @@ def _pass(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
             cosine: Any = dr.clip(dr.dot(normal, dr.gather(Array3f, guide.normals, tap)), 0.0, 1.0)
-            surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**exponent
+            surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**guide.normal_exponent
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
             share = surface * dr.exp(-difference)
             total += share * other
@@ -156,20 +146,55 @@ def without_speckles(color: Any, *, width: int, height: int, times: float) -> An
     times
         The brightest neighbour's luminance: where more is cut to that.
     """
+    return color * _kept(color, width=width, height=height, times=times, rank=1)
+
+
+def with_spread_speckles(
+    color: Any, variance: Any, guide: Guide, *, times: float, levels: int
+) -> tuple[Any, Any]:
+    """An image whose speckles are spread along their surfaces: no light is lost.
+
+    Parameters
+    ----------
+    color : Array3f
+    variance : Float
+        Of the luminance.
+    guide
+    times
+        The second brightest neighbour's luminance, since speckles come in pairs, too: where more is spread.
+    levels
+        Of the wavelet that spreads it, as of :func:`smooth`.
+
+    Returns
+    -------
+    color : Array3f
+    variance : Float
+    """
+    kept = _kept(color, width=guide.width, height=guide.height, times=times, rank=2)
+    beyond = 1.0 - kept
+    spread, spread_variance = smooth(
+        beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
+    )
+    return kept * color + spread, kept * kept * variance + spread_variance
+
+
+def _kept(color: Any, *, width: int, height: int, times: float, rank: int) -> Any:
+    """Part of each pixel that is at most some times its brightest neighbour, or the one of a later rank."""
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
-    luminance = dr.dot(color, Array3f(*LUMINANCE))
+    luminance = dr.abs(dr.dot(color, Array3f(*LUMINANCE)))
     dr.eval(luminance)
-    brightest = Float(0)
+    brightest = [Float(0)] * rank
     for down in (-1, 0, 1):
         for across in (-1, 0, 1):
             if across or down:
-                i = dr.clip(Int(column) + across, 0, columns - 1)
-                j = dr.clip(Int(row) + down, 0, rows - 1)
-                around = dr.gather(Float, dr.abs(luminance), UInt(j * columns + i))
-                brightest = dr.maximum(brightest, around)
-    limit = times * brightest
-    return color * dr.select(dr.abs(luminance) > limit, limit / dr.maximum(dr.abs(luminance), TINY), 1.0)
+                i, j = Int(column) + across, Int(row) + down
+                is_inside = (i >= 0) & (j >= 0) & (i < columns) & (j < rows)
+                around = dr.gather(Float, luminance, UInt(j * columns + i), is_inside)
+                for place, other in enumerate(brightest):
+                    brightest[place], around = dr.maximum(other, around), dr.minimum(other, around)
+    limit = times * brightest[-1]
+    return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
 
 def with_soft_edges(color: Any, items: Any, *, width: int, height: int, sigma: float) -> Any:
