@@ -35,7 +35,7 @@ class SurfaceClass(IntEnum):
 
 
 SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
-LEAST_ALBEDO = 1e-3  # of a surface whose light is worth knowing
+LEAST_ALBEDO = 1e-4  # of a surface whose light is worth knowing: below it the diffuse lobe counts as none
 
 
 class Source(IntEnum):
@@ -132,6 +132,11 @@ class CameraPath:
             rests = frame > 0 and frame not in self.cuts and camera.is_same_view(self.cameras[frame - 1])
             found.append(found[-1] if rests else frame)
         return found
+
+    @cached_property
+    def originals(self) -> tuple[int, ...]:
+        """Frames that show a view of their own, in order: those that are no copies."""
+        return tuple(frame for frame in range(len(self)) if self.original(frame) == frame)
 
     def place(self, frame: int) -> int:
         """How many other views come before a frame's: how far it is along the path, rests left out."""

@@ -16,12 +16,12 @@ from enfilade.irradiance.paths import Path, begun, chosen, scatter_add
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
 from enfilade.pixels.replay import padded, recorded
+from enfilade.records import LEAST_ALBEDO
 from enfilade.renderer import MOST_EDGES, LightRenderer, Rays
 
 BOUNCES = MOST_EDGES - 1  # off lobes, from cache to cache; what goes on then is path traced to its end
 BRIGHT = 4.0  # one over the throughput below which a path is faint
 LEAST_CHANCE = 0.05  # of a faint path to go on
-BLACK = 1e-4  # albedo below which no light is looked up
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
 CELL_BLUR = 0.25  # ... and at what is seen through a lobe, of the lobe's width
 GATHER_BLUR = 0.2  # ... and at what lights a diffuse surface, of its distance
@@ -272,7 +272,7 @@ class Shader:
         """What is emitted where rays meet a surface; and what it scatters, as far as that is known."""
         lit = self._renderer.lit(path.rays, path.bounce, path.carries)
         albedo = lit.surfaces.albedo
-        is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > BLACK)
+        is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > LEAST_ALBEDO)
         spot = _Spot(
             position=lit.position,
             normal=lit.surfaces.normal,

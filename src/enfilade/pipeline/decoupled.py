@@ -17,7 +17,7 @@ import numpy.typing as npt
 from enfilade.codec import read_parts, write_parts
 from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
 from enfilade.pipeline.finish import result_unit, write_frame_result
-from enfilade.pipeline.kept import Kept
+from enfilade.pipeline.kept import Kept, around
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.units import REACH
 from enfilade.pipeline.views import View
@@ -38,7 +38,7 @@ def raw_unit(workshop: Workshop, frame: int) -> str:
 
 
 class DecoupledFrames:
-    """Shades frames, and filters over time what is sampled afresh in each.
+    """Shades frames, and filters over time what is sampled afresh in each; a view that rests, once.
 
     Memory is bounded by the frames that the filter spans, whatever the length of the shot.
 
@@ -50,6 +50,7 @@ class DecoupledFrames:
     def __init__(self, workshop: Workshop) -> None:
         self._workshop = workshop
         self._kept: Kept[_Parts] = Kept(2 * REACH + 2)
+        self._made: Kept[tuple[Frame, View]] = Kept(1)
 
     def shade(self, table: LightTable, frame: int) -> None:
         """Shade a frame by itself, from the light of the pages around it."""
@@ -61,19 +62,28 @@ class DecoupledFrames:
         workshop = self._workshop
         if workshop.run.done(result_unit(workshop, frame)):
             return
-        shot = next(shot for shot in workshop.job.path.shots() if frame in shot)
-        span = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
+        original = workshop.job.path.original(frame)
+        made, view = self._made.made(original, lambda: self._averaged(original))
+        if frame != original:
+            made, view = replace(made, source=np.full_like(made.source, Source.REUSED)), workshop.views[frame]
+        write_frame_result(workshop, frame, view, made)
+
+    def _averaged(self, frame: int) -> tuple[Frame, View]:
+        """A frame with what its surfaces scatter, averaged over the views around it; and its view."""
+        workshop, path = self._workshop, self._workshop.job.path
+        shot = next(shot for shot in path.shots() if frame in shot)
+        span = around(path, shot, frame, REACH)
         parts = {f: self._kept.made(f, lambda f=f: self._read(f)) for f in span}  # type: ignore[misc]
         here = parts[frame]
         others = [f for f in span if f != frame]
-        shares = [1.0 - abs(f - frame) / (REACH + 1) for f in others]
+        shares = [1.0 - abs(path.place(f) - path.place(frame)) / (REACH + 1) for f in others]
         color = here.seen
         if np.any(here.source == Source.SPECULAR):
             with workshop.costs.of("over time"):
-                around = [parts[f].scattered for f in others]
-                color = color + over_time(here.shown, here.scattered, around, shares)
-        made = Frame(color, here.source)
-        write_frame_result(workshop, frame, here.view, made)
+                pages = [parts[f].scattered for f in others]
+                color = color + over_time(here.shown, here.scattered, pages, shares)
+        # What a lobe is sampled as may be negative; what arrives is not.
+        return Frame(np.maximum(color, 0.0), here.source), here.view
 
     def _shaded(self, table: LightTable, frame: int) -> _Parts:
         workshop = self._workshop

@@ -46,9 +46,10 @@ class Drafts:
         self._workshop = workshop
         self._shader = shader
         self._keyframes = keyframes
-        self._traced: Kept[LightPage] = Kept(2 * POOL + 1)
-        self._opened: Kept[Page] = Kept(2 * POOL + 1)
-        self._pooled: Kept[Page] = Kept(PAGES)
+        # More than one frame asks for, so that going along the path makes each once.
+        self._traced: Kept[LightPage] = Kept(2 * POOL + 1 + PAGES)
+        self._opened: Kept[Page] = Kept(2 * POOL + 1 + PAGES)
+        self._pooled: Kept[Page] = Kept(PAGES + 2)
         self._estimates: Kept[Estimates] = Kept(SCOUTS)
         self._cells: tuple[list[int], Cells | None] = ([], None)
 
@@ -70,6 +71,15 @@ class Drafts:
     def trace(self, frame: int) -> LightPage:
         """The draft of a keyframe."""
         return self._traced.made(frame, lambda: self._read_or_trace(frame))
+
+    def lit_pixels(self, frame: int) -> int:
+        """Pixels of the draft of a keyframe that show light."""
+        unit = f"draft {self._workshop.number(frame)}"
+        line = self._workshop.run.done(unit)
+        if line is None:
+            self.trace(frame)
+            line = self._workshop.run.done(unit)
+        return int(line["rays"]["drafts"]) if line else 0
 
     def _pages(self, frame: int) -> LightCache:
         near = nearest(self._workshop.job.path, self._keyframes, frame, PAGES)

@@ -8,8 +8,6 @@ from typing import TypeVar
 
 from enfilade.records import CameraPath
 
-__all__ = ["Kept", "nearest"]
-
 T = TypeVar("T")
 
 
@@ -41,6 +39,12 @@ def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list
     """The so many of some frames of a path that are nearest to one, nearest first; rests take no way."""
     here = path.place(frame)
     return sorted(frames, key=lambda k: (abs(path.place(k) - here), k))[:count]
+
+
+def around(path: CameraPath, shot: range, frame: int, reach: int) -> list[int]:
+    """Frames of a shot that show a view of their own: that of a frame, and so many to each side."""
+    first, here, last = (path.place(f) for f in (shot.start, frame, shot.stop - 1))
+    return list(path.originals[max(here - reach, first) : min(here + reach, last) + 1])
 
 
 def either_side(fills: list[int], frame: int) -> list[int]:

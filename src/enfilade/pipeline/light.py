@@ -28,10 +28,10 @@ from enfilade.pixels.lookup import Page
 from enfilade.records import F32, Geometry, LightPage, Mask, Segment, Shading
 from enfilade.renderer import PixelFilter, Purpose
 
-REACH = 2.0  # of the keyframes' spacing: how far along the path a keyframe counts
-LEAST_SHARE = 1e-3  # of a keyframe farther away: it counts where no other knows the surface
+LEAST_SHARE = 1e-3  # of a page: it counts where no other knows the surface
 POOL = 4  # keyframes to each side with which a page is pooled
 LEAST_HOLES = 5e-3  # of a frame's pixels: fewer are left to the frames themselves
+LEAST_LIT = 0.5  # of the pixels with light in the keyframe that has most: the pilot takes none with fewer
 PILOT_PATHS = 4  # of each of the two estimates that tell how many paths are needed
 PATHS = 4, 256  # fewest and most paths of a keyframe's pixel that the quality may ask for
 FILLS = 2  # pages that fill holes in which a frame looks: the one before and the one after it
@@ -87,17 +87,32 @@ class LightTable:
 
         Pages are weighted so that none comes or goes abruptly.
         """
-        settings = self._workshop.job.settings.light
-        frames = [*nearest(self._path, self.keyframes, frame, settings.keyframes)]
-        frames += either_side(self._fills_at(frame), frame)
-        pages = [self._page(f) for f in frames]
-        reach, here = REACH * self._spacing, self._path.place(frame)
-        shares = [max(1.0 - abs(self._path.place(f) - here) / reach, LEAST_SHARE) for f in frames]
+        count = self._workshop.job.settings.light.keyframes
+        shared = self._shares(frame) | self._fill_shares(frame)
+        pages, shares = [self._page(f) for f in shared], list(shared.values())
         view = seen_from(self._workshop.views[frame].geometry, pages, shares)
         # Always as many pages, so that the kernels which look them up are recorded once.
-        missing = settings.keyframes + FILLS - len(pages)
+        missing = count + FILLS - len(pages)
         pages, shares = [*pages, *[pages[0]] * missing], [*shares, *[0.0] * missing]
         return open_cache([view], [1.0]), open_cache(pages, shares, self.drafts.cells(frame))
+
+    def _shares(self, frame: int) -> dict[int, float]:
+        """The keyframes nearest to a frame, and how much each counts: none where another takes its place."""
+        count = self._workshop.job.settings.light.keyframes
+        *near, beyond = nearest(self._path, self.keyframes, frame, count + 1)
+        reach = float(self._way(frame, beyond))
+        if len(near) < count:
+            near, reach = [*near, beyond], 2.0 * max(reach, 1.0)
+        return {f: max(1.0 - self._way(frame, f) / reach, LEAST_SHARE) for f in near}
+
+    def _fill_shares(self, frame: int) -> dict[int, float]:
+        """The pages that fill holes on either side of a frame; one becomes the other."""
+        pair = either_side(self._fills_at(frame), frame)
+        way = self._way(pair[0], pair[-1]) if pair else 0
+        return {f: max(1.0 - self._way(frame, f) / way, LEAST_SHARE) if way else 1.0 for f in pair}
+
+    def _way(self, one: int, other: int) -> int:
+        return abs(self._path.place(one) - self._path.place(other))
 
     def _fills_at(self, frame: int) -> list[int]:
         """Pages that fill the holes of a frame's own segment: others see other holes."""
@@ -115,11 +130,6 @@ class LightTable:
 
     def _unit(self, segment: Segment) -> str:
         return f"light {self._workshop.number(segment.first)}-{self._workshop.number(segment.last)}"
-
-    @property
-    def _spacing(self) -> float:
-        way = self._path.place(self.keyframes[-1]) - self._path.place(self.keyframes[0])
-        return max(way / max(len(self.keyframes) - 1, 1), 1.0)
 
     def _frame(self, number: int) -> int:
         return self._workshop.job.path.numbers.index(number)
@@ -208,10 +218,14 @@ class LightTable:
         settings = workshop.job.settings.light
         if settings.paths:
             return settings.paths
-        frame = self.keyframes[len(self.keyframes) // 2]
-        unit = f"pilot {workshop.number(frame)}"
+        middle = self.keyframes[len(self.keyframes) // 2]
+        unit = f"pilot {workshop.number(middle)}"
         if line := workshop.run.done(unit):
             return int(line["paths"])
+        # One that looks at the sky or into a mirror would tell nothing.
+        most = max(self.keyframes, key=self.drafts.lit_pixels)
+        is_dark = self.drafts.lit_pixels(middle) < LEAST_LIT * self.drafts.lit_pixels(most)
+        frame = most if is_dark else middle
         jnd = self._pilot_jnd(frame)
         paths = paths_for(jnd, settings.quality, len(self.keyframes))
         rays = 2 * PILOT_PATHS * int(workshop.views[frame].geometry.has_light.sum())

@@ -22,7 +22,6 @@ __all__ = ["excerpt_of", "forecast_decoupled"]
 PIXELS = 100_000  # of a rehearsed frame: a larger one is made smaller
 KEYFRAMES = ("draft", "cells", "keyframe")  # units of a keyframe
 FILL = "fill"  # the page of a frame that fills holes: in the ledger a "keyframe", too
-FRAMES = ("raw", "frame")  # ... and of a frame; that of an initial segment is "light"
 
 
 @dataclass
@@ -70,7 +69,8 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
     more = 1.0 if pilot is None else paths / pilot["paths"]
     frames, all_keyframes = len(job.path), sum(keyframes)
     times = {
-        **dict.fromkeys(FRAMES, frames),
+        "raw": len(job.path.originals),
+        "frame": frames,
         **dict.fromkeys(KEYFRAMES, all_keyframes),
         "keyframe": all_keyframes * more,
         FILL: len(segments) * len(_fills(lines)) * more,  # as many in each as in this one

@@ -8,6 +8,7 @@ from typing import Any
 
 from enfilade.executors import Unit
 from enfilade.pipeline.job import Job
+from enfilade.pipeline.kept import around
 from enfilade.pipeline.survey import Survey, initial_segments
 from enfilade.records import Segment
 from enfilade.store import Run
@@ -211,11 +212,13 @@ class Blueprint:
         for frame in shot:
             facts = {"frame": frame, "shot": index}
             raw = f"raw {self._numbers[frame]}"
-            yield Unit(raw, "shade", facts, (gate,), (FRAMES, frame, 0), f"frame {frame // BLOCK}", "shading")
-            window = range(max(frame - REACH, shot.start), min(frame + REACH + 1, shot.stop))
+            order, group = (FRAMES, frame, 0), f"frame {frame // BLOCK}"
+            if self._job.path.original(frame) == frame:
+                yield Unit(raw, "shade", facts, (gate,), order, group, "shading")
+            window = around(self._job.path, shot, frame, REACH)
             needs = tuple(f"raw {self._numbers[f]}" for f in window)
             unit = self._frame(frame, "decoupled", stage="frames", needs=needs, facts={"shot": index})
-            yield replace(unit, order=(FRAMES, window[-1], 1))
+            yield replace(unit, order=(FRAMES, max(window[-1], frame), 1))
 
     def _light_at(self, frame: int, shot: int, kind: str, stage: int) -> Unit:
         facts, group = {"frame": frame, "shot": shot}, f"{kind} {frame // BLOCK}"

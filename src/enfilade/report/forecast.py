@@ -87,16 +87,25 @@ class _Work:
         for line in lines:
             self._units.setdefault(line["unit"].partition(" ")[0], []).append(line)
 
+    @property
+    def _raws(self) -> int:
+        """Frames before the last step: `decoupled` shades a view at which the camera rests once."""
+        if self._method != "decoupled":
+            return len(self._numbers)
+        return next(
+            (line["views"] for line in self._units.get("survey", []) if "views" in line), len(self._numbers)
+        )
+
     def steps(self) -> list[Step]:
         count = len(self._numbers)
         totals: dict[str, tuple[str, int | None]] = {"survey": ("path surveyed", 1)}
         if self._method == "paper":
             totals |= {"keyframe": ("keyframes", None), "segment": ("segments judged", None)}
-            totals |= {"raw": ("frames before antialiasing", count)}
+            totals |= {"raw": ("frames before antialiasing", self._raws)}
         if self._method == "decoupled":
             totals |= {"draft": ("drafts of keyframes", None), "cells": ("cells beside the drafts", None)}
             totals |= {"pilot": ("pilots", None), "keyframe": ("keyframes", None)}
-            totals |= {"light": ("segments lit", None), "raw": ("frames shaded", count)}
+            totals |= {"light": ("segments lit", None), "raw": ("frames shaded", self._raws)}
         last = {"frame": ("frames", count), "clip": ("clips of the video", None), "video": ("video", 1)}
         extra = {name: (name, None) for name in self._units if name not in totals and name not in last}
         ordered = [*totals.items(), *extra.items(), *last.items()]
@@ -145,7 +154,7 @@ class _Work:
         return sum(_wall(line) for line in self._units.get(kind, []))
 
     def _left_of(self, kind: str) -> float | None:
-        left = len(self._numbers) - self._done(kind)
+        left = (self._raws if kind == "raw" else len(self._numbers)) - self._done(kind)
         if left <= 0:
             return 0.0
         recent = [_wall(line) for line in self._units.get(kind, []) if not _is_given(line)][-RECENT:]

@@ -9,7 +9,8 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool
-from enfilade.backends.mitsuba3.lobes import LEAST_ALBEDO, Lobes
+from enfilade.backends.mitsuba3.lobes import Lobes
+from enfilade.records import LEAST_ALBEDO
 from enfilade.renderer import Bounce, Lit, Rays, Scattered
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
@@ -98,7 +99,9 @@ class Light:
         seen = lit.native
         material = seen.bsdf()
         wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng, choice)
-        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, lit.has_lobe)
+        # Mirrors and clear glass send nothing from a point on a light: its shadow ray is spared.
+        is_spread = lit.has_lobe & self._lobes.has_spread_rest(seen, material)
+        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, is_spread)
         ray = seen.spawn_ray(seen.to_world(wo))
         return Scattered(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),

@@ -19,7 +19,6 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
-LEAST_ALBEDO = 1e-4  # below it the diffuse lobe counts as none
 
 
 class Lobes:
@@ -53,6 +52,11 @@ class Lobes:
         """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
         number: Any = dr.reinterpret_array(UInt, material)
         return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
+
+    def has_spread_rest(self, seen: Any, material: Any) -> Any:
+        """Whether what these hits have beyond the diffuse lobe is more than lobes of one direction each."""
+        is_glossy = has_lobe(material.flags(), "GlossyReflection", "GlossyTransmission")
+        return is_glossy | self.is_undivided(seen, material)
 
     def albedo(self, seen: Any, material: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1: what light is multiplied with, and what the rest is without."""
