@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis.extra.numpy import arrays
 
 from enfilade.camera import Camera, look_at
-from enfilade.masks import slow_pixels, sources, specular_pixels, unseen_items
+from enfilade.masks import lamp_pixels, slow_pixels, sources, specular_pixels, unseen_items
 from enfilade.records import Geometry, Source, SurfaceClass
+from enfilade.renderer import Lamps
 from enfilade.settings import MaskSettings
 
 H, W = 20, 30
@@ -172,3 +173,35 @@ def test_tiny_regions(size):
     item = np.ones((H, W), int)
     item[4, 4 : 4 + size] = 2
     assert seen(differences((4, slice(4, 4 + size), 1.5)), item) == {2}
+
+
+def lamps(pixels, depth, item):
+    """Points at the centres of pixels (x, y)."""
+    across = np.array([(x + 0.5, y + 0.5, 1.0) for x, y in pixels]).reshape(-1, 3)
+    position = CAMERA.eye + depth * (across @ CAMERA.direction_from_pixel.T)
+    return Lamps(position.astype(np.float32), np.full(len(pixels), item, np.uint32))
+
+
+def test_a_lamp_between_pixels_is_told():
+    geometry = scene(np.ones((H, W), int))  # at depth 1, and the lamp before it
+    mask = lamp_pixels(lamps([(4, 7), (4, 7), (29, 19)], 0.9, item=5), geometry)
+    assert sorted(np.argwhere(mask).tolist()) == [[7, 4], [19, 29]]
+
+
+def test_hidden_lamps_and_the_inside_of_large_ones_are_not():
+    geometry = scene(two_panes())
+    assert not lamp_pixels(lamps([(4, 7)], 1.2, item=5), geometry).any()
+    assert not lamp_pixels(lamps([(4, 7)], -0.9, item=5), geometry).any()
+    assert not lamp_pixels(lamps([(-1, 7), (4, 20), (30, 7)], 0.9, item=5), geometry).any()
+    pane = [(x, y) for x in range(3, 13) for y in range(5, 15)]
+    mask = lamp_pixels(lamps(pane, 1.0, item=2), geometry)
+    outline = np.zeros((H, W), bool)
+    outline[5:15, 3:13] = True
+    outline[6:14, 4:12] = False
+    np.testing.assert_array_equal(mask, outline)
+
+
+def test_a_lamp_before_the_sky_is_seen():
+    geometry = scene(np.zeros((H, W), int))
+    assert lamp_pixels(lamps([(4, 7)], 50.0, item=5), geometry).sum() == 1
+    assert not lamp_pixels(lamps([], 50.0, item=5), geometry).any()

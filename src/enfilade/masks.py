@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from enfilade.records import F32, U8, Geometry, Mask, Source
+from enfilade.renderer import Lamps
 from enfilade.settings import MaskSettings
 
 JUDGED_SHARE = 0.5  # of an item's pixels: with fewer judged nothing is known of the item
+HIDDEN = 1.01  # times the farthest depth around: a lamp beyond that is not seen
 GROUP = 4  # fewest connected pixels that count as a group: less is an outlier, not a feature
 EIGHT_CONNECTED = np.ones((3, 3), bool)
 
@@ -73,6 +75,37 @@ def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
     source[is_specular] = Source.SPECULAR
     source[is_slow] = Source.SLOW
     return source
+
+
+def lamp_pixels(lamps: Lamps, geometry: Geometry) -> Mask:
+    """Pixels of lamps that are small in the image, and of the outlines of larger ones, (H, W).
+
+    Parameters
+    ----------
+    lamps
+    geometry
+        Of the frame: what hides a lamp, and where all around is the same lamp.
+    """
+    import scipy.ndimage
+
+    camera = geometry.camera
+    height, width = geometry.item.shape
+    x, y, depth = camera.pixel_from_direction @ (lamps.position - camera.eye).T
+    is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
+    row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
+    depth, item = depth[is_inside], lamps.item[is_inside]
+
+    farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
+    farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
+    lowest, highest = (
+        extreme(geometry.item, 3, mode="nearest")
+        for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter)
+    )
+    is_amid = (lowest[row, column] == item) & (highest[row, column] == item)
+    is_seen = (depth < HIDDEN * farthest[row, column]) & ~is_amid
+    mask = np.zeros((height, width), bool)
+    mask[row[is_seen], column[is_seen]] = True
+    return mask
 
 
 def _is_seen(jnd: F32, region: Mask, settings: MaskSettings) -> bool:

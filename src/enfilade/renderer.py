@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.camera import Camera
-from enfilade.records import Shading
+from enfilade.records import F32, U32, Shading
 
 
 class Purpose(IntEnum):
@@ -166,6 +166,21 @@ class Scattered:
     is_alive: Any
 
 
+@dataclass(frozen=True, eq=False)
+class Lamps:
+    """Points all over the surfaces that emit.
+
+    Attributes
+    ----------
+    position : (N, 3) float32
+        In the world.
+    item : (N,) uint32
+    """
+
+    position: F32
+    item: U32
+
+
 @dataclass(frozen=True)
 class SceneFacts:
     """What a scene says about itself.
@@ -250,6 +265,11 @@ class LightRenderer(Renderer, Protocol):
     @property
     def state(self) -> Any:
         """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
+        ...
+
+    @property
+    def lamps(self) -> Lamps:
+        """Where light comes from; few camera rays would miss what is small in the image."""
         ...
 
     def lit(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from enfilade.camera import Camera, look_at
 from enfilade.codec import read_exr
 from enfilade.errors import SettingsError
 from enfilade.monitor import Silence
@@ -16,7 +17,7 @@ from enfilade.pipeline.rehearsal import excerpt_of
 from enfilade.pipeline.share import Share, do_share, go_on
 from enfilade.pipeline.units import STEPS
 from enfilade.pipeline.walkthrough import prepare, render
-from enfilade.records import Segment
+from enfilade.records import CameraPath, Segment
 from enfilade.scenes import write_scene
 from enfilade.settings import Settings
 from enfilade.store import Run
@@ -153,6 +154,28 @@ def test_a_camera_that_comes_to_rest(decoupled, tmp_path, views):
     ]
     assert len(shaded) == len(set(views))
     assert plan(replace(job, path=path), Silence()).forecast["seconds"] > 0.0
+
+
+def test_lamps_smaller_than_a_pixel_keep_their_light(tmp_path):
+    """Four camera rays miss most of them."""
+    pixel = 2.0 * 4.0 * np.tan(np.radians(20.0)) / 48
+    side, places = 0.3, [(x, y) for x in np.linspace(-1.3, 1.3, 7) for y in np.linspace(-1.0, 1.0, 5)]
+    shape = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="{}"/><translate {}/></transform>'
+    )
+    glow = '<emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>'
+    black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
+    lamps = [shape.format(0.5 * side * pixel, f'x="{x}" y="{y}"') + glow.format(100) for x, y in places]
+    wall_behind = shape.format(9, 'z="-0.01"') + black + glow.format(0.5)
+    inside = "".join(['<integrator type="path"/>', wall_behind, *lamps])
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{inside}</scene>')
+    eyes = [(0.013 * k, 0.007 * k, 4.0) for k in range(3)]
+    cameras = tuple(Camera(look_at(eye, (*eye[:2], 0.0)), 40, 64, 48) for eye in eyes)
+    job = Job(tmp_path / "scene.xml", CameraPath(cameras, (1, 2, 3), 24.0), Settings(), "decoupled")
+    render(job, tmp_path / "run", Silence())
+    frames = [read_exr(file)["RGB"].astype(float) for file in sorted((tmp_path / "run/frames").iterdir())]
+    found = (np.mean(frames, axis=(0, 3)) - 0.5).sum()
+    assert found == pytest.approx(len(places) * 99.5 * side**2, rel=0.12)
 
 
 def test_shares_of_every_step_make_the_same_run(decoupled, tmp_path):

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from enfilade.codec import read_parts, write_parts
 from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
+from enfilade.masks import lamp_pixels
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept, around
 from enfilade.pipeline.light import LightTable
@@ -151,7 +152,10 @@ def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, c
     if most > least:
         shading = seen.shading
         is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * quality * _luminance(shading)
-        seen.add(most - least, _grown(is_edge.reshape(path.height, path.width)).ravel())
+        is_edge = is_edge.reshape(path.height, path.width)
+        # Small lamps that the first rays miss, and dilute, would lose most of their light.
+        is_edge |= lamp_pixels(workshop.light_renderer.lamps, workshop.views[frame].geometry)
+        seen.add(most - least, _grown(is_edge).ravel())
     return seen
 
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.backends.mitsuba3.integrators import scene_integrator, shortened, why_undivided
+from enfilade.backends.mitsuba3.lamps import find_lamps
 from enfilade.backends.mitsuba3.light import Light
 from enfilade.backends.mitsuba3.lobes import has_lobe
 from enfilade.backends.scenefile import fingerprint
@@ -32,6 +34,7 @@ from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import (
     MOST_EDGES,
     Bounce,
+    Lamps,
     Lit,
     PixelFilter,
     RandomKey,
@@ -130,6 +133,11 @@ class MitsubaRenderer:
         items = self._items
         own = self._scene, self._integrator, self._onward, items.number, items.is_passable, items.materials
         return own, self._light.state
+
+    @cached_property
+    def lamps(self) -> Lamps:
+        """See :meth:`enfilade.renderer.LightRenderer.lamps`."""
+        return find_lamps(self._scene)
 
     def lit(
         self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, is_whole: bool = False
