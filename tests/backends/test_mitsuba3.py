@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f
+from enfilade.arrays import Array3f, rows
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
 from enfilade.device import active
@@ -386,6 +386,7 @@ def test_the_longest_path_is_the_setting(corner):
 
 
 HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
+SPOT = '<emitter type="spot"/>'
 FOG = '<medium type="homogeneous" name="interior"/>'
 
 
@@ -409,11 +410,27 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         (HIDDEN.format("path"), DIFFUSE, "hides"),
         ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "media"),
         ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
+        ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
+        (f'<integrator type="volpath"/>{SPOT}', DIFFUSE, ""),
+        (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', "through masks and panes"),
+        (f'<integrator type="path"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
     ],
 )  # fmt: skip
 def test_what_has_no_light_of_its_own_says_why(tmp_path, integrator, inside, words):
     why = opened(of_integrator(tmp_path, integrator, inside)).why_no_light
     assert (words in why) if words else (why == "")
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.6])
+def test_a_mask_is_as_diffuse_as_it_is_opaque(tmp_path, opacity):
+    """A leaf has no rest that would be sampled for nothing, but where light passes it."""
+    renderer = opened(of_integrator(tmp_path, "", f'<bsdf type="twosided">{DIFFUSE}</bsdf>'))
+    leaf = opened(of_integrator(tmp_path, "", veil(opacity)))
+    rays = Rays(Array3f(0, 0, 6), Array3f(0, 0, -1))
+    whole, lit = renderer.lit(rays), leaf.lit(rays)
+    np.testing.assert_allclose(rows(lit.surfaces.albedo), opacity * rows(whole.surfaces.albedo), rtol=1e-5)
+    assert not whole.has_lobe[0]
+    assert lit.has_lobe[0] == (opacity < 1.0)
 
 
 def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):

@@ -15,6 +15,7 @@ PATHS = {  # Mitsuba's classes that follow paths from the camera to their end; t
     "VolumetricPathIntegrator": "volpath",
     "VolpathMisIntegratorImpl": "volpathmis",
 }
+POINTLIKE = (mi.EmitterFlags.DeltaPosition, mi.EmitterFlags.DeltaDirection)  # no ray meets such a light
 UNLIMITED = 2**31  # edges of a path; Mitsuba says so of -1
 
 
@@ -62,9 +63,16 @@ def why_undivided(scene: Any, integrator: Any) -> str:
     longest, _ = _limits(integrator)
     if longest < MOST_EDGES:
         return f"its paths end after {longest} edges, fewer than {MOST_EDGES}"
-    sees_media = PATHS[integrator.class_name()] != "path"
-    if sees_media and any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
+    plugin = PATHS[integrator.class_name()]
+    if plugin == "path":
+        return ""
+    nodes = mi.traverse(scene).hierarchy
+    if any(isinstance(node, mi.Medium) for node in nodes):
         return "there are media in it"
+    if any(isinstance(n, mi.BSDF) and mi.has_flag(n.flags(), mi.BSDFFlags.Null) for n in nodes) and any(
+        mi.has_flag(lamp.flags(), flag) for lamp in scene.emitters() for flag in POINTLIKE
+    ):
+        return f"its integrator, {plugin}, sees point and distant lights through masks and panes"
     return ""
 
 

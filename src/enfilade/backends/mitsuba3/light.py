@@ -54,10 +54,7 @@ class Light:
 
     def has_rest(self, seen: Any) -> Any:
         """Whether a hit's material is more than a diffuse lobe."""
-        material = seen.bsdf()
-        flags = material.flags()
-        beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
-        return seen.is_valid() & (((flags & beyond) != 0) | self._lobes.is_undivided(seen, material))
+        return self._lobes.has_rest(seen, seen.bsdf())
 
     def light(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LightRenderer.light`."""

@@ -4,8 +4,8 @@ Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when a
 that component sends straight ahead: a coat that lets less light out the more obliquely it is seen is part of
 it, so that the light by the albedo is the same whoever looks. Some BSDFs do not divide themselves
 (``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
-diffuse lobe is Lambert's with their own albedo, and the rest is what the whole BSDF has beyond it, which may
-be negative.
+diffuse lobe is Lambert's with their own albedo, as far as they are opaque, and the rest is what the whole
+BSDF has beyond it, which may be negative; a mask over a Lambert lobe has none where it is opaque.
 """
 
 from __future__ import annotations
@@ -19,6 +19,9 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
+
+
+LAMBERT = ("MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse")  # of them a material has Lambert's lobe, and holes
 
 
 class Lobes:
@@ -38,20 +41,32 @@ class Lobes:
         materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
         numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
         registry = [int(number[0]) for number in numbers]
-        is_undivided = np.zeros(max(registry, default=0) + 1, bool)
-        is_undivided[registry] = [_has_undivided(material) for material in materials]
-        self._is_undivided = Bool(is_undivided)
+        is_undivided, is_lambert = np.zeros((2, max(registry, default=0) + 1), bool)
+        is_undivided[registry] = [not names.isdisjoint(UNDIVIDED) for names in map(_classes, materials)]
+        is_lambert[registry] = [names.issubset(LAMBERT) for names in map(_classes, materials)]
+        self._is_undivided, self._is_lambert = Bool(is_undivided), Bool(is_lambert)
         self._has_undivided = bool(is_undivided.any())
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._is_undivided
+        return self._is_undivided, self._is_lambert
 
     def is_undivided(self, seen: Any, material: Any) -> Any:
         """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
         number: Any = dr.reinterpret_array(UInt, material)
         return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
+
+    def has_rest(self, seen: Any, material: Any) -> Any:
+        """Whether these hits have more than a diffuse lobe."""
+        beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
+        has_rest = seen.is_valid() & ((material.flags() & beyond) != 0)
+        if not self._has_undivided:
+            return has_rest
+        number: Any = dr.reinterpret_array(UInt, material)
+        is_lambert = dr.gather(Bool, self._is_lambert, number, seen.is_valid())
+        is_whole = is_lambert & (self._opacity(seen, material, has_rest & is_lambert) >= 1.0)
+        return (has_rest & ~is_whole) | (self.is_undivided(seen, material) & ~is_lambert)
 
     def has_spread_rest(self, seen: Any, material: Any) -> Any:
         """Whether what these hits have beyond the diffuse lobe is more than lobes of one direction each."""
@@ -65,7 +80,9 @@ class Lobes:
         ahead = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), seen.wi.z))
         albedo = dr.pi * material.eval(self._diffuse, seen, ahead, is_diffuse & ~undivided)
         if self._has_undivided:
-            own = material.eval_diffuse_reflectance(seen, is_diffuse & undivided)
+            undivided &= is_diffuse
+            own = material.eval_diffuse_reflectance(seen, undivided)
+            own *= self._opacity(seen, material, undivided)
             albedo = dr.select(undivided, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
@@ -124,6 +141,10 @@ class Lobes:
         wo, pdf = dr.select(undivided, mixed_wo, own.wo), dr.select(undivided, mixed_pdf, own.pdf)
         return wo, pdf, dr.select(undivided, beyond, weight), is_delta
 
+    def _opacity(self, seen: Any, material: Any, active: Any) -> Any:
+        """What part of a surface is there: 1 - what it lets through unseen."""
+        return 1.0 - dr.mean(material.eval_null_transmission(seen, active))
+
     def _beyond(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """What a whole BSDF has beyond Lambert's lobe, and the mean density of sampling the two."""
         whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active)
@@ -136,10 +157,9 @@ class Lobes:
         return self.albedo(seen, material, active) * pdf, pdf
 
 
-def _has_undivided(material: Any) -> bool:
-    """Whether a material, or one nested in it, does not divide itself."""
-    nodes = mi.traverse(material).hierarchy
-    return any(isinstance(n, mi.BSDF) and n.class_name() in UNDIVIDED for n in nodes)
+def _classes(material: Any) -> set[str]:
+    """Mitsuba's classes of a material, and of those nested in it."""
+    return {n.class_name() for n in mi.traverse(material).hierarchy if isinstance(n, mi.BSDF)}
 
 
 def has_lobe(flags: Any, *lobes: str) -> Any:
