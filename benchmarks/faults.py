@@ -4,6 +4,7 @@
 
 kills      SIGKILL for a whole command or one of its workers, at random moments, or in the middle of write,
            fsync and rename; then resumed to the end
+stops      SIGSTOP for a worker at random moments: it hangs, is ended, and another does its unit
 executors  1, 2 and 7 workers, in process, worker processes and Ray
 cluster    Ray, with workers killed while it works
 disk       a disk that fills up at random points, then gets room; needs root, for a small tmpfs
@@ -30,13 +31,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 FRAMES, SIZE = 48, "32x24"
-KINDS = ("kills", "executors", "cluster", "disk", "bits", "mitsuba")
-COUNTS = {"kills": 200, "disk": 50, "bits": 50, "mitsuba": 10}
-QUICK = {"kills": 5, "disk": 5, "bits": 5, "mitsuba": 1}
+KINDS = ("kills", "stops", "executors", "cluster", "disk", "bits", "mitsuba")
+COUNTS = {"kills": 200, "stops": 10, "disk": 50, "bits": 50, "mitsuba": 10}
+QUICK = {"kills": 5, "stops": 2, "disk": 5, "bits": 5, "mitsuba": 1}
 CLUSTER_KILLS, QUICK_CLUSTER_KILLS = 10, 5
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
 STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
 TIMEOUT_S = 1800  # a busy machine is no failure
+STOPPED_MIN = 0.05  # after which a worker that does nothing is ended
 
 
 @dataclass
@@ -105,6 +107,7 @@ def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
     print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
     tries: dict[str, Callable[[], None]] = {
         "kills": lambda: try_kills(work, folder, chance, counts["kills"], tally, "kills"),
+        "stops": lambda: try_stops(work, folder, chance, counts["stops"], tally),
         "executors": lambda: try_executors(work, folder, arguments.quick, tally),
         "cluster": lambda: try_cluster(folder, arguments.quick, tally),
         "disk": lambda: try_disk(work, folder, chance, counts["disk"], tally),
@@ -273,14 +276,34 @@ def kill_all(work: Work, out: Path, chance: random.Random) -> str | None:
 
 def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
     """One worker is killed at a random moment; the command must go on by itself."""
+    return strike_worker(work, out, chance, signal.SIGKILL)
+
+
+def strike_worker(
+    work: Work, out: Path, chance: random.Random, blow: signal.Signals, who: str = "processes"
+) -> str | None:
+    """One worker gets a signal at a random moment; None where there was no worker."""
     moment = chance.uniform(0.3, 1.0) * work.seconds
-    process = start(command(work.inputs, out, "--executor", "processes", "--workers", "2"))
+    process = start(command(work.inputs, out, "--executor", who, "--workers", "2"))
     time.sleep(moment)
     workers = [pid for pid in children(process.pid) if b"enfilade.executors.child" in cmdline(pid)]
     if workers:
-        kill(chance.choice(workers))
+        kill(chance.choice(workers), blow)
     code = process.wait(TIMEOUT_S)
-    return f"a worker killed after {moment:.2f} s, exit code {code}" if workers else None
+    return f"{blow.name} for a worker after {moment:.2f} s, exit code {code}" if workers else None
+
+
+def try_stops(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+    """Stop a worker, so that it hangs; the command must end it and go on by itself."""
+    for _ in range(count):
+        with scratch(folder) as out:
+            what = None
+            while what is None:  # it came too early or too late
+                shutil.rmtree(out, ignore_errors=True)
+                what = strike_worker(work, out, chance, signal.SIGSTOP, f"processes,idle={STOPPED_MIN}")
+            is_done = what.endswith("exit code 0")
+            problem = attempt(lambda: None, work, out, what) if is_done else what
+            tally.note("stops", problem)
 
 
 def start(line: list[str]) -> subprocess.Popen[bytes]:
@@ -298,10 +321,10 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def kill(pid: int) -> None:
-    """Kill a process that may have ended."""
+def kill(pid: int, blow: signal.Signals = signal.SIGKILL) -> None:
+    """Kill a process that may have ended, or send it another signal."""
     try:
-        os.kill(pid, signal.SIGKILL)
+        os.kill(pid, blow)
     except ProcessLookupError:
         return
 

@@ -135,7 +135,9 @@ def test_what_was_done_before_took_none_of_the_time(tmp_path, monkeypatch):
 
 def test_the_lock_says_how_many_work(tmp_path, monkeypatch):
     signed = []
-    monkeypatch.setattr(crew, "sign_workers", lambda folder, workers: signed.append((folder.name, workers)))
+    monkeypatch.setattr(
+        crew, "sign_workers", lambda folder, workers, _part: signed.append((folder.name, workers))
+    )
     traced_lines(tmp_path, monkeypatch, done=18)
     assert signed == [("run", 1)]
 

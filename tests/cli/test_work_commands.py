@@ -6,7 +6,9 @@ import pytest
 
 import scenes_analytic
 from enfilade.backends.analytic_scene import scene_text
+from enfilade.errors import EnfiladeError
 from enfilade.pipeline.crew import Crew
+from enfilade.store.lock import Lock
 
 PAPER = ("--method", "paper")
 
@@ -36,8 +38,12 @@ def begun(run, camera_path, tmp_path):
     return line
 
 
-def test_prepared_and_worked_on(run, begun, tmp_path):
+def test_prepared_and_worked_on(run, begun, tmp_path, monkeypatch):
+    monkeypatch.setattr("enfilade.pipeline.share.PATIENCE_S", 0.1)
     out = tmp_path / "run"
+    held = Lock(out)
+    assert run("work", out, "--quiet").exit_code == 2  # nobody has shared it
+    held.release()
     early = run("work", out, "--step", "keyframes", "--quiet")
     assert early.exit_code == 1
     assert "--step plan" in early.stderr
@@ -45,7 +51,15 @@ def test_prepared_and_worked_on(run, begun, tmp_path):
     assert plan.exit_code == 0, plan.output
     assert plan.stdout.splitlines()[0] == "openjd_status: plan"
     assert plan.stdout.splitlines()[-1] == "openjd_progress: 100.0"
-    assert run("work", out, "--step", "frames", "--quiet").exit_code == 1
+    early = run("work", out, "--step", "frames", "--openjd")
+    assert early.exit_code == 1
+    assert early.stdout.startswith("waiting up to 0 s: 3 units of step 'frames' wait for ")
+    held = Lock(out)
+    for line in (("--step", "keyframes"), ()):
+        late = run("work", out, *line, "--quiet")
+        assert late.exit_code == 1
+        assert "another command is writing" in late.stderr
+    held.release()
     rest = run("work", out, "--quiet")
     assert rest.exit_code == 0, rest.output
     video, plot = out / "video.mp4", out / "plots" / "walkthrough.png"
@@ -106,7 +120,8 @@ def test_a_farm_gets_a_template(run, begun, tmp_path):
     assert result.stdout == f"template {file}\n"
     steps = json.loads(file.read_text())["steps"]
     assert steps[2]["script"]["actions"]["onRun"]["args"] == [
-        "work", "{{Param.Run}}", "--openjd", "--step", "segments",
+        "work", "{{Param.Run}}", "--openjd", "--executor", "processes", "--workers", "1",
+        "--step", "segments",
         "--chunk", "{{Task.Param.Chunk}}", "--of", "2",
     ]  # fmt: skip
 
@@ -120,6 +135,21 @@ def test_what_is_no_run_is_refused(run, tmp_path, command):
     result = run(command, tmp_path / "nope")
     assert result.exit_code == 2
     assert "there is no such folder; begin one with `enfilade render" in result.stderr
+
+
+def test_jobs_that_slurm_took_are_printed_one_by_one(run, begun, tmp_path, monkeypatch):
+    asked = []
+
+    def submit(folder, cluster, chunks, options, tell):
+        asked.append((folder, cluster, chunks, options))
+        tell("plan       job 7, 1 task")
+        raise EnfiladeError("step 'keyframes' could not be submitted")
+
+    monkeypatch.setattr("enfilade.pipeline.farm.submit", submit)
+    line = ("--submit", "slurm", "--slurm", "cpus_per_task=16", "--slurm", "slurm_partition=cpu")
+    result = run("farm", tmp_path / "run", *line)
+    assert asked == [(tmp_path / "run", "slurm", None, {"cpus_per_task": 16, "slurm_partition": "cpu"})]
+    assert (result.exit_code, result.stdout) == (1, "plan       job 7, 1 task\n")
 
 
 def test_farm_options_are_pairs(run, begun, tmp_path):

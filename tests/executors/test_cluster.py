@@ -55,21 +55,45 @@ def test_without_ray_it_says_how_to_get_it(tmp_path, monkeypatch):
         open_executor("ray", Recipe(""), lambda *_: None, workers=1, logs=tmp_path)
 
 
-def test_what_travels_to_a_cluster_is_json():
-    cluster.KEPT.clear()
-    recipe = json.dumps({"target": "toy_worker:open_toy", "spec": {"folder": "/nowhere", "refuses": True}})
-    order = json.dumps({"kind": "fine", "facts": {"name": "a"}, "share": 1})
-    [[what, value]] = json.loads(cluster.do_unit(recipe, order))
+@pytest.fixture
+def in_ray(tmp_path, toys):
+    """Do a unit as a Ray worker does; returns its reports."""
+
+    def do(kind, *, limits=None, spec=None, **facts):
+        recipe = dataclasses.asdict(toys(**(spec or {})))
+        terms = {"recipe": recipe, "logs": str(tmp_path / "logs"), "limits": limits or {}}
+        order = {"name": "a", "kind": kind, "facts": {"name": "a", **facts}, "share": 1}
+        return json.loads(cluster.do_unit(json.dumps(terms), json.dumps(order)))
+
+    yield do
+    cluster._let_go()
+
+
+def test_what_travels_to_a_cluster_is_json(in_ray):
+    [[what, value]] = in_ray("fine", spec={"refuses": True})
     assert (what, value["type"], value["message"]) == ("failed", "SettingsError", "no such scene")
 
 
-def test_what_another_try_may_mend_is_for_the_supervisor(tmp_path):
-    recipe = json.dumps({"target": "toy_worker:open_toy", "spec": {"folder": str(tmp_path)}})
-    order = json.dumps({"kind": "raises", "facts": {"name": "a", "times": 1}, "share": 1})
-    [[what, value]] = json.loads(cluster.do_unit(recipe, order))
+def test_what_another_try_may_mend_is_for_the_supervisor(in_ray):
+    [[what, value]] = in_ray("raises", times=1)
     assert (what, value["kind"], value["text"]) == ("failed", "error", "ZeroDivisionError: by nought")
     assert "Traceback" in value["log"]
-    assert json.loads(cluster.do_unit(recipe, order)) == [["line", {"unit": "a"}]]
+    assert in_ray("raises", times=1) == [["line", {"unit": "a"}]]
+
+
+def test_a_worker_that_hangs_on_a_node_is_ended_there(in_ray):
+    [[what, value]] = in_ray("stops", limits={"idle_s": 0.8}, times=1)
+    assert (what, value["kind"]) == ("failed", "died")
+    assert value["text"].endswith("(it is stopped) and was ended")
+    assert in_ray("stops", times=1) == [["line", {"unit": "a"}]]
+
+
+def test_a_ray_worker_keeps_its_scene_and_takes_the_gpu_it_is_given(in_ray, tmp_path, monkeypatch):
+    for gpu in "001":
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", gpu)
+        in_ray("fine")
+    pids = (tmp_path / "a.tries").read_text().split()[1::2]
+    assert pids[0] == pids[1] != pids[2]
 
 
 class RayError(Exception):
@@ -85,24 +109,29 @@ class Ray:
 
     exceptions = SimpleNamespace(RayError=RayError, OutOfMemoryError=OutOfMemoryError)
 
-    def __init__(self, *lost):
-        self.lost, self.options = list(lost), {}
+    def __init__(self, *lost, nodes=({"CPU": 1.0},)):
+        self.lost, self.options, self.begun = list(lost), {}, {}
+        self.is_deaf, self.cancelled = False, []
+        self._nodes = [{"Alive": True, "Resources": node} for node in nodes]
 
-    def init(self, **_where):
-        pass
+    def init(self, **how):
+        self.begun = how
 
     def shutdown(self):
         pass
 
-    def cluster_resources(self):
-        return {"CPU": 1}
+    def nodes(self):
+        return [*self._nodes, {"Alive": False, "Resources": {"CPU": 64.0, "GPU": 8.0}}]
 
     def remote(self, **options):
         self.options = options
         return lambda do: SimpleNamespace(remote=lambda *given: (do, given))
 
     def wait(self, references, **_how):
-        return references[:1], references[1:]
+        return ([], references) if self.is_deaf else (references[:1], references[1:])
+
+    def cancel(self, reference, **_how):
+        self.cancelled.append(reference)
 
     def get(self, reference):
         if self.lost:
@@ -111,14 +140,76 @@ class Ray:
         return do(*given)
 
 
-def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tmp_path, monkeypatch):
+@pytest.fixture
+def joined(tmp_path, monkeypatch):
+    """Join a cluster that has what it is said to have."""
+
+    def join(*nodes, name="ray:head", workers=None, **spec):
+        ray = Ray(nodes=nodes)
+        monkeypatch.setitem(sys.modules, "ray", ray)
+        recipe = Recipe("", spec)
+        return ray, open_executor(name, recipe, lambda *_: None, workers=workers, logs=tmp_path)
+
+    return join
+
+
+NODE, BIG = {"CPU": 8.0, "GPU": 2.0}, {"CPU": 16.0}
+
+
+@pytest.mark.parametrize(
+    ("workers", "spec", "slots", "cpus", "gpus"),
+    [
+        (None, {"threads": 1}, 24, 1, 0),
+        (None, {"threads": 4}, 6, 4, 0),
+        (None, {"threads": 5}, 4, 5, 0),  # one fits on the one node, three on the other
+        (3, {"threads": 64}, 3, 16, 0),  # Ray would wait for ever for a node of 64
+        (4, {"threads": 0}, 4, 6, 0),
+        (None, {"threads": 2, "device": "cuda"}, 2, 2, 1.0),
+        (4, {"threads": 1, "device": "cuda"}, 4, 1, 0.5),
+        (3, {"threads": 1, "device": "cuda"}, 3, 1, 0.5),
+        (1, {"threads": 1, "device": "cuda"}, 1, 1, 1.0),
+    ],
+)
+def test_ray_is_asked_for_what_a_unit_takes(joined, workers, spec, slots, cpus, gpus):
+    ray, executor = joined(NODE, BIG, workers=workers, **spec)
+    assert executor.slots == slots
+    assert (ray.options["num_cpus"], ray.options["num_gpus"]) == (cpus, gpus)
+    assert json.loads(executor._terms)["recipe"]["spec"]["threads"] == cpus
+
+
+def test_a_cluster_without_a_gpu_is_refused_where_one_is_needed(joined):
+    with pytest.raises(EnfiladeError, match=r"no GPU, .* add --device cpu"):
+        joined(BIG, device="cuda")
+
+
+def test_a_local_cluster_has_room_for_its_workers(joined):
+    ray, _ = joined(BIG, name="ray", workers=3, threads=2)
+    assert ray.begun["num_cpus"] == 6
+
+
+def test_a_node_that_says_nothing_is_given_up(joined, monkeypatch):
+    ray, executor = joined(BIG, name="ray:head,unit=0.001", workers=1)
+    said = []
+    executor._hear = lambda *report: said.append(report)
+    monkeypatch.setattr(cluster, "GRACE_S", 0.05)
+    monkeypatch.setattr(cluster, "TOLD_S", 0.02)
+    ray.is_deaf = True
+    executor.begin(0, Unit("a", "fine"), share=1)
+    while not (events := executor.wait(None)):
+        pass
+    assert events[0].failure.kind is FailureKind.DIED
+    assert "more than the limit for a unit" in events[0].failure.text
+    assert len(ray.cancelled) == 1
+    assert said[0][2][0].startswith("a: in Ray's hands for ")
+
+
+def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tmp_path, monkeypatch, toys):
     ray = Ray(OutOfMemoryError("killed"), RayError("its node died"))
     monkeypatch.setitem(sys.modules, "ray", ray)
     monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.0)
     graph, kinds = Graph(), []
     graph.add(Unit("a", "starves", {"name": "a", "times": 1}))
-    recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path)})
-    with closing(open_executor("ray", recipe, lambda *_: None, workers=1, logs=tmp_path)) as executor:
+    with closing(open_executor("ray", toys(), lambda *_: None, workers=1, logs=tmp_path)) as executor:
         ending = supervise(
             graph,
             executor,
@@ -126,6 +217,7 @@ def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tm
             is_done=lambda _: (tmp_path / "a").exists(),
             failed=lambda _, failures: kinds.append(failures[-1].kind),
         )
+    cluster._let_go()
     assert ray.options["max_retries"] == 0
     assert "retry_exceptions" not in ray.options
     assert not ending.aside

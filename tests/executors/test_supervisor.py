@@ -13,54 +13,17 @@ from types import SimpleNamespace
 import pytest
 
 from enfilade.errors import EnfiladeError, NoSpaceError, SettingsError
-from enfilade.executors import ATTEMPTS, FailureKind, Graph, Recipe, Unit, open_executor, supervise
+from enfilade.executors import ATTEMPTS, FailureKind, Graph, Recipe, open_executor, supervise
 from enfilade.executors.inprocess import InProcess
 from enfilade.executors.processes import Processes
+from toy_worker import nothing, unit
 
 TESTS = Path(__file__).parents[1]
-
-
-def nothing(*reports):
-    return ()
 
 
 @pytest.fixture(params=["in-process", "processes"])
 def name(request):
     return request.param
-
-
-@pytest.fixture
-def work(tmp_path, monkeypatch):
-    """Do units with toy workers; returns the ending, who was told of what, and the folder."""
-    monkeypatch.setenv("PYTHONPATH", str(TESTS))
-    monkeypatch.setattr("enfilade.executors.supervisor.FIRST_DELAY_S", 0.01)
-
-    def do(name, units, workers=2, follow=nothing, **spec):
-        told, failures, graph = [], [], Graph()
-        for unit in units:
-            graph.add(unit)
-        recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path), **spec})
-        executor = open_executor(
-            name, recipe, lambda *r: told.append(r), workers=workers, logs=tmp_path / "logs"
-        )
-        try:
-            ending = supervise(
-                graph,
-                executor,
-                follow=follow,
-                is_done=lambda unit: (tmp_path / unit.name).exists(),
-                failed=lambda unit, own: failures.append((unit.name, own[-1].kind, len(own))),
-            )
-        finally:
-            executor.close()
-        return ending, told, failures
-
-    do.folder = tmp_path
-    return do
-
-
-def unit(name, kind="fine", needs=(), **facts):
-    return Unit(name, kind, {"name": name, **facts}, needs)
 
 
 def done(work):
@@ -87,7 +50,7 @@ def test_a_worker_that_dies_costs_its_unit_alone(work, kind):
     )
     assert not ending.aside
     assert done(work) == ["a", "b", "c", "k"]
-    assert failures == [("k", FailureKind.DIED, 1), ("k", FailureKind.DIED, 2)]
+    assert [f[:3] for f in failures] == [("k", FailureKind.DIED, 1), ("k", FailureKind.DIED, 2)]
     tries = [line.split() for line in (work.folder / "k.tries").read_text().splitlines()]
     assert [share for share, _ in tries] == ["1", "1", "4"]  # twice, and it may have been for its memory
     assert len({pid for _, pid in tries}) == 3
@@ -112,7 +75,7 @@ def test_an_error_nobody_foresaw_is_tried_again_then_set_aside(work, name):
     assert aside.name == "s"
     assert own[0].text == "ZeroDivisionError: by nought"
     assert "Traceback" in own[0].log
-    assert [f for f in failures if f[0] == "r"] == [("r", FailureKind.ERROR, 1)]
+    assert [f[:3] for f in failures if f[0] == "r"] == [("r", FailureKind.ERROR, 1)]
     assert {line.split()[0] for line in (work.folder / "r.tries").read_text().splitlines()} == {"1"}
 
 
@@ -205,9 +168,44 @@ def test_a_full_disk_without_room_for_a_log_is_said(tmp_path, monkeypatch):
 
     executor = Processes(Recipe(""), nothing, workers=1, logs=tmp_path / "logs")
     monkeypatch.setattr(Path, "mkdir", full)
-    with pytest.raises(NoSpaceError, match=r"logs/worker-0\.log: no room"):
+    with pytest.raises(NoSpaceError, match=r"logs/worker-[^/]+-0\.log: no room"):
         executor.begin(0, unit("a"), share=1)
     executor.close()
+
+
+def test_two_commands_that_share_a_folder_have_logs_of_their_own(work, tmp_path):
+    (tmp_path / "logs").mkdir()
+    other = tmp_path / "logs" / "worker-0.log"
+    other.write_text("of another command\n")
+    work("processes", [unit("k", "killed", times=1)], workers=1)
+    logs = sorted(f.name for f in (tmp_path / "logs").iterdir())
+    assert logs == ["worker-0.log"]  # what says nothing leaves nothing
+    assert other.read_text() == "of another command\n"
+    ending, _, _ = work("processes", [unit("p", "killed")], workers=1)
+    [log] = {f.name for f in (tmp_path / "logs").iterdir()} - {"worker-0.log"}
+    assert log.endswith(f"-{os.getpid()}-0.log")
+    assert "last words" in ending.aside[0][1][0].log
+
+
+def test_logs_do_not_become_more_and_more(work, tmp_path, monkeypatch):
+    monkeypatch.setattr("enfilade.executors.processes.MOST_LOGS", 3)
+    (tmp_path / "logs").mkdir()
+    for age in range(5):
+        log = tmp_path / "logs" / f"worker-host-{age}-0.log"
+        log.write_text("x")
+        os.utime(log, (1e9 - age, 1e9 - age))
+    work("processes", [unit("p", "killed")], workers=1)
+    logs = {f.name for f in (tmp_path / "logs").iterdir()}
+    assert len(logs) == 3
+    assert {"worker-host-0-0.log", "worker-host-1-0.log"} < logs
+
+
+def test_who_has_failed_is_not_asked_again(work):
+    units = [unit("r", "raises", times=1), unit("a", needs=("r",)), unit("b", needs=("a",))]
+    work("processes", units, workers=1)
+    pids = [(work.folder / f"{n}.tries").read_text().split()[1::2] for n in "rab"]
+    assert pids[0][0] != pids[0][1]  # its device or its libraries may be in disorder
+    assert pids[0][1:] == pids[1] == pids[2]
 
 
 SUPERVISOR = """

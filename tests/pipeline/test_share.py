@@ -1,25 +1,23 @@
 """Several commands share a run: each step after the one before, in any order within; the run is the same."""
 
 import dataclasses
-import json
 import subprocess
 import sys
-from contextlib import nullcontext
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from enfilade.errors import EnfiladeError, RunFolderError, SettingsError, UnfinishedError
+from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
 from enfilade.monitor import Silence
 from enfilade.pipeline.crew import Crew
-from enfilade.pipeline.farm import submit, template, write_template
+from enfilade.pipeline.farm import submit, write_template
 from enfilade.pipeline.share import Share, do_share, go_on
 from enfilade.pipeline.walkthrough import prepare, render
 from enfilade.records import CameraPath
 from enfilade.store import Run
+from enfilade.store.lock import Lock
 from scenes_analytic import room, room_walk
-from small_runs import job_of
+from small_runs import Told, job_of
 
 NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 OPENJD = Path(sys.executable).with_name("openjd")
@@ -41,14 +39,29 @@ def whole(tmp_path_factory):
     return Run.existing(folder / "run").digest()
 
 
+@pytest.fixture(autouse=True)
+def pauses(monkeypatch):
+    """Nobody waits for others, but where a test says for how long; then these are the pauses."""
+    made = []
+    monkeypatch.setattr("enfilade.pipeline.share.PATIENCE_S", 0.0)
+    monkeypatch.setattr("enfilade.pipeline.share.time.sleep", made.append)
+    return made
+
+
 @pytest.fixture
 def begun(tmp_path):
     prepare(make_job(tmp_path), tmp_path / "run")
     return tmp_path / "run"
 
 
-def share(folder, *which):
-    do_share(folder, Share(*which), Silence(), Crew())
+def share(folder, *which, crew=None, monitor=None):
+    do_share(folder, Share(*which), monitor or Silence(), crew or Crew())
+
+
+def flip(file):
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 4
+    file.write_bytes(data)
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -84,6 +97,128 @@ def test_a_step_that_comes_too_early_says_what_it_waits_for(begun):
         share(begun, "frames", 3, 2)
 
 
+@pytest.mark.parametrize("crew", [Crew(), Crew("processes", 1)], ids=["in-process", "processes"])
+def test_what_an_earlier_step_wrote_is_mended_by_the_task_that_needs_it(whole, begun, crew):
+    share(begun, "plan")
+    for step in ("keyframes", "segments"):
+        share(begun, step)
+    numbers = [int(file.stem) for file in sorted((begun / "keyframes").glob("*.exr"))]
+    flip(begun / "raw" / "0002.exr")  # found when it is read; then what it is made from is found
+    flip(begun / "keyframes" / f"{numbers[0]:04d}.exr")
+    (begun / "keyframes" / f"{numbers[1]:04d}.exr").unlink()
+    (begun / "raw" / "0003.exr").unlink()
+    monitor = Told()
+    share(begun, "frames", 1, 2, crew=crew, monitor=monitor)
+    assert any("raw/0002.exr is missing or damaged" in text for text in monitor.said)
+    assert any("made again here: " in text and "raw 3" in text for text in monitor.said)
+    share(begun, "frames", 2, 2, crew=crew)
+    flip(begun / "frames" / "0008.exr")
+    (begun / "raw" / "0008.exr").unlink()
+    share(begun, "clips", crew=crew)
+    go_on(begun, Silence(), Crew())
+    assert Run.existing(begun).damaged() == []
+    assert Run.existing(begun).digest() == whole
+
+
+def test_what_is_lost_and_not_needed_is_left_to_others(begun):
+    share(begun, "plan")
+    share(begun, "keyframes")
+    share(begun, "segments")
+    (begun / "raw" / "0016.exr").unlink()
+    share(begun, "frames", 1, 4)
+    assert not (begun / "raw" / "0016.exr").exists()
+
+
+class Releasing(list):
+    """Stands for `time.sleep`: notes the pauses, and does something in one of them."""
+
+    def __init__(self, act, after):
+        super().__init__()
+        self.act, self.after = act, after
+
+    def __call__(self, seconds):
+        self.append(seconds)
+        if len(self) == self.after:
+            self.act()
+
+
+@pytest.fixture
+def patient(monkeypatch):
+    def wait(act, after):
+        pauses = Releasing(act, after)
+        monkeypatch.setattr("enfilade.pipeline.share.PATIENCE_S", 120.0)
+        monkeypatch.setattr("enfilade.pipeline.share.time.sleep", pauses)
+        return pauses
+
+    return wait
+
+
+GONE = '{"host": "another", "pid": 7, "started": "2026-01-01T00:00:00+00:00"}'
+
+
+def test_the_lock_of_a_host_that_is_gone_is_waited_for(begun, patient):
+    share(begun, "plan")
+    dead, monitor = Lock(begun, part="keyframes-1-of-2"), Told()
+    (begun / "parts" / "keyframes-1-of-2.lock").write_text(GONE)
+    pauses = patient(dead.release, 5)
+    share(begun, "keyframes", 1, 2, monitor=monitor)
+    assert pauses == [2.0, 4.0, 8.0, 15.0, 15.0]
+    assert "waiting up to 120 s: another command is writing " in monitor.said[0]
+    assert "process 7 on another, since 2026" in monitor.said[0]
+    assert not any("waiting" in text for text in monitor.said[1:])
+
+
+def test_the_last_task_of_a_farm_waits_for_the_lock_too(whole, begun, patient):
+    share(begun, "plan")
+    dead = Lock(begun)
+    pauses = patient(dead.release, 2)
+    go_on(begun, Silence(), Crew())
+    assert len(pauses) == 2
+    assert Run.existing(begun).digest() == whole
+
+
+def test_a_lock_that_stays_is_no_wrong_input(begun):
+    share(begun, "plan")
+    holder = Lock(begun, part="keyframes-1-of-2")
+    with pytest.raises(UnfinishedError, match="another command is writing"):
+        share(begun, "keyframes", 1, 2)
+    with pytest.raises(UnfinishedError, match="another command is writing"):
+        go_on(begun, Silence(), Crew())
+    holder.release()
+
+
+def test_a_run_that_was_never_shared_is_refused_at_once(begun, patient):
+    holder, pauses = Lock(begun), patient(lambda: None, 1)
+    with pytest.raises(RunFolderError, match="another command is writing"):
+        go_on(begun, Silence(), Crew())
+    with pytest.raises(RunFolderError, match="another command is writing"):
+        share(begun, "plan")
+    holder.release()
+    assert pauses == []
+
+
+@pytest.mark.parametrize("hidden", ["plan-1-of-1", "keyframes-1-of-1"])
+def test_what_another_host_has_done_is_waited_for_until_it_is_seen(begun, patient, hidden):
+    share(begun, "plan")
+    share(begun, "keyframes")
+    file, away, monitor = begun / "parts" / f"{hidden}.jsonl", begun.parent / "away", Told()
+    file.rename(away)
+    pauses = patient(lambda: away.rename(file), 3)
+    share(begun, "segments", 1, 2, monitor=monitor)
+    assert len(pauses) == 3
+    assert [text for text in monitor.said if "waiting up to 120 s: " in text] == [monitor.said[0]]
+
+
+def test_what_is_never_seen_is_told_after_two_minutes(begun, patient, monkeypatch):
+    share(begun, "plan")
+    now = iter(range(0, 10_000, 30))
+    monkeypatch.setattr("enfilade.pipeline.share.time.monotonic", lambda: float(next(now)))
+    pauses = patient(lambda: None, 1)
+    with pytest.raises(UnfinishedError, match=r"units of step 'frames' wait for .* \(after 120 s\)"):
+        share(begun, "frames", 1, 2)
+    assert len(pauses) == 4
+
+
 def test_a_scene_that_has_changed_is_refused(begun):
     scene = begun.parent / "scene.analytic.json"
     scene.write_text(scene.read_text().replace('"noise": 0.05', '"noise": 0.06'))
@@ -97,23 +232,6 @@ def test_a_damaged_job_is_said(begun):
         share(begun, "plan")
 
 
-def test_the_template_is_one_of_open_job_description(begun):
-    write_template(begun, begun / "farm.json", chunks=2)
-    made = json.loads((begun / "farm.json").read_text())
-    assert made == template(begun, 2)
-    assert [step["name"] for step in made["steps"]] == [
-        "plan",
-        "keyframes",
-        "segments",
-        "frames",
-        "clips",
-        "video",
-    ]
-    line = [str(OPENJD), "check", str(begun / "farm.json")]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
-    assert done.returncode == 0, done.stdout
-
-
 @pytest.mark.slow
 def test_the_template_run_by_open_job_description_makes_the_same_run(whole, begun):
     write_template(begun, begun / "farm.json", chunks=2)
@@ -124,50 +242,8 @@ def test_the_template_run_by_open_job_description_makes_the_same_run(whole, begu
     assert Run.existing(begun).digest() == whole
 
 
-class Cluster:
-    """Stands for submitit: notes when each task is given to it and when it is waited for."""
-
-    def __init__(self, failing=""):
-        self.failing, self.events, self.parameters = failing, [], []
-        self.helpers = SimpleNamespace(CommandFunction=list)
-        self.core = SimpleNamespace(utils=SimpleNamespace(UncompletedJobError=TimeoutError))
-        self.AutoExecutor = lambda **_: SimpleNamespace(
-            update_parameters=lambda **given: self.parameters.append(given),
-            batch=nullcontext,
-            submit=self._submit,
-        )
-
-    def _submit(self, line):
-        number = str(sum(what == "given" for what, _ in self.events))
-        self.events.append(("given", number))
-        return SimpleNamespace(job_id=number, exception=lambda: self._ended(number, line))
-
-    def _ended(self, number, line):
-        self.events.append(("ended", number))
-        return RuntimeError("no memory") if self.failing in line else None
-
-
-def test_tasks_on_this_machine_come_one_after_the_other(begun, monkeypatch):
-    cluster = Cluster()
-    monkeypatch.setitem(sys.modules, "submitit", cluster)
-    jobs = submit(begun, "local", 3, {})
-    assert jobs == [str(n) for n in range(1 + 3 * 3 + 1 + 1)]
-    assert cluster.events == [(what, job) for job in jobs for what in ("given", "ended")]
-    monkeypatch.setitem(sys.modules, "submitit", Cluster(failing="segments"))
-    with pytest.raises(EnfiladeError, match="step 'segments' failed: no memory"):
-        submit(begun, "local", 3, {})
-
-
-def test_slurm_gets_all_tasks_of_a_step_at_once_and_holds_the_next_until_they_are_done(begun, monkeypatch):
-    cluster = Cluster()
-    monkeypatch.setitem(sys.modules, "submitit", cluster)
-    assert cluster.events == [("given", job) for job in submit(begun, "slurm", 2, {"timeout_min": 5})]
-    after = [given.get("slurm_additional_parameters") for given in cluster.parameters]
-    held = ["0", "1:2", "3:4", "5:6", "7"]  # plan, keyframes, segments, frames, the clip
-    assert after == [None, *({"dependency": f"afterok:{jobs}"} for jobs in held)]
-
-
 @pytest.mark.slow
 def test_submitit_makes_the_same_run(whole, begun):
-    assert len(submit(begun, "local", 2, {"timeout_min": 5})) == 1 + 3 * 2 + 1 + 1  # the clip and the video
+    jobs = submit(begun, "local", 2, {"timeout_min": 5}, print)
+    assert len(jobs) == 1 + 3 * 2 + 1 + 1  # the clip and the video
     assert Run.existing(begun).digest() == whole

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from enfilade.errors import DamagedFileError, NoSpaceError, RunFolderError, UnfinishedError
+from enfilade.executors import Unit
 from enfilade.executors.inprocess import InProcess
 from enfilade.monitor import Silence
 from enfilade.pipeline import crew, finish, worker
@@ -126,6 +127,64 @@ def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, 
             with pytest.raises(type(error)):
                 trace(run, do)
     assert not (folder / PARTIAL).exists()
+
+
+def chain(run):
+    """A blueprint of three rounds, of which each needs the one before, through a gate or one by one."""
+
+    def unit(name, kind, *needs):
+        return Unit(name, kind, {"name": name}, needs)
+
+    units = [unit(f"c{n}", "late", f"b{n}") for n in (1, 2, 3)]
+    units += [unit(f"b{n}", "middle", "gate") for n in (1, 2, 3)]
+    units += [
+        Unit("gate", "gate", needs=("a1", "a2"), is_gate=True),
+        unit("a1", "early"),
+        unit("a2", "early"),
+    ]
+    return SimpleNamespace(
+        first=lambda: units,
+        follow=lambda _unit: (),
+        is_done=lambda unit: run.done(unit.name) is not None,
+    )
+
+
+@pytest.mark.parametrize(
+    ("lost", "wanted", "made"),
+    [
+        (["b1", "b2"], ["c1"], ["b1", "c1"]),  # b2 is not needed
+        (["a2", "b1"], ["c1"], ["a2", "b1", "c1"]),  # through the gate
+        (["a2"], ["c1"], ["c1"]),  # b1 stands: what it was made of is not needed
+        (["c1", "b1"], ["c2"], ["c2"]),
+    ],
+)
+def test_what_was_lost_is_made_again_where_it_is_needed(folder, monkeypatch, lost, wanted, made):
+    monkeypatch.setattr(crew, "Blueprint", lambda _job, run: chain(run))
+    begun = []
+    with Run.sharing(folder, "before") as before:
+        for name in ("a1", "a2", "b1", "b2", "b3"):
+            (folder / name).write_text("x")
+            before.finish(name, files=[folder / name], facts={})
+    for name in lost:
+        (folder / name).unlink(missing_ok=True)
+    with Run.sharing(folder, "now") as run:
+
+        def do(_kind, facts):
+            begun.append(facts["name"])
+            run.finish(facts["name"], files=[], facts={})
+
+        maker = SimpleNamespace(make=lambda _tell, **_: do)
+        monkeypatch.setattr(crew, "_open", lambda *_: InProcess(maker, print))
+        left = crew.carry_out(None, run, Crew(), Told(), is_wanted=lambda unit: unit.name in wanted)
+    assert (left, begun) == ([], made)
+
+
+def test_a_share_that_must_wait_opens_no_worker(folder, monkeypatch):
+    monkeypatch.setattr(crew, "Blueprint", lambda _job, run: chain(run))
+    monkeypatch.setattr(crew, "_open", None)
+    with Run.sharing(folder, "now") as run:
+        left = crew.carry_out(None, run, Crew(), Told(), is_wanted=lambda unit: unit.kind == "late")
+    assert left == ["c1", "c2", "c3"]
 
 
 def test_files_that_other_shares_are_writing_stay(folder, trace):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -402,6 +404,106 @@ def test_several_commands_share_a_run(folder):
             Run.sharing(folder, "three")
     assert [line["unit"] for line in recorded(folder)] == ["a", "b"]
     assert not list((folder / "parts").glob("*.jsonl"))
+
+
+def opened(monkeypatch):
+    """Names of the files that are opened to be read, from now on."""
+    names, really = [], Path.open
+
+    def note(file, *how, **more):
+        names.append(file.name)
+        return really(file, *how, **more)
+
+    monkeypatch.setattr(Path, "open", note)
+    return names
+
+
+def test_a_worker_opens_one_ledger_a_unit(folder, monkeypatch):
+    Run.open(folder, IDENTITY).close()
+    with Run.sharing(folder, "one") as one, Run.sharing(folder, "two") as two:
+        two.finish("a", files=[], facts={})
+        worker = Run.joining(folder, print, part="one")
+        assert worker.done("a")
+        names = opened(monkeypatch)
+        one.finish("b", files=[], facts={})
+        worker.keep_up()
+        assert names == ["one.jsonl"]
+        assert worker.done("b")
+        one.keep_up()  # it wrote all that it needs itself
+        assert names == ["one.jsonl"]
+        two.finish("c", files=[write(two, "raw", 1)], facts={})
+        worker.check(worker.file("raw", 1))  # of a line that it has not read
+        assert worker.done("c")
+    with Run.open(folder, IDENTITY) as run:
+        worker = Run.joining(folder, print)
+        run.finish("d", files=[], facts={})
+        worker.keep_up()
+        assert worker.done("d")
+
+
+def test_parts_are_joined_with_one_flush_and_their_locks_go(folder, monkeypatch):
+    Run.open(folder, IDENTITY).close()
+    for part in range(5):
+        with Run.sharing(folder, f"frames-{part}-of-5") as run:
+            for unit in range(4):
+                run.finish(f"frame {4 * part + unit}", files=[], facts={})
+    flushed, really = [], os.fsync
+
+    def flush(handle):
+        flushed.append(Path(f"/proc/self/fd/{handle}").readlink())
+        really(handle)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    with Run.open(folder, IDENTITY) as run:
+        assert {line["unit"] for line in run.lines()} == {f"frame {n}" for n in range(20)}
+    assert flushed.count(folder / "ledger.jsonl") == 1
+    assert folder / "parts" not in {place for name in flushed for place in (name, name.parent)}
+    assert list((folder / "parts").iterdir()) == []
+    assert len(recorded(folder)) == 20
+
+
+def test_parts_stay_where_the_disk_is_full(folder, monkeypatch):
+    Run.open(folder, IDENTITY).close()
+    with Run.sharing(folder, "one") as one:
+        one.finish("a", files=[], facts={})
+
+    really = os.fsync
+
+    def full(handle):
+        if b'"unit"' in (folder / "ledger.jsonl").read_bytes():
+            raise OSError(errno.ENOSPC, "No space left on device")
+        really(handle)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(NoSpaceError):
+            Run.open(folder, IDENTITY)
+    assert (folder / "parts" / "one.jsonl").exists()
+    with Run.open(folder, IDENTITY) as run:
+        assert run.done("a")
+    assert len(recorded(folder)) == 1
+
+
+def test_what_another_command_has_made_again_is_not_removed(folder):
+    Run.open(folder, IDENTITY).close()
+    with Run.sharing(folder, "one") as one, Run.sharing(folder, "two") as two:
+        file = write(one, "raw", 1)
+        one.finish("raw 1", files=[file], facts={})
+        two.refresh()
+        good = file.read_bytes()
+        file.write_bytes(b"damaged"[: len(good)])
+        for run in (one, two):
+            with pytest.raises(DamagedFileError):
+                run.check(file)
+        one.forget("raw/0001.exr")
+        assert not one.done("raw 1")
+        assert one.was_finished("raw 1")
+        assert not one.was_finished("raw 2")
+        file.write_bytes(good)
+        one.finish("raw 1", files=[file], facts={})
+        two.forget("raw/0001.exr")
+        assert file.read_bytes() == good
+        two.check(file)
 
 
 @pytest.mark.parametrize("name", ["run.lock", "ledger.jsonl"])

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import socket
+from pathlib import Path
 
 import pytest
 
@@ -77,3 +78,36 @@ def test_a_full_disk_leaves_a_lock_without_a_name(tmp_path, monkeypatch):
     with pytest.raises(RunFolderError, match="hasn't given its name"):
         Lock(tmp_path)
     lock.release()
+
+
+def test_a_lock_is_waited_for_as_long_as_it_is_said(shared):
+    holder, told = Lock(shared, part="one"), []
+
+    def wait(text):
+        told.append(text)
+        if len(told) == 3:
+            holder.release()
+
+    Lock(shared, part="one", wait=wait).release()
+    assert len(told) == 3
+    assert f"another command is writing {shared / 'parts'}: process {os.getpid()} on " in told[0]
+    holder = Lock(shared)
+    with pytest.raises(TimeoutError):
+        Lock(shared, part="one", wait=give_up)
+    holder.release()
+    Lock(shared, part="one").release()  # and what was opened to wait is closed
+
+
+def give_up(_text):
+    raise TimeoutError
+
+
+def test_who_knows_its_part_looks_through_no_other_lock(shared, monkeypatch):
+    one, two = Lock(shared, part="one"), Lock(shared, part="two")
+    read, really = [], Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda file: (read.append(file.name), really(file))[1])
+    sign_workers(shared, 5, "two")
+    assert read == ["two.lock"]
+    assert [w["workers"] for w in writers_of(shared)] == [1, 5]
+    one.release()
+    two.release()

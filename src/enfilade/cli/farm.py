@@ -35,7 +35,8 @@ from enfilade.cli.group import debug_option
     "options",
     multiple=True,
     metavar="KEY=VALUE",
-    help="A parameter of submitit's, such as slurm_partition=cpu or timeout_min=120; as often as wanted.",
+    help="A parameter of submitit's, such as slurm_partition=cpu, timeout_min=120 (instead of 60) or "
+    "cpus_per_task=16 (instead of 8); as often as wanted.",
 )
 @debug_option
 def command(
@@ -49,8 +50,7 @@ def command(
     from enfilade.pipeline.farm import TEMPLATE, submit, write_template
 
     if cluster is not None:
-        jobs = submit(run, cluster, chunks, dict(_pair(text) for text in options))
-        click.echo(f"jobs    {', '.join(jobs)}")
+        submit(run, cluster, chunks, dict(_pair(text) for text in options), click.echo)
         return
     out = run / TEMPLATE if file is None else file
     write_template(run, out, chunks)

@@ -121,7 +121,7 @@ def crew_options(command: Command) -> Command:
         click.option(
             "--workers",
             type=click.IntRange(1),
-            help="Worker processes, or units on the cluster at once.  [default: one for each core]",
+            help="Worker processes, or units on the cluster at once.  [default: one for each GPU, or core]",
         ),
         click.option(
             "--executor",
@@ -129,7 +129,8 @@ def crew_options(command: Command) -> Command:
             default="in-process",
             show_default=True,
             help="Who does the work: in-process, processes (on this machine), ray (a local cluster) or "
-            "ray:ADDRESS.",
+            "ray:ADDRESS. Limits may follow: processes,idle=30,unit=90 ends a worker that uses no CPU time "
+            "for 30 minutes (10 unless said), or takes more than 90 for a unit (none unless said).",
         ),
     ):
         command = decorate(command)

@@ -44,7 +44,8 @@ def command(
     """Go on with the run in the folder RUN, which `enfilade render` or another of these began.
 
     Without --step, all that is left is done. With it, several commands can work on one run, on one or on
-    many hosts: each step after the one before, all chunks of a step at the same time.
+    many hosts: each step after the one before, all chunks of a step at the same time. On a run that was
+    shared before, what others hold, or have not done yet, is waited for up to two minutes.
     """
     mark_resumable(ctx)
     activate(device)

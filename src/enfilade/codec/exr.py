@@ -7,6 +7,7 @@ positions and normals (``P``, ``N``) and ``.R .G .B`` for the rest; the layer ``
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import os
 import sys
@@ -81,7 +82,9 @@ def write_exr(
             _part_headers(beside)
         except (RuntimeError, ImageError) as error:
             size = sum(array.nbytes for array in layers.values())
-            raise unwritable(file, str(error), written=beside, size=size) from error
+            # OpenEXR doesn't say what the operating system said. It could be opened: it isn't forbidden.
+            cause = OSError(errno.EIO, str(error))
+            raise unwritable(file, str(error), written=beside, size=size) from cause
 
 
 def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:
@@ -247,7 +250,19 @@ def _failures(file: Path) -> Iterator[None]:
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
         if isinstance(error, ImageError):
             raise
+        if (reason := _unreadable(file)) is not None:  # which OpenEXR doesn't say
+            raise ImageError(f"can't read {file}: {reason.strerror}") from reason
         raise _damaged(file, str(error)) from error
+
+
+def _unreadable(file: Path) -> OSError | None:
+    try:
+        with file.open("rb") as raw:
+            while raw.read(1 << 20):
+                pass
+    except OSError as error:
+        return error
+    return None
 
 
 def _damaged(file: Path, reason: str) -> ImageError:

@@ -17,10 +17,24 @@ from typing import Any
 
 from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 
-__all__ = ["MARK", "flush", "json_bytes", "read_json", "sweep", "unwritable", "whole_file", "write_json"]
+__all__ = [
+    "MARK",
+    "flush",
+    "is_passing",
+    "json_bytes",
+    "read_json",
+    "sweep",
+    "unwritable",
+    "whole_file",
+    "write_json",
+]
 
 MARK = ".writing-"  # in the name of every file that isn't finished
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+LASTING = FULL | {
+    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
+    errno.EPERM, errno.EROFS,
+}  # fmt: skip
 BLOCK = bytes(1 << 20)  # written to learn whether there is room
 
 
@@ -139,6 +153,11 @@ def unwritable(
     NoSpaceError or RunFolderError
     """
     is_full = isinstance(reason, OSError) and reason.errno in FULL
+    if isinstance(reason, OSError) and is_passing(reason):
+        return RunFolderError(
+            f"can't write {file}: {reason.strerror}; look at its disk, then run the same command again: what "
+            "is finished stays"
+        )
     text = reason.strerror or str(reason) if isinstance(reason, OSError) else reason
     if is_full or (written is not None and _is_full(written, size)):
         return NoSpaceError(
@@ -149,6 +168,14 @@ def unwritable(
         f"can't write {file}: {text}; make room or choose another folder, then run the same command "
         "again: what is finished stays"
     )
+
+
+def is_passing(error: OSError) -> bool:
+    """Whether the same may succeed a little later: a disk or a network did not answer as it should.
+
+    Not so where a file is missing, in the way, or forbidden, nor where the disk is full.
+    """
+    return error.errno in errno.errorcode and error.errno not in LASTING
 
 
 def _is_full(file: Path, size: int) -> bool:

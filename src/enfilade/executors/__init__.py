@@ -7,6 +7,7 @@ workers that die.
 from enfilade.executors.executor import Event, Executor, Failure, FailureKind, Recipe
 from enfilade.executors.graph import Graph
 from enfilade.executors.opener import EXECUTORS, open_executor
+from enfilade.executors.resources import cores
 from enfilade.executors.supervisor import ATTEMPTS, supervise
 from enfilade.executors.unit import Unit
 
@@ -20,6 +21,7 @@ __all__ = [
     "Graph",
     "Recipe",
     "Unit",
+    "cores",
     "open_executor",
     "supervise",
 ]

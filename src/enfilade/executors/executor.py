@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from enfilade import errors
+from enfilade.codec.whole import is_passing
 from enfilade.executors.unit import Unit
 
 Tell = Callable[[str, Any], None]
@@ -34,11 +36,21 @@ class Recipe:
         ``package.module:function``. Called with `spec` and with what takes its reports, it returns a function
         that does a unit, given its kind and facts.
     spec : mapping
-        Fit for JSON.
+        Fit for JSON. Who chooses where it works looks at ``threads`` and ``device``, if they are there.
     """
 
     target: str
     spec: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def threads(self) -> int:
+        """Threads of the worker; 0: its share of the cores."""
+        return int(self.spec.get("threads", 0))
+
+    @property
+    def needs_gpu(self) -> bool:
+        """Whether the worker needs a GPU."""
+        return bool(self.spec.get("device") == "cuda")
 
     def make(self, tell: Tell, *, share: int = 1) -> Worker:
         """Make the worker.
@@ -61,6 +73,8 @@ class FailureKind(Enum):
     DIED = "died"  # its worker did
     MEMORY = "memory"  # there was too little
     ERROR = "error"  # it raised something that nobody foresaw
+    IO = "io"  # a disk or a network did not answer as it should
+    DEVICE = "device"  # its worker found no device
     REFUSED = "refused"  # an error of ours: it would be the same again
     DAMAGED = "damaged"  # a file that it needs isn't what was written
     SPACE = "space"  # the disk is full
@@ -99,6 +113,11 @@ class Failure:
                 return Failure(FailureKind.DAMAGED, text, log, error, file=error.file)
             case errors.NoSpaceError():
                 return Failure(FailureKind.SPACE, text, log, error)
+            case errors.EnfiladeError() | OSError() if (cause := _passing_cause(error)) is not None:
+                kind = FailureKind.MEMORY if cause.errno == errno.ENOMEM else FailureKind.IO
+                return Failure(kind, text, log)
+            case errors.DeviceError():
+                return Failure(FailureKind.DEVICE, text, log, errors.DeviceError(str(error)))
             case errors.EnfiladeError():
                 return Failure(FailureKind.REFUSED, text, log, error)
             case MemoryError():
@@ -149,6 +168,13 @@ class Event:
     failure: Failure | None = None
 
 
+def _passing_cause(error: BaseException | None) -> OSError | None:
+    """What the operating system said, where that may be otherwise next time."""
+    while error is not None and not isinstance(error, OSError):
+        error = error.__cause__
+    return error if error is not None and is_passing(error) else None
+
+
 class Executor(Protocol):
     """Workers that take a unit each."""
 
@@ -162,7 +188,11 @@ class Executor(Protocol):
         ...
 
     def wait(self, timeout_s: float | None) -> list[Event]:
-        """Wait until units end, or for so long. Reports are told meanwhile."""
+        """Wait until units end, or for so long at most. Reports are told meanwhile."""
+        ...
+
+    def retire(self, slot: int) -> None:
+        """Let a worker go that has nothing in hand: the next unit of its slot gets a new one."""
         ...
 
     def close(self) -> None:

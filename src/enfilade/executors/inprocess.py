@@ -52,6 +52,11 @@ class InProcess:
             self._unit = None
         return [Event(0)]
 
+    def retire(self, slot: int) -> None:
+        """Forget the worker."""
+        del slot
+        self._worker = None
+
     def close(self) -> None:
         """Forget the worker."""
         self._worker = None

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import heapq
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from enfilade.errors import EnfiladeError
 from enfilade.executors.executor import Event, Executor, Failure, FailureKind
 from enfilade.executors.graph import Graph
+from enfilade.executors.trouble import MACHINE, Trouble
 from enfilade.executors.unit import Unit
+from enfilade.executors.watch import span
 
 ATTEMPTS = 4  # of a unit
-FIRST_DELAY_S = 0.25  # before the second attempt; twice that before each next one
+FIRST_DELAY_S = 0.25  # before the second attempt
+LONGER = 2  # times longer before each next one
+LONGER_OF_MACHINE = 16  # ... where the machine may have failed: 0.25, 4 and 64 s
 SMALLER = 4  # times less memory for each attempt after one that had too little
 IDLE_S = 0.05  # looked again for what may be begun
+PAUSE_S = 1.0  # ... at most, while all wait
 
 
 @dataclass(eq=False)
@@ -26,7 +33,8 @@ class Ending:
     aside : list of (Unit, list of Failure)
         What failed again and again, each with all its failures.
     stopped : Failure or None
-        What ended it early: a full disk, an error of ours, a damaged file.
+        What ended it early: a full disk, an error of ours, a damaged file, a machine on which nothing
+        succeeds any more (see :class:`~enfilade.executors.trouble.Trouble`).
     """
 
     aside: list[tuple[Unit, list[Failure]]] = field(default_factory=list)
@@ -53,7 +61,8 @@ def supervise(
     is_done
         Whether a unit's line is in the ledger. One that says it is finished and isn't has failed.
     failed
-        Told of each failure of a unit, with all that it has had. After :data:`ATTEMPTS` it is set aside.
+        Told of each failure of a unit, with those that count so far; with :data:`ATTEMPTS` or more it is set
+        aside. A failure that does not count, since the machine is in trouble, says so.
 
     Returns
     -------
@@ -82,15 +91,20 @@ class _Loop:
         self._in_hand: dict[int, Unit] = {}
         self._last: dict[int, str] = {}  # group of what a worker did last
         self._failures: dict[str, list[Failure]] = {}
+        self._counts: dict[str, int] = {}  # of them, those that count
         self._delayed: list[tuple[float, str, Unit]] = []
+        self._held: deque[Unit] = deque()  # what failed while the machine was in trouble
+        self._trouble = Trouble(executor.slots)
+        self._trial: int | None = None  # worker of the unit that tries whether the trouble is over
+        self._has_success = False
 
     def run(self) -> None:
         while True:
             self._hand_out()
-            if not self._in_hand and (self.ending.stopped or not self._delayed):
-                return
             if not self._in_hand:
-                time.sleep(IDLE_S)
+                if self.ending.stopped or not (self._delayed or self._held or self._trouble.is_on):
+                    return
+                time.sleep(min(max(self._trouble.left_s, IDLE_S), PAUSE_S))
             for event in self._executor.wait(self._patience()):
                 self._end(event)
 
@@ -98,48 +112,126 @@ class _Loop:
         now = time.monotonic()
         while self._delayed and self._delayed[0][0] <= now:
             self._graph.put_back(heapq.heappop(self._delayed)[2])
+        most = self._trouble.slots
+        if self._trouble.is_on:
+            is_trial = self._trial is None and not self._trouble.left_s
+            most = len(self._in_hand) + is_trial
+        else:
+            while self._held:
+                self._graph.put_back(self._held.popleft())
         for slot in range(self._executor.slots):
-            if slot in self._in_hand or self.ending.stopped:
+            if slot in self._in_hand:
                 continue
-            busy = {unit.group for unit in self._in_hand.values()}
-            unit = self._graph.take(self._last.get(slot, ""), busy)
-            if unit is None:
+            if self.ending.stopped or len(self._in_hand) >= most or not self._begin(slot):
                 return
-            self._in_hand[slot] = unit
-            self._last[slot] = unit.group
+
+    def _begin(self, slot: int) -> bool:
+        busy = {unit.group for unit in self._in_hand.values()}
+        unit = self._graph.take(self._last.get(slot, ""), busy)
+        if unit is None and self._trouble.is_on and self._held:
+            unit = self._held.popleft()  # last: what has failed least is tried first
+        if unit is None:
+            return False
+        self._in_hand[slot] = unit
+        self._last[slot] = unit.group
+        self._trial = slot if self._trouble.is_on else None
+        try:
             self._executor.begin(slot, unit, share=self._share(unit))
+        except (EnfiladeError, OSError) as error:  # no worker can be begun
+            self._end(Event(slot, Failure.of(error)))
+            return False
+        return True
 
     def _patience(self) -> float | None:
-        return max(self._delayed[0][0] - time.monotonic(), IDLE_S) if self._delayed else None
+        waits = [self._delayed[0][0] - time.monotonic()] if self._delayed else []
+        if self._trouble.is_on and self._trial is None:
+            waits.append(self._trouble.left_s)
+        return max(min(waits), IDLE_S) if waits else None
 
     def _share(self, unit: Unit) -> int:
         kinds = [failure.kind for failure in self._failures.get(unit.name, [])]
         # The kernel kills who takes too much memory; but a worker that is killed once may have been unlucky.
         scarce = kinds.count(FailureKind.MEMORY) + max(kinds.count(FailureKind.DIED) - 1, 0)
-        return int(SMALLER**scarce)
+        return int(SMALLER ** min(scarce, ATTEMPTS - 1))
 
     def _end(self, event: Event) -> None:
         unit = self._in_hand.pop(event.slot)
-        failure = event.failure
+        is_trial, failure = event.slot == self._trial, event.failure
+        if is_trial:
+            self._trial = None
         if failure is None and not self._is_done(unit):
             failure = Failure(FailureKind.ERROR, "it ended without a line in the ledger")
         if failure is None:
+            self._has_success = True
+            self._trouble.succeed()
             self._graph.finish(unit.name)
             for following in self._follow(unit):
                 self._graph.add(following)
         else:
-            self._fail(unit, failure)
+            self._fail(unit, failure, is_trial=is_trial)
+        if failure is not None or len(self._in_hand) >= self._trouble.slots:
+            # What failed may have left a device or a library unfit; where memory is scarce, one that waits
+            # keeps its scene.
+            self._executor.retire(event.slot)
 
-    def _fail(self, unit: Unit, failure: Failure) -> None:
-        if failure.kind in (FailureKind.SPACE, FailureKind.REFUSED, FailureKind.DAMAGED):
-            self.ending.stopped = self.ending.stopped or failure
-            return
+    def _fail(self, unit: Unit, failure: Failure, *, is_trial: bool) -> None:
         failures = self._failures.setdefault(unit.name, [])
         failures.append(failure)
-        self._failed(unit, failures)
-        if len(failures) >= ATTEMPTS:
-            self._graph.set_aside(unit.name)
-            self.ending.aside.append((unit, failures))
+        kinds = [past.kind for past in failures]
+        if self._is_final(failure):
+            self.ending.stopped = self.ending.stopped or failure
+        elif failure.kind is FailureKind.MEMORY and not self._trouble.is_on and kinds.count(failure.kind) < 3:
+            self._count(unit, failure)  # first it shall do with less
+        elif self._trouble.fail(unit.name, failure.kind, is_trial=is_trial):
+            self._count(unit, failure)
         else:
-            delay = FIRST_DELAY_S * 2 ** (len(failures) - 1)
-            heapq.heappush(self._delayed, (time.monotonic() + delay, unit.name, unit))
+            self._hold(unit, failure)
+
+    def _is_final(self, failure: Failure) -> bool:
+        if failure.kind is FailureKind.DEVICE and not self._has_success:
+            before = [past.kind for failures in self._failures.values() for past in failures]
+            return before.count(FailureKind.DEVICE) > 1  # two say so, and nobody has seen it work
+        return failure.kind in (FailureKind.SPACE, FailureKind.REFUSED, FailureKind.DAMAGED)
+
+    def _count(self, unit: Unit, failure: Failure) -> None:
+        failures = self._failures[unit.name]
+        count = self._counts[unit.name] = self._counts.get(unit.name, 0) + 1
+        if count >= ATTEMPTS:
+            self._set_aside(unit)
+            return
+        self._failed(unit, failures[-count:])
+        longer = LONGER_OF_MACHINE if failure.kind in MACHINE else LONGER
+        delay = FIRST_DELAY_S * longer ** (count - 1)
+        heapq.heappush(self._delayed, (time.monotonic() + delay, unit.name, unit))
+
+    def _set_aside(self, unit: Unit) -> None:
+        failures = self._failures[unit.name]
+        self._failed(unit, failures)
+        self._graph.set_aside(unit.name)
+        self.ending.aside.append((unit, failures))
+
+    def _hold(self, unit: Unit, failure: Failure) -> None:
+        """Keep a unit until the trouble is over, or give up where it has been for too long."""
+        self._held.append(unit)
+        if self._trouble.is_hopeless and not self._in_hand:
+            self._give_up(failure)
+            return
+        pause = f" for {span(self._trouble.left_s)}" if self._trouble.left_s else ""
+        text = f"{failure.text}; {self._trouble.describe()}: all wait{pause}, and this failure does not count"
+        past = self._failures[unit.name][:-1][2 - ATTEMPTS :]
+        self._failed(unit, [*past, replace(failure, text=text)])
+
+    def _give_up(self, failure: Failure) -> None:
+        said = self._trouble.describe()
+        tried = [unit for unit in self._held if len(self._failures[unit.name]) >= ATTEMPTS]
+        for unit in tried:
+            self._set_aside(unit)
+        has_more = bool(self._delayed) or self._graph.take() is not None
+        if has_more or len(tried) < len(self._held):
+            text = (
+                f"nothing succeeds any more: {said}, the last one since {failure.text}. What is finished "
+                "stays: see to the machine, then run the same command again"
+            )
+            self.ending.stopped = Failure(failure.kind, text, failure.log, EnfiladeError(text))
+        self._held.clear()
+        self._trouble = Trouble(self._executor.slots)

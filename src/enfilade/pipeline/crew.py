@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -78,7 +77,8 @@ def carry_out(
     crew
     monitor
     is_wanted
-        Which units are this command's share; others must be finished before, or are left.
+        Which units are this command's share. Others must be finished before, or are left; but those that
+        were finished once, whose files don't stand any more, are made again where the share needs them.
 
     Returns
     -------
@@ -108,12 +108,12 @@ def _carry_out(
     progress, aside = Progress(monitor), _Aside(run, monitor)
     for _ in range(REPAIRS):
         shift, damaged = _Shift(job, run, progress, aside, is_wanted), None
-        if shift.left:
+        if shift.can_begin:
             progress.tell_before()
             # Workers of their own for each shift: those of the last have what was damaged in memory, and
             # would not write it again.
             with closing(_open(job, run, crew, progress)) as executor:
-                sign_workers(run.folder, executor.slots)
+                sign_workers(run.folder, executor.slots, run.part)
                 damaged = shift.work(executor)
         if damaged is None:
             aside.check(len(shift.left))
@@ -137,9 +137,12 @@ def _open(job: Job, run: Run, crew: Crew, progress: Progress) -> Executor:
 
     if crew.executor == "in-process":
         return InProcess(_Here(job, run), hear)
-    cores = len(os.sched_getaffinity(0))
-    threads = crew.threads or max(cores // (crew.workers or cores), 1)
-    spec = {"folder": str(run.folder.resolve()), "device": active().backend, "threads": threads}
+    spec = {
+        "folder": str(run.folder.resolve()),
+        "part": run.part,
+        "device": active().backend,
+        "threads": crew.threads,
+    }
     recipe = Recipe("enfilade.pipeline.hire:open_worker", spec)
     return open_executor(crew.executor, recipe, hear, workers=crew.workers, logs=run.folder / LOGS)
 
@@ -156,7 +159,18 @@ class _Shift:
         self._graph = Graph()
         self._progress = progress
         self._aside = aside
+        self._known: set[str] = set()  # units, whether they are taken up or not
+        self._gates: dict[str, Unit] = {}
+        self._lost: dict[str, Unit] = {}  # of others, finished once: their files don't stand any more
         self._take_up(self._blueprint.first())
+
+    @property
+    def can_begin(self) -> bool:
+        """Whether there is a unit that waits for nothing."""
+        unit = self._graph.take()
+        if unit is not None:
+            self._graph.put_back(unit)
+        return unit is not None
 
     @property
     def left(self) -> list[str]:
@@ -184,22 +198,53 @@ class _Shift:
     def _take_up(self, units: Any) -> None:
         """Add units to the graph; those that are done bring theirs at once."""
         pending = deque(units)
+        if not pending:
+            return
         while pending:
             unit = pending.popleft()
             is_done = not unit.is_gate and self._blueprint.is_done(unit)
-            is_wanted = self._is_wanted(unit)
-            if not unit.is_gate and not is_done and not is_wanted:
+            self._known.add(unit.name)
+            if unit.is_gate:
+                self._gates[unit.name] = unit
+            elif not is_done and not self._is_wanted(unit):
+                if self._run.was_finished(unit.name):
+                    self._lost[unit.name] = unit
                 continue
-            if is_done:
-                self._graph.finish(unit.name)
-                self._aside.drop(unit)
-            elif unit.name in self._aside:
-                self._graph.set_aside(unit.name)
-            self._graph.add(unit)
-            if is_wanted:
-                self._progress.add(unit, is_done=is_done)
+            self._add(unit, is_done=is_done)
             if is_done:
                 pending.extend(self._blueprint.follow(unit))
+        lost = self._lost_needs() if self._lost else []
+        for unit in lost:
+            self._add(unit, is_done=False)
+        if lost:
+            names = shortened([unit.name for unit in lost])
+            self._progress.monitor.say(f"files of earlier steps are missing and made again here: {names}")
+
+    def _add(self, unit: Unit, *, is_done: bool) -> None:
+        if is_done:
+            self._graph.finish(unit.name)
+            self._aside.drop(unit)
+        elif unit.name in self._aside:
+            self._graph.set_aside(unit.name)
+        self._graph.add(unit)
+        if not is_done or self._is_wanted(unit):
+            self._progress.add(unit, is_done=is_done)
+
+    def _lost_needs(self) -> list[Unit]:
+        """Take those of the lost units that are needed, by this share or by one another."""
+        pending = deque(name for unit in self._graph.unfinished() for name in unit.needs)
+        seen: set[str] = set()
+        while pending:
+            name = pending.popleft()
+            unit = self._lost.get(name) or self._gates.get(name)
+            if unit is not None and name not in seen:
+                pending.extend(unit.needs)
+            seen.add(name)
+        # What nobody knows yet comes of a unit that must be done before, and may be among the lost.
+        found = [unit for unit in self._lost.values() if unit.name in seen or not seen <= self._known]
+        for unit in found:
+            del self._lost[unit.name]
+        return found
 
     def _is_done(self, unit: Unit) -> bool:
         if self._blueprint.is_done(unit):
@@ -265,11 +310,10 @@ class _Aside:
         names = tuple(self._last)
         if not names:
             return
-        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
         raise UnfinishedError(
-            f"{len(names)} of the run's units failed again and again: {shown} ({self._last[names[0]]}); "
-            f"their logs are in {self._folder}. The rest is done but for {left} that need them; "
-            "the same command tries them again",
+            f"{len(names)} of the run's units failed again and again: {shortened(names)} "
+            f"({self._last[names[0]]}); their logs are in {self._folder}. The rest is done but for "
+            f"{left} that need them; the same command tries them again",
             names,
         )
 
@@ -287,6 +331,11 @@ class _Here:
 
         check_identity(self._job, self._run)
         return Worker(smaller(self._job, share), self._run, Distant(tell)).do
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names for a message: some of them, and how many more there are."""
+    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
 
 
 def bytes_needed(run: Run, names: list[str]) -> float:

@@ -7,12 +7,17 @@ again: what is in the folder is not done again. (https://github.com/OpenJobDescr
 from __future__ import annotations
 
 import math
+import re
+import shutil
+import subprocess
 import sys
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from enfilade.codec import write_json
-from enfilade.errors import EnfiladeError
+from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.pipeline.job import read_job
 from enfilade.pipeline.units import CLIPS_STEP, STEPS, clips_of
 
@@ -20,6 +25,14 @@ TEMPLATE = "farm.template.json"  # in the run folder
 SPECIFICATION = "jobtemplate-2023-09"
 FRAMES_A_CHUNK = 16  # where nothing else is asked for
 LAST = "video"  # the step that does all that is left
+# A worker process of its own: one that crashes, or is killed for its memory, costs an attempt at its unit.
+WORKER = ("--executor", "processes", "--workers", "1")
+TIMEOUT_MIN = 60
+CORES = 8  # of a Slurm task: Slurm itself gives one
+TIMEOUTS = 10  # times that a Slurm task is queued again: what it has finished is not done again
+MOST_TASKS = 1001  # of an array, where Slurm's settings say nothing else
+CORE_OPTIONS = frozenset({"cpus_per_task", "slurm_cpus_per_task", "slurm_cpus_per_gpu", "slurm_exclusive"})
+TAIL = 20  # lines of what a task said that are told when it fails
 
 
 def chunks_for(frames: int) -> int:
@@ -76,8 +89,50 @@ def template(folder: Path, chunks: int | None = None) -> dict[str, Any]:
     }
 
 
-def submit(folder: Path, cluster: str, chunks: int | None, options: dict[str, Any]) -> list[str]:
+class Task:
+    """A command line as submitit runs it; one that is out of time, or gives way to others, is queued again.
+
+    Parameters
+    ----------
+    line
+    """
+
+    def __init__(self, line: list[str]) -> None:
+        self.line = line
+
+    def __call__(self) -> None:
+        """Run it, here; what it says goes into the job's logs.
+
+        Raises
+        ------
+        EnfiladeError
+            It failed.
+        """
+        last: deque[str] = deque(maxlen=TAIL)
+        with subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace") as process:  # noqa: S603
+            try:
+                for text in process.stderr or ():
+                    sys.stderr.write(text)
+                    last.append(text)
+            except BaseException:  # submitit ends the job from within a signal
+                process.kill()
+                raise
+        if process.returncode:
+            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {process.returncode}")
+
+    def checkpoint(self) -> Any:
+        """The same again: what is in the run folder is not done again."""
+        import submitit
+
+        return submitit.helpers.DelayedSubmission(self)
+
+
+def submit(
+    folder: Path, cluster: str, chunks: int | None, options: dict[str, Any], tell: Callable[[str], object]
+) -> list[str]:
     """Give a run that was begun to Slurm, step by step, each after the one before.
+
+    A step that fails takes those after it out of the queue.
 
     Parameters
     ----------
@@ -86,19 +141,25 @@ def submit(folder: Path, cluster: str, chunks: int | None, options: dict[str, An
     cluster
         ``slurm``, or ``local``: processes of this machine, one after the other, waited for.
     chunks
-        How many tasks share a step; None: one for each 16 frames.
+        How many tasks share a step; None: one for each 16 frames. Where Slurm takes fewer in an array, they
+        come as several arrays.
     options
-        More parameters of submitit's executor, such as ``slurm_partition`` and ``timeout_min``.
+        More parameters of submitit's executor, such as ``slurm_partition``, ``timeout_min`` and
+        ``cpus_per_task``, which is 8 where none says otherwise.
+    tell
+        Takes a line on each job as soon as it is submitted.
 
     Returns
     -------
     list of str
-        Numbers of the jobs.
+        Numbers of the jobs; of an array, the one that stands for all its tasks.
 
     Raises
     ------
     EnfiladeError
-        submitit is not installed, or a local job failed.
+        submitit is not installed, Slurm refused a job, or a local one failed.
+    SettingsError
+        submitit knows no such parameter.
     RunFolderError
         It holds no run.
     """
@@ -106,23 +167,74 @@ def submit(folder: Path, cluster: str, chunks: int | None, options: dict[str, An
         import submitit
     except ImportError as error:
         raise EnfiladeError("Slurm needs submitit: pip install 'enfilade[farm]'") from error
-    made: list[Any] = []
-    previous: list[Any] = []
+    made: list[str] = []
+    previous: list[str] = []
+    most = 1 if cluster == "local" else _most_tasks()  # one by one: each takes all cores, and memory
     for step in template(folder, chunks)["steps"]:
-        executor = submitit.AutoExecutor(folder=folder / "slurm", cluster=cluster)
-        after = {"dependency": "afterok:" + ":".join(job.job_id for job in previous)} if previous else {}
-        more = {"slurm_additional_parameters": after} if after else {}
-        executor.update_parameters(**{"timeout_min": 60, **options, **more})
-        tasks = [submitit.helpers.CommandFunction(line) for line in _lines(step, folder)]
-        if cluster == "local":
-            for task in tasks:  # one by one: each takes all cores, and memory for a scene
-                made.append(executor.submit(task))
-                _wait(step["name"], made[-1], submitit.core.utils.UncompletedJobError)
-            continue
-        with executor.batch():
-            previous = [executor.submit(task) for task in tasks]
-        made += previous
-    return [job.job_id for job in made]
+        tasks = [Task(line) for line in _lines(step, folder)]
+        groups = [tasks[first : first + most] for first in range(0, len(tasks), most)]
+        ids: list[str] = []
+        for group in groups:
+            executor = _executor(submitit, folder, cluster, options, previous)
+            try:
+                with executor.batch():
+                    jobs = [executor.submit(task) for task in group]
+                ids.append(jobs[0].job_id.partition("_")[0])
+            except RuntimeError as error:  # all that submitit says of sbatch
+                raise EnfiladeError(_refused(step["name"], error, made)) from error
+            made.append(ids[-1])
+            tell(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
+            if cluster == "local":
+                _wait(step["name"], jobs[0], submitit.core.utils.UncompletedJobError)
+        previous = ids
+    return made
+
+
+def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any], previous: list[str]) -> Any:
+    """What takes the tasks of a step, after jobs of the step before."""
+    given = {"timeout_min": TIMEOUT_MIN, **options}
+    timeouts = given.pop("slurm_max_num_timeout", TIMEOUTS)
+    if cluster == "slurm":
+        if not CORE_OPTIONS & given.keys():
+            given["cpus_per_task"] = CORES
+        cores = given.get("slurm_cpus_per_task", given.get("cpus_per_task"))
+        if cores is not None:  # srun doesn't ask sbatch how many
+            given.setdefault("slurm_srun_args", [f"--cpus-per-task={cores}"])
+        more = {"requeue": True, **given.get("slurm_additional_parameters", {})}
+        if previous:
+            more |= {"dependency": "afterok:" + ":".join(previous), "kill-on-invalid-dep": "yes"}
+        given["slurm_additional_parameters"] = more
+    try:
+        executor = submitit.AutoExecutor(
+            folder=folder / "slurm", cluster=cluster, slurm_max_num_timeout=timeouts
+        )
+        executor.update_parameters(**given)
+    except (NameError, ValueError, AssertionError) as error:  # a parameter unknown, or of a wrong type
+        raise SettingsError(f"submitit takes no such --slurm: {error}") from error
+    except RuntimeError as error:
+        raise EnfiladeError(f"submitit: {error}") from error
+    return executor
+
+
+def _refused(step: str, error: Exception, made: list[str]) -> str:
+    numbers = " ".join(made)
+    after = (
+        f"jobs {numbers} are in the queue: they do the steps before; `scancel {numbers}` takes them out"
+        if made
+        else "nothing is in the queue"
+    )
+    return f"step {step!r} could not be submitted: {error}; {after}"
+
+
+def _most_tasks() -> int:
+    """How many tasks Slurm takes in an array."""
+    scontrol = shutil.which("scontrol")
+    if scontrol is None:
+        return MOST_TASKS
+    line = [scontrol, "show", "config"]
+    said = subprocess.run(line, capture_output=True, text=True, check=False).stdout  # noqa: S603
+    found = re.search(r"^MaxArraySize\s*=\s*(\d+)", said, re.MULTILINE)
+    return max(int(found[1]), 1) if found else MOST_TASKS
 
 
 def _wait(step: str, job: Any, uncompleted: type[Exception]) -> None:
@@ -135,7 +247,7 @@ def _wait(step: str, job: Any, uncompleted: type[Exception]) -> None:
 
 
 def _step(name: str, before: list[dict[str, Any]], count: int) -> dict[str, Any]:
-    arguments = ["work", "{{Param.Run}}", "--openjd"]
+    arguments = ["work", "{{Param.Run}}", "--openjd", *WORKER]
     step: dict[str, Any] = {"name": name}
     if before:
         step["dependencies"] = [{"dependsOn": before[-1]["name"]}]

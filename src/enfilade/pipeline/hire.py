@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from enfilade.device import activate, load
 from enfilade.executors.executor import Tell
+from enfilade.executors.resources import cores
 
 
 def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
@@ -17,8 +17,8 @@ def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
     Parameters
     ----------
     spec
-        ``folder`` of the run; ``device``: Dr.Jit's name of it; ``threads``, 0 for one a core; ``share``: see
-        :meth:`~enfilade.executors.Recipe.make`.
+        ``folder`` of the run; ``part``: the share of it that is worked on, None for all; ``device``: Dr.Jit's
+        name of it; ``threads``, 0 for one a core; ``share``: see :meth:`~enfilade.executors.Recipe.make`.
     tell
         Takes reports: ``line`` with a line of the ledger, or a call of a monitor by its name.
 
@@ -34,14 +34,14 @@ def open_worker(spec: Mapping[str, Any], tell: Tell) -> Any:
     DeviceError
     """
     activate("gpu" if spec["device"] == "cuda" else "cpu")
-    load().set_thread_count(spec["threads"] or len(os.sched_getaffinity(0)))
+    load().set_thread_count(spec["threads"] or cores())
     from enfilade.pipeline.job import check_identity, read_job
     from enfilade.pipeline.worker import Worker, smaller
     from enfilade.store import Run
 
     folder = Path(spec["folder"])
     job = read_job(folder)
-    run = Run.joining(folder, lambda line: tell("line", line))
+    run = Run.joining(folder, lambda line: tell("line", line), part=spec["part"])
     check_identity(job, run)
     return Worker(smaller(job, spec["share"]), run, Distant(tell)).do
 

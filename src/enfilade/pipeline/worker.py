@@ -53,7 +53,7 @@ class Worker:
         ValueError
             There is no such kind.
         """
-        self._run.refresh()
+        self._run.keep_up()
         if kind != self._kind and kind in ("antialias", "clip"):
             release_memory()  # of the stages before
         self._kind = kind
@@ -146,6 +146,9 @@ class Worker:
 
     def _line(self, unit: str) -> dict[str, Any]:
         line = self._run.done(unit)
+        if line is None:  # one that another command recorded after this worker began
+            self._run.refresh()
+            line = self._run.done(unit)
         if line is None:
             raise ValueError(f"unit {unit!r} is not finished")
         return line

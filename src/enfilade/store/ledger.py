@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -115,7 +115,12 @@ class Ledger:
         ValueError
             A fact is NaN or infinite, for which JSON has no word.
         """
-        data = sealed(line)
+        return self.extend([line])[0]
+
+    def extend(self, lines: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Add many lines with one write and one flush, all of them or none; see :meth:`append`."""
+        raws = [sealed(line) for line in lines]
+        data = b"".join(raws)
         size = os.fstat(self._handle).st_size
         try:
             _write_all(self._handle, data)
@@ -124,7 +129,7 @@ class Ledger:
             os.ftruncate(self._handle, size)
             raise whole.unwritable(self._file, error) from error
         self._read[self._file] = size + len(data)
-        return self._keep(data)
+        return [self._keep(raw) for raw in raws]
 
     def keep(self, line: Mapping[str, Any]) -> dict[str, Any]:
         """Know a line without writing it; returns it as it would be read again."""

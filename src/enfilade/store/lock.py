@@ -7,18 +7,20 @@ import fcntl
 import json
 import os
 import socket
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from enfilade.errors import RunFolderError
 
-__all__ = ["LOCK_NAME", "Lock", "sign_workers", "writers_of"]
+__all__ = ["LOCK_NAME", "PART_LOCKS", "Lock", "Wait", "sign_workers", "writers_of"]
 
 LOCK_NAME = "run.lock"
 PART_LOCKS = "parts/*.lock"
 SHOWN = 3  # holders named in a message
+
+Wait = Callable[[str], None]  # told who holds a lock before each new try; raises when that took long enough
 
 
 class Lock:
@@ -35,6 +37,9 @@ class Lock:
     part
         Name of a share of the run: those who share it keep away who wants the folder to itself, and others
         of the same name. None: the folder to itself.
+    wait
+        Told who holds it before each new try, and raises to give up: a file server keeps the locks of a host
+        that lost its power for a minute and a half. None: one try.
 
     Attributes
     ----------
@@ -46,16 +51,16 @@ class Lock:
         Another process is writing there, or the folder can't be written.
     """
 
-    def __init__(self, folder: Path, *, part: str | None = None) -> None:
+    def __init__(self, folder: Path, *, part: str | None = None, wait: Wait | None = None) -> None:
         self.is_shared = part is not None
         self._own = self._shared = -1
         try:
             if part is None:
-                self._own = _locked(folder / LOCK_NAME, fcntl.LOCK_EX)
+                self._own = _locked(folder / LOCK_NAME, fcntl.LOCK_EX, wait)
             else:
-                self._shared = _locked(folder / LOCK_NAME, fcntl.LOCK_SH)
+                self._shared = _locked(folder / LOCK_NAME, fcntl.LOCK_SH, wait)
                 os.ftruncate(self._shared, 0)  # who had the folder to itself has gone
-                self._own = _locked(folder / f"parts/{part}.lock", fcntl.LOCK_EX)
+                self._own = _locked(folder / f"parts/{part}.lock", fcntl.LOCK_EX, wait)
             _sign(self._own)
         except BaseException:
             self.release()
@@ -72,7 +77,7 @@ class Lock:
         self._own = self._shared = -1
 
 
-def _locked(file: Path, kind: int) -> int:
+def _locked(file: Path, kind: int, wait: Wait | None) -> int:
     try:
         handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
     except OSError as error:
@@ -80,16 +85,29 @@ def _locked(file: Path, kind: int) -> int:
             f"can't write in {file.parent}: {error.strerror}; choose another --out"
         ) from error
     try:
-        fcntl.flock(handle, kind | fcntl.LOCK_NB)
-    except OSError as error:
+        _hold(handle, kind, file, wait)
+    except BaseException:
         os.close(handle)
-        if not isinstance(error, BlockingIOError):
-            raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
-        raise RunFolderError(
-            f"another command is writing {file.parent}: {_holders(file)}; wait for it, stop it, "
-            "or choose another --out"
-        ) from error
+        raise
     return handle
+
+
+def _hold(handle: int, kind: int, file: Path, wait: Wait | None) -> None:
+    while not _is_had(handle, kind, file):
+        held = f"another command is writing {file.parent}: {_holders(file)}"
+        if wait is None:
+            raise RunFolderError(f"{held}; wait for it, stop it, or choose another --out")
+        wait(held)
+
+
+def _is_had(handle: int, kind: int, file: Path) -> bool:
+    try:
+        fcntl.flock(handle, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
+    return True
 
 
 def writers_of(folder: Path) -> list[dict[str, Any]]:
@@ -109,15 +127,18 @@ def writers_of(folder: Path) -> list[dict[str, Any]]:
     return _living([folder / LOCK_NAME]) or _living(_part_locks(folder))
 
 
-def sign_workers(folder: Path, workers: int) -> None:
+def sign_workers(folder: Path, workers: int, part: str | None = None) -> None:
     """Say in the lock that this process holds how many units it does at once.
 
     Parameters
     ----------
     folder
     workers
+    part
+        Name of the share that it holds, where that is known: a farm has thousands of locks to look through.
     """
-    for file in (*_part_locks(folder), folder / LOCK_NAME):
+    known = [] if part is None else [folder / f"parts/{part}.lock"]
+    for file in known or (*_part_locks(folder), folder / LOCK_NAME):
         name = _signature(file)
         if name is not None and (name["host"], name["pid"]) == (socket.gethostname(), os.getpid()):
             with contextlib.suppress(OSError), file.open("r+b") as stream:  # the name is only to be read

@@ -14,12 +14,12 @@ from enfilade.errors import DamagedFileError, RunFolderError
 from enfilade.store.checksum import checksum, size_of
 from enfilade.store.identity import LEDGER_FILE, RUN_FILE, claim, identity_of, prepare
 from enfilade.store.ledger import Ledger, covered
-from enfilade.store.lock import LOCK_NAME, Lock
+from enfilade.store.lock import LOCK_NAME, Lock, Wait
+from enfilade.store.parts import PARTS, join_parts, part_file, part_files
 
-__all__ = ["KINDS", "Run"]
+__all__ = ["KINDS", "PARTS", "Run"]
 
 KINDS = ("drafts", "keyframes", "cells", "raw", "frames", "clips")
-PARTS = "parts"  # folder of the ledgers of those who share a run
 RESERVED = frozenset({"unit", "files"})  # keys of a ledger line that are ours
 
 Report = Callable[[dict[str, Any]], None]
@@ -38,6 +38,8 @@ class Run:
         What makes the results what they are, as ``run.json`` has it.
     notes : list of str
         What was recovered or removed when the folder was opened, for the user to know.
+    part : str or None
+        Name of the share of the run that this command, or the one that it works for, has; None: all of it.
     """
 
     def __init__(
@@ -48,8 +50,10 @@ class Run:
         *,
         lock: Lock | None = None,
         report: Report | None = None,
+        part: str | None = None,
     ) -> None:
         self.folder = folder
+        self.part = part
         self.identity = identity
         self.notes: list[str] = list(ledger.notes)
         self._lock = lock
@@ -86,7 +90,7 @@ class Run:
                 notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
             ledger = Ledger(folder / LEDGER_FILE, writable=True)
             ledger.begin(checksum(folder / RUN_FILE))
-            _join_parts(folder, ledger)
+            join_parts(folder, ledger)
             run = cls(folder, wanted, ledger, lock=lock)
         except BaseException:
             lock.release()
@@ -111,11 +115,11 @@ class Run:
         """
         identity = identity_of(folder)
         ledger = Ledger(folder / LEDGER_FILE, writable=False, is_lenient=is_lenient)
-        ledger.read_on(*_parts(folder))
+        ledger.read_on(*part_files(folder))
         return cls(folder, identity, ledger)
 
     @classmethod
-    def joining(cls, folder: Path, report: Report) -> Self:
+    def joining(cls, folder: Path, report: Report, *, part: str | None = None) -> Self:
         """Work on a run that another process writes: what is finished is reported to that one.
 
         Parameters
@@ -123,16 +127,21 @@ class Run:
         folder
         report
             Takes the ledger line of a finished unit.
+        part
+            The share that the other process has, if it shares the run.
 
         Raises
         ------
         RunFolderError
             It holds no run, or is damaged.
         """
-        return cls(folder, identity_of(folder), Ledger(folder / LEDGER_FILE, writable=False), report=report)
+        identity = identity_of(folder)
+        ledger = Ledger(folder / LEDGER_FILE, writable=False)
+        ledger.read_on(*part_files(folder))
+        return cls(folder, identity, ledger, report=report, part=part)
 
     @classmethod
-    def sharing(cls, folder: Path, part: str) -> Self:
+    def sharing(cls, folder: Path, part: str, *, wait: Wait | None = None) -> Self:
         """Work on a run together with other commands, on a folder that all of them see.
 
         What is finished goes into a ledger of its own, ``parts/NAME.jsonl``, which the next command that has
@@ -143,6 +152,8 @@ class Run:
         folder
         part
             Name of this command's share, which no other has at the same time.
+        wait
+            See :class:`~enfilade.store.lock.Lock`.
 
         Raises
         ------
@@ -150,13 +161,13 @@ class Run:
             It holds no run, or is damaged; one command has it to itself, or another the same share.
         """
         identity = identity_of(folder)
-        file = folder / PARTS / f"{part}.jsonl"
+        file = part_file(folder, part)
         file.parent.mkdir(exist_ok=True)
-        lock = Lock(folder, part=part)
+        lock = Lock(folder, part=part, wait=wait)
         try:
             ledger = Ledger(file, writable=True)
-            ledger.read_on(folder / LEDGER_FILE, *_parts(folder))
-            return cls(folder, identity, ledger, lock=lock)
+            ledger.read_on(folder / LEDGER_FILE, *part_files(folder))
+            return cls(folder, identity, ledger, lock=lock, part=part)
         except BaseException:
             lock.release()
             raise
@@ -167,8 +178,14 @@ class Run:
         return self._lock is not None and not self._lock.is_shared
 
     def refresh(self) -> None:
-        """Read what other processes have finished since."""
-        self._ledger.read_on(self.folder / LEDGER_FILE, *_parts(self.folder))
+        """Read what all others have finished since: on a farm, from thousands of ledgers."""
+        self._ledger.read_on(self.folder / LEDGER_FILE, *part_files(self.folder))
+
+    def keep_up(self) -> None:
+        """Read what the command for which this run was joined has recorded since, from its one ledger."""
+        if self._report is not None:
+            own = LEDGER_FILE if self.part is None else part_file(self.folder, self.part)
+            self._ledger.read_on(self.folder / own)
 
     def __enter__(self) -> Self:
         return self
@@ -211,6 +228,10 @@ class Run:
         ):
             return None
         return line
+
+    def was_finished(self, unit: str) -> bool:
+        """Whether a unit was finished once, also where its files don't stand any more."""
+        return self._ledger.get(unit) is not None
 
     def finish(self, unit: str, *, files: Sequence[Path], facts: Mapping[str, Any]) -> None:
         """Record a unit as finished: a line in the ledger that stays when this returns.
@@ -267,15 +288,20 @@ class Run:
             It is missing, damaged, or not on record.
         """
         name = self._relative(file)
+        if self._is_right(name):
+            return
+        if self._is_one_of_many:  # whose line of it this one may not have read
+            self.refresh()
+            if self._is_right(name):
+                return
         line = self._ledger.writer(name)
         if line is None:
             raise DamagedFileError(f"{file} is in no ledger line: it was not finished; delete it", name)
-        if not self._is_sound(name, line):
-            raise DamagedFileError(
-                f"{file} isn't what unit {line['unit']!r} wrote: it is missing or damaged; delete it and run "
-                "the same command again",
-                name,
-            )
+        raise DamagedFileError(
+            f"{file} isn't what unit {line['unit']!r} wrote: it is missing or damaged; delete it and run "
+            "the same command again",
+            name,
+        )
 
     def damaged(self) -> list[str]:
         """Compare every file with its checksum; names of those that are missing or damaged, in order."""
@@ -283,6 +309,8 @@ class Run:
 
     def forget(self, name: str) -> None:
         """Remove a damaged file, so that its unit counts as not done.
+
+        One that another command, with which the run is shared, has made again meanwhile stays.
 
         Parameters
         ----------
@@ -297,6 +325,10 @@ class Run:
         file = self.folder / name
         if not file.parent.resolve().is_relative_to(self.folder.resolve()):
             raise RunFolderError(f"{file} lies outside the run folder: a link leads there; remove the link")
+        if self._is_one_of_many:
+            self.refresh()
+            if self._is_right(name):
+                return
         try:
             file.unlink(missing_ok=True)
         except OSError as error:
@@ -325,24 +357,18 @@ class Run:
             raise ValueError(f"{name!r} is no name for a file of the caller's")
         write_json(self.folder / name, value)
 
+    @property
+    def _is_one_of_many(self) -> bool:
+        """Whether other commands write in the run, too, or the one that it was joined for."""
+        return self._report is not None or (self._lock is not None and self._lock.is_shared)
+
+    def _is_right(self, name: str) -> bool:
+        line = self._ledger.writer(name)
+        return line is not None and self._is_sound(name, line)
+
     def _is_sound(self, name: str, line: Mapping[str, Any]) -> bool:
         file, record = self.folder / name, line["files"][name]
         return bool(size_of(file) == record["bytes"] and checksum(file) == record)
 
     def _relative(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix()
-
-
-def _parts(folder: Path) -> list[Path]:
-    return sorted((folder / PARTS).glob("*.jsonl"))
-
-
-def _join_parts(folder: Path, ledger: Ledger) -> None:
-    """Take over the lines of those who shared the run."""
-    for file in _parts(folder):
-        part = Ledger(file, writable=True)
-        ledger.notes.extend(part.notes)
-        for line in part:
-            ledger.append(line)
-        part.close()
-        file.unlink()
