@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from enfilade.backends.scenefile import MB, SceneFile
-from enfilade.codec.pictures import PICTURES, picture_pixels
+from enfilade.backends.headers import check_volume, mesh_elements, pixels
+from enfilade.backends.scenefile import MB, Name, SceneFile, as_loaded
 from enfilade.errors import ImageError, SceneError
 from enfilade.settings import LimitSettings
 
@@ -22,8 +22,9 @@ __all__ = ["check_scene"]
 PLUGIN = re.compile(r"[a-z0-9_]+")
 FILM = ("width", "height", "crop_width", "crop_height")
 MILLION = 1_000_000
-MESH_HEADER = 1 << 16  # bytes in which the header of a PLY mesh must end
-FACE_BYTES, VERTEX_BYTES = 4, 6  # least that one takes in a binary file
+BLENDER = "blender"  # a plugin that is given addresses in memory, where Blender keeps a mesh
+PLY_READERS = ("ply", "ellipsoids", "ellipsoidsmesh")
+LEAST_BYTES = {"vertex": 6, "face": 4}  # that one takes in a PLY mesh
 
 
 def check_scene(scene: Path, limits: LimitSettings) -> list[Path]:
@@ -48,92 +49,96 @@ def check_scene(scene: Path, limits: LimitSettings) -> list[Path]:
         and the setting.
     """
     roots = [scene.resolve().parent, *(Path(p).resolve() for p in limits.allow.split(os.pathsep) if p)]
-    inspector = _Inspector(SceneFile(scene), roots, limits)
-    inspector.inspect()
+    inspector = _Inspector(roots, limits)
+    for name in as_loaded(scene):
+        inspector.inspect(SceneFile(name))
     return list(inspector.files)
 
 
 @dataclass(eq=False)
 class _Inspector:
-    scene: SceneFile
     roots: list[Path]
     limits: LimitSettings
     files: dict[Path, None] = field(default_factory=dict)
+    meshes: set[Path] = field(default_factory=set)  # that have been looked at as such
+    _of_mesh: set[Element] = field(default_factory=set)  # strings within shapes that read PLY
+    _sides: dict[Element, list[int]] = field(default_factory=dict)  # of the film that a number belongs to
 
-    def inspect(self) -> None:
-        """Check the scene file and all that it names; what it includes, before that is read."""
-        for file, element in self.scene.elements():
+    def inspect(self, scene: SceneFile) -> None:
+        """Check a scene file and all that it names; what it includes, before that is read."""
+        for file, element, names in scene.elements():
             self._check_plugin(file, element)
             self._check_film(file, element)
-            for name in self.scene.names(file, element):
-                self._check_file(file, name)
+            for name in names:
+                self._check_file(name)
+        for element, name in scene.strings():
+            self._check_file(name, is_mesh=element in self._of_mesh)
 
     def _check_plugin(self, file: Path, element: Element) -> None:
         kind = element.get("type")
-        if kind is not None and not PLUGIN.fullmatch(self.scene.filled(file, kind)):
+        if kind is not None and not PLUGIN.fullmatch(kind):
             raise SceneError(f"{file}: <{element.tag} type={kind!r}> is no name of a plugin")
+        if kind == BLENDER:
+            raise SceneError(f"{file}: only Blender itself can give a shape of type {kind!r} what it reads")
+        if kind in PLY_READERS:
+            self._of_mesh.update(element)
 
     def _check_film(self, file: Path, element: Element) -> None:
-        if element.tag != "film":
-            return
-        sides = [1, 1]
-        for child in element.iter("integer"):
-            if child.get("name") in FILM:
-                text = self.scene.filled(file, child.get("value", ""))
-                if not re.fullmatch(r"\s*[0-9]{1,9}\s*", text):
-                    raise SceneError(
-                        f"{file}: a film's {child.get('name')} is {text!r}, not a number of pixels"
-                    )
-                side = FILM.index(str(child.get("name"))) % 2
-                sides[side] = max(sides[side], int(text))
-        self._bound(sides[0] * sides[1] / MILLION, "megapixels", f"{file}: a film", "million pixels")
+        if element.tag == "film":
+            sides = [1, 1]
+            self._sides.update((child, sides) for child in element)
+        name = _snake_case(element.get("name", ""))
+        if element in self._sides and name in FILM:
+            text = element.get("value", "")
+            if not re.fullmatch(r"\s*[0-9]{1,9}\s*", text):
+                raise SceneError(f"{file}: a film's {name} is {text!r}, not a number of pixels")
+            sides = self._sides[element]
+            sides[FILM.index(name) % 2] = max(sides[FILM.index(name) % 2], int(text))
+            self._bound(sides[0] * sides[1] / MILLION, "megapixels", f"{file}: a film", "million pixels")
 
-    def _check_file(self, file: Path, name: str) -> None:
+    def _check_file(self, name: Name, *, is_mesh: bool = False) -> None:
         try:
-            place = self.scene.place(file, name).resolve()
+            place = name.place.resolve()
         except (OSError, ValueError, RuntimeError) as error:  # links in a circle, a NUL
-            raise SceneError(f"{file} names a file that can't be looked for: {name!r} ({error})") from error
+            raise SceneError(
+                f"{name.file} names a file that can't be looked for: {name.text!r} ({error})"
+            ) from error
         if not any(place.is_relative_to(root) for root in self.roots):
             raise SceneError(
-                f"{file} names {name!r}, which leads to {place}, outside the scene's folder; "
+                f"{name.file} names {name.text!r}, which leads to {place}, outside the scene's folder; "
                 f"allow it with --allow {place.parent}"
             )
         if place.is_file():
-            if place not in self.files:
-                self.files[place] = None
-                self._check_size(place)
-        elif place.exists() and not place.is_dir():
-            raise SceneError(f"{file} names {name!r}, which is no ordinary file")
-
-    def _check_size(self, file: Path) -> None:
-        size = file.stat().st_size
-        self._bound(size / MB, "file_mb", str(file), "MB")
-        suffix = file.suffix.lower()
-        if suffix in PICTURES:
             try:
-                pixels = picture_pixels(file)
+                self._check_size(place, is_mesh=is_mesh or place.suffix.lower() == ".ply")
+            except OSError as error:
+                raise SceneError(f"can't read {place}: {error.strerror}") from error
+        elif place.exists() and not place.is_dir():
+            raise SceneError(f"{name.file} names {name.text!r}, which is no ordinary file")
+
+    def _check_size(self, file: Path, *, is_mesh: bool) -> None:
+        if file not in self.files:
+            self.files[file] = None
+            self._bound(file.stat().st_size / MB, "file_mb", str(file), "MB")
+            try:
+                self._bound(pixels(file) / MILLION, "megapixels", str(file), "million pixels")
             except ImageError as error:
                 raise SceneError(str(error)) from error
-            self._bound(pixels / MILLION, "megapixels", str(file), "million pixels")
-        elif suffix == ".ply":
-            self._check_ply(file, size)
-
-    def _check_ply(self, file: Path, size: int) -> None:
-        with file.open("rb") as raw:
-            header, end, _ = raw.read(MESH_HEADER).partition(b"end_header")
-        if not header.startswith(b"ply") or not end:
-            raise SceneError(f"{file} is no PLY mesh, or its header is damaged")
-        for name, least in ((b"vertex", VERTEX_BYTES), (b"face", FACE_BYTES)):
-            found = re.search(rb"element\s+" + name + rb"\s+([0-9]{1,18})\s", header)
-            count = int(found[1]) if found else 0
-            self._bound(count / MILLION, "elements_m", str(file), f"million elements ({name.decode()})")
-            if count * least > size:
-                raise SceneError(
-                    f"{file} says that it has {count} of {name.decode()}, but is too short for it"
-                )
+            check_volume(file)
+        if is_mesh and file not in self.meshes:
+            self.meshes.add(file)
+            for kind, count in mesh_elements(file).items():
+                self._bound(count / MILLION, "elements_m", str(file), f"million elements ({kind})")
+                if count * LEAST_BYTES.get(kind, 0) > file.stat().st_size:
+                    raise SceneError(f"{file} says that it has {count} of {kind}, but is too short for it")
 
     def _bound(self, value: float, setting: str, what: str, unit: str) -> None:
         most = getattr(self.limits, setting)
         if value > most:
             flag = f"--limits-{setting.replace('_', '-')}"
             raise SceneError(f"{what} has {value:.6g} {unit}; at most {most} are taken: raise {flag}")
+
+
+def _snake_case(name: str) -> str:
+    """The name of a property as Mitsuba reads it in scenes of versions below 2: ``cropWidth``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import parse
+from defusedxml.ElementTree import DefusedXMLParser, parse
 
+from enfilade.backends.parameters import Parameters
 from enfilade.errors import SceneError
 
-__all__ = ["SceneFile", "fingerprint"]
+__all__ = ["Demands", "Name", "SceneFile", "as_loaded", "fingerprint"]
 
-PARAMETER = re.compile(r"\$(\w+)")
 MB = 1_000_000
 XML_MB = 256  # of a scene file itself: meshes stand in files of their own
-DEEPEST = 16  # includes within includes, and parameters within parameters
+DEEPEST = 16  # includes within includes
+DECLARATION = 4096  # bytes in which <?xml ... ?> must end
+ENCODING = re.compile(rb"encoding\s*=\s*[\"']([^\"']*)")
+ENCODINGS = (b"utf-8", b"utf8", b"us-ascii", b"ascii")
 ADVICE = {  # by the suffix of what is no scene
     ".blend": "is Blender's own file; export it with the mitsuba-blender add-on (File > Export > Mitsuba) "
     "and give the XML that it writes: docs/camera-paths.md",
@@ -27,11 +31,51 @@ ADVICE = {  # by the suffix of what is no scene
 }
 
 
+@dataclass(frozen=True)
+class Name:
+    """A file's name in a scene.
+
+    Parameters
+    ----------
+    file
+        The XML file that names it.
+    text
+        The name, its parameters filled in.
+    place
+        Where Mitsuba finds it; beside the scene where it finds nothing.
+    """
+
+    file: Path
+    text: str
+    place: Path
+
+
+@dataclass(frozen=True)
+class Demands:
+    """All that a scene asks for.
+
+    Parameters
+    ----------
+    files
+        XML files: the scene and what it includes, links followed.
+    plugins
+        Their names.
+    strings
+        Name and value of each ``<string>``.
+    """
+
+    files: frozenset[Path]
+    plugins: frozenset[str]
+    strings: frozenset[tuple[str, str]]
+
+
 class SceneFile:
     """A scene file and those that it includes, as Mitsuba's parser takes them.
 
     Names of files are looked for in the folders that ``<path>`` gives, the last one first, then beside the
-    scene, also where an included file names them, and then in the working directory.
+    scene, also where an included file names them, and then in the working directory. Includes are looked
+    for beside the file that has them before all else, and, as files of spectra, only in folders that a
+    ``<path>`` has given before.
 
     Parameters
     ----------
@@ -40,93 +84,132 @@ class SceneFile:
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        self._parameters: dict[str, str] = {}
+        self._parameters = Parameters()
         self._folders = [file.parent]
+        self._strings: list[tuple[Path, Element]] = []
 
-    def elements(self) -> Iterator[tuple[Path, Element]]:
-        """All elements, each with the file that it stands in; those of an include after the include itself.
+    def elements(self) -> Iterator[tuple[Path, Element, list[Name]]]:
+        """All elements, parameters filled in, those of an include after the include itself.
+
+        To be gone through once. An included file is not looked at before its ``<include>`` has been given.
+
+        Yields
+        ------
+        tuple
+            The XML file, the element, and names of the files that Mitsuba reads as soon as it comes to it.
 
         Raises
         ------
         SceneError
-            A file can't be read or is malformed. The message names it.
+            A file can't be read or is malformed; a parameter has no value. The message names the file.
         """
-        return self._elements(self.file, depth=0)
+        return self._elements(self.file, self._folders, depth=0)
 
-    def names(self, file: Path, element: Element) -> Iterator[str]:
-        """Names of files in an element of a file; of its other strings, those that lead to one that is there.
+    def strings(self) -> Iterator[tuple[Element, Name]]:
+        """Names of files in strings, which Mitsuba looks for when it has read all elements; so after them.
+
+        Strings with the name ``filename``, and others that lead to a file that is there.
 
         Raises
         ------
         SceneError
-            A parameter has no value.
+            No file can have that name.
         """
-        for key, value in element.attrib.items():
-            is_string = element.tag == "string" and key == "value"
-            is_name = key == "filename" or (element.tag == "path" and key == "value")
-            is_named = is_string and (element.get("name") == "filename" or self._leads_to_one(file, value))
-            if is_name or is_named:
-                yield value
+        for file, element in self._strings:
+            value = element.get("value", "")
+            if element.get("name") == "filename" or self._leads_to_one(value):
+                yield element, self._name(file, value, self._folders)
 
-    def place(self, file: Path, name: str) -> Path:
-        """Where Mitsuba finds what an element of a file names; beside the scene where it finds nothing.
+    def demands(self) -> Demands:
+        """Read all, instead of going through the elements.
 
         Raises
         ------
         SceneError
-            A parameter has no value, or no file can have that name.
+            See :meth:`elements`.
         """
-        filled = self.filled(file, name)
-        places = [folder / filled for folder in (*self._folders, Path())]
+        files, plugins = set(), {"scene"}
+        for file, element, _ in self.elements():
+            files.add(file.resolve())
+            plugins.add(element.get("type", "scene"))
+        strings = frozenset((e.get("name", ""), e.get("value", "")) for _, e in self._strings)
+        return Demands(frozenset(files), frozenset(plugins), strings)
+
+    def _elements(
+        self, file: Path, folders: list[Path], depth: int
+    ) -> Iterator[tuple[Path, Element, list[Name]]]:
+        if depth > DEEPEST:
+            raise SceneError(f"{file} includes files that include files, more than {DEEPEST} deep")
+        for element in _parsed(file).iter():
+            self._fill(file, element)
+            # A name without a folder has no parent for Mitsuba.
+            beside = [file.parent, *folders] if file.parent != Path() else [*folders]
+            names = []
+            match element.tag:
+                case "include":
+                    names = [self._name(file, element.get("filename", ""), beside)]
+                case "path" if depth:
+                    raise SceneError(
+                        f"{file}: Mitsuba does not look in the <path> of an included file; give it in "
+                        f"{self.file}"
+                    )
+                case "path":
+                    names = [self._name(file, element.get("value", ""), [file.parent, *folders])]
+                case "string":
+                    self._strings.append((file, element))
+                case _ if "filename" in element.attrib:
+                    names = [self._name(file, element.get("filename", ""), folders)]
+            yield file, element, names
+            match element.tag:
+                case "include":
+                    yield from self._elements(names[0].place, beside, depth + 1)
+                case "path":
+                    self._folders.insert(0, names[0].place)
+                case "default":
+                    self._define(file, element)
+
+    def _fill(self, file: Path, element: Element) -> None:
+        if "}" in element.tag or any("}" in key for key in element.attrib):
+            raise SceneError(f"{file} has namespaces, which Mitsuba does not know")
         try:
-            return next((place for place in places if place.exists()), self.file.parent / filled)
+            for key, text in element.attrib.items():
+                element.set(key, self._parameters.filled(text))
+        except ValueError as error:
+            raise SceneError(f"{file}: {error}") from error
+
+    def _define(self, file: Path, element: Element) -> None:
+        try:
+            self._parameters.define(element.get("name", ""), element.get("value", ""))
+        except ValueError as error:
+            raise SceneError(f"{file} has {error}") from error
+
+    def _name(self, file: Path, text: str, folders: Sequence[Path]) -> Name:
+        places = [folder / text for folder in (*folders, Path.cwd())]
+        try:
+            return Name(file, text, next((p for p in places if p.exists()), self.file.parent / text))
         except OSError as error:
-            raise SceneError(f"{file} names a file that can't be looked for: {name!r} ({error})") from error
+            raise SceneError(f"{file} names a file that can't be looked for: {text!r} ({error})") from error
 
-    def filled(self, file: Path, text: str) -> str:
-        """Text of an element of a file with the defaults of its parameters, as Mitsuba fills them in.
-
-        Raises
-        ------
-        SceneError
-            One has none.
-        """
-        for _ in range(DEEPEST):
-            if "$" not in text:
-                return text
-            text = PARAMETER.sub(lambda found: self._parameters.get(found[1], "\0"), text)
-            if "\0" in text:
-                break
-        raise SceneError(f"{file}: a parameter of {text!r} has no <default>")
-
-    def _elements(self, file: Path, depth: int) -> Iterator[tuple[Path, Element]]:
-        root = _parsed(file)
-        for element in root.iter("default"):
-            self._parameters.setdefault(element.get("name", ""), element.get("value", ""))
-        for element in root.iter("path"):
-            if depth:
-                raise SceneError(
-                    f"{file}: Mitsuba does not look in the <path> of an included file; give it in {self.file}"
-                )
-            self._folders.insert(0, self.place(file, element.get("value", "")))
-        for element in root.iter():
-            yield file, element
-            if element.tag == "include":
-                if depth == DEEPEST:
-                    raise SceneError(f"{file} includes files that include files, more than {DEEPEST} deep")
-                yield from self._elements(self.place(file, element.get("filename", "")), depth + 1)
-
-    def _leads_to_one(self, file: Path, value: str) -> bool:
+    def _leads_to_one(self, value: str) -> bool:
         # Not in the working directory: any word may be the name of something there.
-        filled = self.filled(file, value)
         try:
-            return any((folder / filled).exists() for folder in self._folders)
+            return any((folder / value).exists() for folder in self._folders)
         except OSError:  # too long: no file's name
             return False
 
 
+def as_loaded(scene: Path) -> list[Path]:
+    """Names by which a scene is loaded: as it is, and by worker processes as a whole path, links followed.
+
+    It is one where Mitsuba finds the same files by both.
+    """
+    whole = scene.resolve()
+    is_same = scene.parent != Path() and scene.parent.resolve() / scene.name == whole
+    return [scene] if is_same else [scene, whole]
+
+
 def fingerprint(scene: Path) -> str:
-    """SHA-256 over a scene file and every file that it names, in the order in which they are named.
+    """SHA-256 over a scene file and every file that it names: what Mitsuba reads first, then the rest.
 
     Raises
     ------
@@ -135,9 +218,9 @@ def fingerprint(scene: Path) -> str:
     """
     read = SceneFile(scene)
     files = {scene: None}
-    for file, element in read.elements():
-        for name in read.names(file, element):
-            files[read.place(file, name)] = None
+    for _, _, names in read.elements():
+        files.update((name.place, None) for name in names)
+    files.update((name.place, None) for _, name in read.strings())
     digest = hashlib.sha256()
     for file in files:
         if file.is_file():
@@ -155,13 +238,30 @@ def _parsed(file: Path) -> Element:
             raise SceneError(f"{file} {advice}")
         if size > XML_MB * MB:
             raise SceneError(f"{file} has {size / MB:.0f} MB; a scene file may have {XML_MB}")
-        root: Element = parse(file, forbid_dtd=True).getroot()
+        with file.open("rb") as raw:
+            _check_encoding(file, raw.read(DECLARATION))
+            raw.seek(0)
+            # Whatever it declares: Mitsuba knows few encodings, and takes all others to be UTF-8.
+            parser = DefusedXMLParser(encoding="utf-8", forbid_dtd=True)
+            root: Element = parse(raw, parser).getroot()
     except OSError as error:
         raise SceneError(f"can't read the scene {file}: {error.strerror}") from error
     except ParseError as error:
         raise SceneError(f"{file} is not well-formed XML: {error}") from error
     except DefusedXmlException as error:
         raise SceneError(f"{file} has a document type or entities, which scenes have no need of") from error
-    except (ValueError, LookupError) as error:  # an encoding that nobody knows
+    except ValueError as error:
         raise SceneError(f"{file} can't be read as XML: {error}") from error
     return root
+
+
+def _check_encoding(file: Path, start: bytes) -> None:
+    if b"\0" in start[:4]:  # of UTF-16 or UTF-32, with a mark before it or without
+        raise SceneError(f"{file} is XML in the encoding 'utf-16', or none; save it as UTF-8")
+    declaration, end, _ = start.removeprefix(b"\xef\xbb\xbf").partition(b"?>")
+    if not declaration.startswith(b"<?xml"):
+        return
+    found = ENCODING.search(declaration)
+    if not end or (found and found[1].lower() not in ENCODINGS):
+        name = found[1].decode(errors="replace") if found else "?"
+        raise SceneError(f"{file} is XML in the encoding {name!r}; save it as UTF-8")
