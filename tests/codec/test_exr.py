@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -199,3 +200,9 @@ def test_what_a_killed_process_left_is_swept(tmp_path):
     left.write_bytes(b"x")
     assert sweep(tmp_path) == [left]
     assert [f.name for f in (tmp_path / "sub").iterdir()] == ["a.exr"]
+
+
+def test_a_rate_is_a_rational(tmp_path):
+    rate = Fraction(24000, 1001)
+    write_exr(tmp_path / "a.exr", {"Z": np.zeros((2, 3), np.float32)}, attributes={"framesPerSecond": rate})
+    assert read_attributes(tmp_path / "a.exr") == {"framesPerSecond": rate}

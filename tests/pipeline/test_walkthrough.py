@@ -23,7 +23,7 @@ from enfilade.records import CameraPath, Source, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.store import Run
 from keyframes_analytic import psnr
-from scenes_analytic import room, room_walk, slide, wall
+from scenes_analytic import ball, room, room_walk, slide, wall
 from small_runs import colors, frame_bytes, job_of, part_of, rendered, units, with_cut
 
 PATH = part_of(room_walk(30), range(13))
@@ -446,3 +446,13 @@ def test_a_scene_is_tried_before_its_run_begins_also_where_its_folder_is_there(t
     prepare(job, tmp_path / "run", is_tried=True)
     prepare(job, tmp_path / "run", is_tried=True)
     assert tried == [False, True, False]
+
+
+def test_the_sky_is_far_in_the_depth_that_is_delivered(tmp_path):
+    job = job_of(tmp_path, ball(), slide(2), output={"layers": "Z,item"})
+    _, folder = rendered(tmp_path, job)
+    layers = read_exr(folder / "frames" / "0001.exr")
+    is_sky = layers["item"] == 0
+    assert is_sky.any()
+    assert layers["Z"][is_sky].min() > 9e9
+    assert 0.0 < layers["Z"][~is_sky].min() < layers["Z"][~is_sky].max() < 10.0

@@ -12,6 +12,7 @@ import functools
 import os
 import sys
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def write_exr(
     file: Path,
     layers: Mapping[str, Array],
     *,
-    attributes: Mapping[str, str | float | int] | None = None,
+    attributes: Mapping[str, str | float | int | Fraction] | None = None,
     is_portable: bool = False,
 ) -> None:
     """Write layers as one OpenEXR file of scan lines: the same input, the same bytes.
@@ -54,7 +55,8 @@ def write_exr(
     layers : mapping of str to (H, W), (H, W, 2) or (H, W, 3) float16, float32 or uint32
         All of one size. The dtype is kept: half, float or uint. ``""`` is ``RGB``.
     attributes
-        Of the header. Numbers lose what does not fit in 32 bits; a string keeps everything.
+        Of the header. Numbers lose what does not fit in 32 bits; a string keeps everything. A fraction is a
+        rational, as ``framesPerSecond`` has to be.
     is_portable
         Packed by PXR24, which every program reads: floats are rounded to 16 significant bits, half floats and
         integers stay what they are. Otherwise exactly, by HTJ2K, in half the time of ZIP, but

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -187,7 +188,7 @@ def write_result(
     color: F32,
     layers: Mapping[str, Array],
     *,
-    attributes: Mapping[str, str | float | int] | None = None,
+    attributes: Mapping[str, str | float | int | Fraction] | None = None,
 ) -> None:
     """Write a delivered frame, in formats that other programs read.
 

@@ -22,7 +22,9 @@ from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import F32, U8, Frame, Source
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.video import encode_video, join_videos, video_suffix
+from enfilade.video import encode_video, exact_fps, join_videos, video_suffix
+
+BEYOND = 1e10  # depth of the sky
 
 
 def result_unit(workshop: Workshop, frame: int) -> str:
@@ -161,7 +163,7 @@ def write_frame_result(workshop: Workshop, frame: int, view: View, made: Frame, 
             file,
             made.color,
             delivered_layers(chosen, view, made.source),
-            attributes={"framesPerSecond": float(workshop.job.path.fps)},
+            attributes={"framesPerSecond": exact_fps(workshop.job.path.fps)},
         )
     workshop.finish(
         result_unit(workshop, frame),
@@ -175,12 +177,13 @@ def write_frame_result(workshop: Workshop, frame: int, view: View, made: Frame, 
 def delivered_layers(chosen: Container[str], view: View, source: U8) -> dict[str, Any]:
     """Layers of a delivered frame, those of ``settings.LAYERS`` that are chosen.
 
-    ``Z`` and ``P`` are in scene units, in the world; ``forward`` and ``backward`` in pixels per frame, x
-    right, y down; ``item`` and ``source`` (``records.Source``) are unsigned integers.
+    ``Z``, along the optical axis, and ``P``, in the world, are in scene units; where nothing is hit, ``Z`` is
+    :data:`BEYOND`, as Blender has it. ``forward`` and ``backward`` are in pixels per frame, x right, y down;
+    ``item`` (0 where nothing is hit) and ``source`` (``records.Source``) are unsigned integers.
     """
     geometry = view.geometry
     layers: dict[str, Callable[[], Any]] = {
-        "Z": lambda: geometry.depth,
+        "Z": lambda: np.where(geometry.is_hit, geometry.depth, np.float32(BEYOND)),
         "P": lambda: positions(geometry),
         "N": lambda: geometry.normal,
         "albedo": lambda: geometry.albedo,
