@@ -1,5 +1,7 @@
 """The choice of a device, and that nothing heavy is loaded before it."""
 
+import ctypes
+import os
 import subprocess
 import sys
 
@@ -8,6 +10,7 @@ import pytest
 
 from enfilade.device import activate
 from enfilade.errors import DeviceError
+from enfilade.pipeline.installation import examine
 
 HEAVY = ("mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "trimesh", "shapely", "PyOpenColorIO")
 
@@ -21,7 +24,12 @@ def test_the_lower_floors_load_nothing_heavy(module):
     assert done.stdout.split() == []
 
 
-def pretend(monkeypatch, *, llvm, cuda=False, version=(19, 1, 7)):
+def pretend(monkeypatch, *, llvm, cuda=False, optix=True, version=(19, 1, 7)):
+    def library(name):
+        if not optix:
+            raise OSError(f"{name}: cannot open shared object file")
+
+    monkeypatch.setattr(ctypes, "CDLL", library)
     has = {dr.JitBackend.LLVM: llvm, dr.JitBackend.CUDA: cuda}
     monkeypatch.setattr(dr, "has_backend", has.__getitem__)
     monkeypatch.setattr(dr.detail, "llvm_version", lambda: version)
@@ -60,3 +68,42 @@ def test_a_gpu_is_taken_unless_the_cpu_is_asked_for(monkeypatch):
     assert activate("auto").variant == activate("gpu").variant == "cuda_ad_rgb"
     assert activate("cpu").version == (19, 1, 7)
     assert chosen == ["cuda", "cuda", "llvm"]
+
+
+def test_a_gpu_that_can_not_trace_rays_is_not_taken(monkeypatch):
+    chosen = pretend(monkeypatch, llvm=True, cuda=True, optix=False)
+    device = activate("auto")
+    assert device.variant == "llvm_ad_rgb"
+    assert "libnvoptix" in device.note
+    assert activate("cpu").note == ""
+    with pytest.raises(DeviceError, match=r"libnvoptix.*NVIDIA_DRIVER_CAPABILITIES=all.*--device cpu"):
+        activate("gpu")
+    assert chosen == ["llvm", "llvm"]
+    gpu = next(check for check in examine() if check.name == "NVIDIA GPU")
+    assert not gpu.is_ok
+    assert not gpu.is_required
+
+
+@pytest.mark.parametrize("before", [None, "1,3"])
+def test_a_run_on_the_cpu_keeps_off_the_gpus_and_its_children_need_not(before):
+    code = """
+import builtins, os
+from enfilade.device import activate
+own = builtins.__import__
+def spy(name, *rest, **more):
+    if name == "drjit":
+        print("seen", os.environ.get("CUDA_VISIBLE_DEVICES"))
+    return own(name, *rest, **more)
+builtins.__import__ = spy
+activate("cpu")
+builtins.__import__ = own
+print("after", os.environ.get("CUDA_VISIBLE_DEVICES"))
+"""
+    variables = {k: v for k, v in os.environ.items() if k != "CUDA_VISIBLE_DEVICES"}
+    variables |= {} if before is None else {"CUDA_VISIBLE_DEVICES": before}
+    done = subprocess.run(  # noqa: S603
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=variables
+    )
+    lines = done.stdout.splitlines()
+    assert lines[0] == "seen "
+    assert lines[-1] == f"after {before}"

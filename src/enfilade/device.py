@@ -5,7 +5,12 @@ The choice is made once, before the first kernel: Dr.Jit binds its array types a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from enfilade.errors import DeviceError
@@ -13,6 +18,12 @@ from enfilade.errors import DeviceError
 LLVM_MINIMUM = 16  # 14 and 15 abort inside the compiler on some of Mitsuba's kernels
 INSTALL_LLVM = "install it with: sudo apt-get install libllvm19 (any LLVM from 16 on will do)"
 INSTALL_LIBRARIES = "the library that it misses is most likely had by: sudo apt-get install libatomic1"
+
+NO_GPU = "no usable NVIDIA GPU on this machine"
+NO_OPTIX = (
+    "the NVIDIA driver's library for ray tracing, {}, is not here; in a container, "
+    "NVIDIA_DRIVER_CAPABILITIES=all brings it, else a newer driver"
+)
 
 Choice = Literal["auto", "cpu", "gpu"]
 
@@ -29,11 +40,14 @@ class Device:
         Mitsuba's name of the matching variant.
     version : tuple of int
         Version of LLVM, or of CUDA.
+    note : str
+        Why a GPU that is there is not taken; empty where none is, or it is.
     """
 
     backend: Literal["llvm", "cuda"]
     variant: str
     version: tuple[int, ...]
+    note: str = ""
 
 
 def activate(choice: Choice = "auto") -> Device:
@@ -42,20 +56,59 @@ def activate(choice: Choice = "auto") -> Device:
     Parameters
     ----------
     choice
-        ``"cpu"``, ``"gpu"``, or ``"auto"``: the GPU where there is one.
+        ``"cpu"``, ``"gpu"``, or ``"auto"``: the GPU where there is one that can trace rays.
 
     Raises
     ------
     DeviceError
         Dr.Jit can't be loaded, LLVM is missing or too old, or a GPU was asked for and there is none.
     """
-    dr = load()
-    has_gpu = choice != "cpu" and bool(dr.has_backend(dr.JitBackend.CUDA))
-    if choice == "gpu" and not has_gpu:
-        raise DeviceError("no usable NVIDIA GPU on this machine; run with --device cpu or auto")
-    device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version())) if has_gpu else _llvm()
+    if choice == "cpu":
+        with _hidden_gpus():
+            dr, device = load(), _llvm()
+    else:
+        dr = load()
+        reason = why_no_gpu(dr)
+        if reason and choice == "gpu":
+            raise DeviceError(f"{reason}; run with --device cpu or auto")
+        if reason:
+            device = replace(_llvm(), note="" if reason == NO_GPU else reason)
+        else:
+            device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version()))
     dr.set_backend(device.backend)
     return device
+
+
+def why_no_gpu(dr: Any) -> str:
+    """Why Dr.Jit can't trace rays on a GPU here; empty where it can."""
+    if not dr.has_backend(dr.JitBackend.CUDA):
+        return NO_GPU
+    library = os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1")
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return NO_OPTIX.format(library)
+    return ""
+
+
+@contextmanager
+def _hidden_gpus() -> Iterator[None]:
+    """Keep Dr.Jit, which looks for all backends at its start, off the GPUs: it would take memory of each.
+
+    Processes that are begun later see them.
+    """
+    name = "CUDA_VISIBLE_DEVICES"
+    before = os.environ.get(name)
+    is_started = "drjit" in sys.modules
+    if not is_started:
+        os.environ[name] = ""
+    try:
+        yield
+    finally:
+        if not is_started:
+            del os.environ[name]
+            if before is not None:
+                os.environ[name] = before
 
 
 def load() -> Any:

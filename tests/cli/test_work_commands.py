@@ -6,8 +6,10 @@ import pytest
 
 import scenes_analytic
 from enfilade.backends.analytic_scene import scene_text
+from enfilade.cli import work
 from enfilade.errors import EnfiladeError
 from enfilade.pipeline.crew import Crew
+from enfilade.store import Run
 from enfilade.store.lock import Lock
 
 PAPER = ("--method", "paper")
@@ -124,6 +126,15 @@ def test_a_farm_gets_a_template(run, begun, tmp_path):
         "--step", "segments",
         "--chunk", "{{Task.Param.Chunk}}", "--of", "2",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("variant", "chosen"), [("cuda_ad_rgb", "gpu"), ("llvm_ad_rgb", "cpu"), (None, "auto")]
+)
+def test_a_run_is_gone_on_with_on_the_device_of_its_beginning(tmp_path, variant, chosen):
+    if variant:
+        Run.open(tmp_path, {"versions": {"variant": variant}}).close()
+    assert work._device_of(tmp_path) == chosen
 
 
 @pytest.mark.parametrize("command", ["work", "farm"])

@@ -108,3 +108,13 @@ def test_a_disk_that_has_a_bad_moment_when_a_worker_is_begun(work, monkeypatch):
     assert not ending.aside
     assert failures[0][1] is FailureKind.IO
     assert (work.folder / "a").exists()
+
+
+def test_too_little_memory_is_told_also_while_a_kernel_is_recorded():
+    """Dr.Jit says so in the cause alone."""
+    recording = RuntimeError("record(): error encountered while recording a frozen function (see above).")
+    assert Failure.of(recording).kind is FailureKind.ERROR
+    for words in ("jit_malloc(): out of memory!", "Tried to free the allocation cache while recording"):
+        error = RuntimeError(str(recording))
+        error.__cause__ = RuntimeError(words)
+        assert Failure.of(error).kind is FailureKind.MEMORY

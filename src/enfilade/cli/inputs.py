@@ -186,7 +186,8 @@ def job_of(
             raise SettingsError(
                 f"{flag} says nothing to --method {method}{instead}; leave it out, or choose another method"
             )
-    activate(device)
+    if note := activate(device).note:
+        click.echo(f"note    rendered on the CPU: {note}", err=True)
     from enfilade.path import load_path, parse_frames
     from enfilade.pipeline.job import Job
 

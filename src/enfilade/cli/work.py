@@ -11,6 +11,7 @@ from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import crew_of, crew_options, device_option, quiet_option
 from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
 from enfilade.device import Choice, activate
+from enfilade.errors import RunFolderError
 
 
 @click.command("work", short_help="Go on with a run, or do a share of it beside other commands.")
@@ -48,7 +49,7 @@ def command(
     shared before, what others hold, or have not done yet, is waited for up to two minutes.
     """
     mark_resumable(ctx)
-    activate(device)
+    activate(_device_of(run) if device == "auto" else device)
     crew = crew_of(**who)
     from enfilade.cli.progress import OpenJdMonitor, watch
     from enfilade.pipeline.share import Share, do_share, go_on
@@ -62,3 +63,14 @@ def command(
             name_files(run, summary, plots)
         else:
             do_share(run, Share(step, chunk, count), monitor, crew)
+
+
+def _device_of(run: Path) -> Choice:
+    """The device that a run was begun for: another would be refused."""
+    from enfilade.store import Run
+
+    try:
+        variant = str(Run.existing(run, is_lenient=True).identity["versions"]["variant"])
+    except (RunFolderError, LookupError):  # who goes on with the run says what is wrong with it
+        return "auto"
+    return "gpu" if variant.startswith("cuda") else "cpu"

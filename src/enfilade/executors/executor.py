@@ -17,6 +17,9 @@ Tell = Callable[[str, Any], None]
 Hear = Callable[[Unit, str, Any], None]
 Worker = Callable[[str, Mapping[str, Any]], None]
 
+# Dr.Jit's words for too little memory; the second where it could have made room, but was recording.
+SCARCE = ("out of memory", "tried to free the allocation cache")
+
 
 class Maker(Protocol):
     """What makes a worker."""
@@ -122,7 +125,7 @@ class Failure:
                 return Failure(FailureKind.REFUSED, text, log, error)
             case MemoryError():
                 return Failure(FailureKind.MEMORY, text, log)
-            case RuntimeError() if "out of memory" in str(error).lower():  # Dr.Jit's own
+            case RuntimeError() if _is_memory(error):
                 return Failure(FailureKind.MEMORY, text, log)
             case _:
                 return Failure(FailureKind.ERROR, text, log)
@@ -173,6 +176,15 @@ def _passing_cause(error: BaseException | None) -> OSError | None:
     while error is not None and not isinstance(error, OSError):
         error = error.__cause__
     return error if error is not None and is_passing(error) else None
+
+
+def _is_memory(error: BaseException | None) -> bool:
+    """Whether Dr.Jit had too little memory: while it records a kernel, only the cause says so."""
+    while error is not None:
+        if any(words in str(error).lower() for words in SCARCE):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 class Executor(Protocol):

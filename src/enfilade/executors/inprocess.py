@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import traceback
 from typing import Any
 
@@ -43,6 +44,7 @@ class InProcess:
             return []
         try:
             if self._worker is None:
+                gc.collect()  # a worker that failed is in circles, and has a scene
                 self._worker = self._recipe.make(self._tell, share=self._share)
             self._worker(unit.kind, unit.facts)
         except Exception as error:  # noqa: BLE001  (whatever it is, the rest goes on)

@@ -327,9 +327,11 @@ class _Here:
 
     def make(self, tell: Any, *, share: int = 1) -> Callable[[str, Mapping[str, Any]], None]:
         """Make the worker."""
+        from enfilade.arrays import release_memory
         from enfilade.pipeline.worker import Worker, smaller
 
         check_identity(self._job, self._run)
+        release_memory()  # of one that failed
         return Worker(smaller(self._job, share), self._run, Distant(tell)).do
 
 

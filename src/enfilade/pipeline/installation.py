@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from enfilade import __version__
-from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, Choice, activate, load
+from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, NO_GPU, Choice, activate, load, why_no_gpu
 from enfilade.errors import DeviceError
 
 _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)(.*?)(?:;.*extra\s*==\s*['\"]([^'\"]+)['\"].*)?$")
@@ -97,7 +97,7 @@ def _devices(choice: Choice) -> Iterator[Check]:
 
 def _llvm(dr: Any) -> Check:
     name = f"LLVM {LLVM_MINIMUM} or newer"
-    is_needed = not dr.has_backend(dr.JitBackend.CUDA)
+    is_needed = bool(why_no_gpu(dr))
     if not dr.has_backend(dr.JitBackend.LLVM):
         return Check(name, "", is_needed, INSTALL_LLVM)
     version = tuple(dr.detail.llvm_version())
@@ -106,10 +106,11 @@ def _llvm(dr: Any) -> Check:
 
 
 def _gpu(dr: Any) -> Check:
-    if not dr.has_backend(dr.JitBackend.CUDA):
+    reason = why_no_gpu(dr)
+    if reason == NO_GPU:
         return Check("NVIDIA GPU", "", False, "only --device gpu needs one, with its driver")
     version = ".".join(map(str, dr.detail.cuda_version()))
-    return Check("NVIDIA GPU", f"CUDA {version}", False)
+    return Check("NVIDIA GPU", f"CUDA {version}", False, reason)
 
 
 def _variant(choice: Choice) -> Check:
