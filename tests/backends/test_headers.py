@@ -8,8 +8,9 @@ from PIL import Image
 
 from enfilade.backends.headers import mesh_elements, pixels
 from enfilade.backends.scenecheck import check_scene
+from enfilade.codec.pictures import picture_pixels
 from enfilade.device import active
-from enfilade.errors import SceneError
+from enfilade.errors import ImageError, SceneError
 from enfilade.settings import LimitSettings
 
 FORMAT = b"format binary_little_endian 1.0\n"
@@ -123,6 +124,19 @@ def test_a_picture_has_as_many_pixels_as_mitsuba_finds(tmp_path, name, data, cou
 )
 def test_pictures_are_known_by_what_is_in_them(named, name, data, words):
     refused(named(name, data, plugin="obj")[0], words)
+
+
+def test_the_kinds_of_pictures_are_those_that_mitsuba_reads(tmp_path):
+    for kind in ("PNG", "BMP", "JPEG", "PPM", "TGA"):
+        Image.new("RGB", (4, 3)).save(tmp_path / "a.png", kind)
+        assert picture_pixels(tmp_path / "a.png") == 12
+    for kind in ("TIFF", "ICO", "GIF"):
+        Image.new("RGB", (16, 16)).save(tmp_path / "a.png", kind)
+        with pytest.raises(ImageError, match="no picture that can be read"):
+            picture_pixels(tmp_path / "a.png")
+    (tmp_path / "a.png").write_bytes(RADIANCE + b"\n-Y 2 +X 3\n")  # left to `pixels`
+    with pytest.raises(ImageError, match="no picture that can be read"):
+        picture_pixels(tmp_path / "a.png")
 
 
 def test_a_large_picture_by_another_name(named):

@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from enfilade.cli.compare import DEPARTURES, FLOWS
+from enfilade.cli.compare import DEPARTURES, FLOWS, IMAGES
+from enfilade.codec import write_exr
 from enfilade.metric import MetricOptions
 from enfilade.pipeline.compare import FlowChoice
+from enfilade.report.heatmap import HeatmapPainter
+from enfilade.settings import VideoSettings
+from enfilade.video import encode_video, open_sequence
+from enfilade.video.images import SUFFIXES
 from enfilade.viewing import DISPLAYS
 
 KEYS = {  # docs/compare.md
@@ -18,7 +23,7 @@ KEYS = {  # docs/compare.md
     "persistence", "mode", "departures", "flow", "bands_cpd", "per_frame",
 }  # fmt: skip
 FRAME_KEYS = {
-    "name", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
+    "name", "number", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
     "steady_bands_jnd", "transient_bands_jnd", "velocity_deg_s",
 }  # fmt: skip
 FRAMES = 6
@@ -51,6 +56,42 @@ def test_a_table_and_heat_maps_in_a_folder(run, folders, tmp_path):
     colored = np.ptp(noisy[: 40 * 8], axis=2) > 60
     assert colored[:, : 25 * 8].mean() > 0.9
     assert colored[:, 55 * 8 :].mean() < 0.1
+
+
+def captions_of(monkeypatch):
+    written = []
+    monkeypatch.setattr(
+        HeatmapPainter,
+        "paint",
+        lambda self, _jnd, _grey, text: written.append(text) or np.zeros((self.height, self.width, 3), "u1"),
+    )
+    return written
+
+
+def test_frames_are_called_by_their_own_numbers(run, folders, tmp_path, monkeypatch):
+    captions = captions_of(monkeypatch)
+    for folder in folders:
+        for i in reversed(range(FRAMES)):
+            (folder / f"{i}.png").rename(folder / f"{i + 101}.png")
+    result = run("compare", *folders, "--flow", "none", "--heatmap", tmp_path / "maps", "--json")
+    numbers = list(range(101, 101 + FRAMES))
+    assert [frame["number"] for frame in json.loads(result.stdout)["per_frame"]] == numbers
+    assert [int(caption.split()[1]) for caption in captions] == numbers
+    assert sorted(m.name for m in (tmp_path / "maps").iterdir()) == [f"{n}.png" for n in numbers]
+
+
+def test_frames_of_a_video_are_counted_from_1(run, folders, tmp_path, monkeypatch):
+    captions = captions_of(monkeypatch)
+    frames = list(open_sequence(folders[0]))
+    settings = VideoSettings(codec="ffv1")
+    film = tmp_path / "film.mkv"
+    encode_video(film, frames, fps=24.0, width=60, height=40, settings=settings, exposure_ev=0.0)
+    result = run("compare", film, folders[1], "--flow", "none", "--heatmap", tmp_path / "maps", "--json")
+    found = json.loads(result.stdout)["per_frame"]
+    names = [(i, f"frame {i} of {film}") for i in range(1, FRAMES + 1)]
+    assert [(frame["number"], frame["name"]) for frame in found] == names
+    assert [int(caption.split()[1]) for caption in captions] == list(range(1, FRAMES + 1))
+    assert sorted(m.name for m in (tmp_path / "maps").iterdir()) == [f"{i:06}.png" for i, _ in names]
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
@@ -101,6 +142,7 @@ def test_what_help_lists_is_what_there_is(run):
     # --help loads no NumPy, so it can't ask
     assert MetricOptions.departures() == DEPARTURES
     assert tuple(choice.value for choice in FlowChoice) == FLOWS
+    assert IMAGES == SUFFIXES
     output = " ".join(run("compare", "--help").output.split())
     listed = run("compare", "--display", "list")
     assert listed.exit_code == 0
@@ -123,6 +165,32 @@ def test_numbers_win_over_a_display(run, folders, tmp_path):
     options = ("--display", "desktop-24-fhd", "--settings", tmp_path / "a.toml")
     assert seen(*options) == pytest.approx((whole[0], 80.0))
     assert seen(*options, "--viewing-peak-cd-m2", "90") == pytest.approx((whole[0], 90.0))
+
+
+def test_layers_are_chosen_for_one_side_or_both(run, folders, tmp_path):
+    values = {"albedo": 0.5, "beauty": 0.25}
+    layers = {name: np.full((40, 60, 3), value, np.float32) for name, value in values.items()}
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_exr(tmp_path / folder / "0001.exr", layers)
+
+    def score(*options):
+        result = run("compare", tmp_path / "a", tmp_path / "b", "--json", *options)
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout)["score_jnd"], result.stderr
+
+    identical, said = score()
+    assert identical == 0.0
+    assert "the layer beauty of " in said
+    assert "--layer chooses another: albedo" in said
+    assert score("--layer", "albedo")[0] == 0.0
+    assert score("--layer", "albedo", "--layer", "beauty")[0] > 1.0
+    refused = run("compare", tmp_path / "a", tmp_path / "b", "--layer", "diffuse")
+    assert refused.exit_code == 2
+    assert "no colour layer diffuse; it has the colour layers albedo, beauty" in refused.stderr
+    refused = run("compare", *folders, "--layer", "albedo")
+    assert refused.exit_code == 2
+    assert "leave out --layer" in refused.stderr
 
 
 def test_viewing_conditions_count(run, folders):
@@ -148,6 +216,7 @@ def test_nothing_to_compare_is_wrong_input(run, folders, tmp_path, what):
         (("--heatmap", "heat.gif"), "give a folder, or a file .mp4"),
         (("--graph", "graph.pdf"), "it is written as .png"),
         (("--fps", "0"), "fps"),
+        (("--layer", "a", "--layer", "b", "--layer", "c"), "--layer is given 3 times"),
         (("--device", "cpu", "--mode", "paper"), "--device cpu says nothing to this metric"),
         (("--device", "auto", "--without", "transducer"), "transducer and spatial_pooling; leave it out"),
         (("--device", "cpu", "--without", "spatial_pooling"), "says nothing to this metric"),

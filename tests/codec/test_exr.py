@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from enfilade.codec import read_attributes, read_exr, sweep, write_exr
+from enfilade.codec.exr import color_layers
 from enfilade.errors import ImageError, RunFolderError
 
 KINDS = {"float16": np.float16, "float32": np.float32, "uint32": np.uint32}
@@ -132,7 +133,9 @@ def test_foreign_names_mixed_types_and_windows(tmp_path):
     with OpenEXR.File(header, {**names, **alpha}) as image:
         image.write(str(tmp_path / "a.exr"))
     layers = read_exr(tmp_path / "a.exr")
-    assert set(layers) == {"View Layer.Combined", "View Layer.Combined.A", "R", "G", "B"}
+    assert set(layers) == {"View Layer.Combined", "View Layer.Combined.A", "RGB"}
+    assert layers["RGB"].dtype == np.float32  # half and float together
+    assert color_layers(tmp_path / "a.exr") == ("RGB", "View Layer.Combined")
     expected = np.zeros((4, 3), np.float32)
     expected[:2, 1:] = plane[:, :2]
     np.testing.assert_array_equal(layers["View Layer.Combined"][..., 1], expected)
@@ -147,7 +150,23 @@ def test_parts_come_together(tmp_path):
     with OpenEXR.File(parts) as image:
         image.write(str(tmp_path / "a.exr"))
     layers = read_exr(tmp_path / "a.exr")
-    assert (layers["Z"].max(), layers["right.Z"].max()) == (0, 1)
+    assert (layers["left.Z"].max(), layers["right.Z"].max()) == (0, 1)
+
+
+def test_layers_of_parts_have_the_names_of_their_parts(tmp_path):
+    plane = np.ones((2, 3), np.float32)
+    parts = {
+        "albedo": dict.fromkeys("RGB", plane),
+        "beauty": dict.fromkeys("RGBA", plane * 2),
+        "rest": {**dict.fromkeys(("light.R", "light.G", "light.B"), plane), "N.X": plane, "R": plane},
+    }
+    header = {"type": OpenEXR.scanlineimage}
+    with OpenEXR.File([OpenEXR.Part({"name": n, **header}, c) for n, c in parts.items()]) as image:
+        image.write(str(tmp_path / "a.exr"))
+    layers = read_exr(tmp_path / "a.exr")
+    assert set(layers) == {"albedo", "beauty", "beauty.A", "light", "N.X", "rest.R"}
+    assert (layers["albedo"].max(), layers["beauty"].max()) == (1, 2)
+    assert color_layers(tmp_path / "a.exr") == ("albedo", "beauty", "light")
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,22 @@ def test_a_cut_between_two_frames_begins_with_the_next():
     assert eyes(shots)[11, 0] == 9.0
 
 
+@pytest.mark.parametrize("is_held", [True, False])
+def test_a_cut_may_come_when_a_rest_ends(is_held):
+    first = key(1, (1, 1, 5), hold=0.2 if is_held else 0.0)
+    cut = 1.2 if is_held else 1.0
+    shots = read([key(0), first, key(cut, (100, 1, 5), cut=True), key(3, (101, 1, 5))])
+    x, begin = eyes(shots)[:, 0], round(10 * cut)
+    assert shots.cuts == {begin}
+    assert (x[10:begin] == 1.0).all()
+    assert x[begin] == 100.0
+
+
+def test_a_cut_at_the_end_of_a_rest_is_found_in_decimals():  # in floats 0.1 + 0.2 is beyond 0.3
+    shots = read([key(0.1, hold=0.2), key(0.3, (100, 1, 5), cut=True), key(1)])
+    assert shots.cuts == {2}
+
+
 def test_a_shot_too_short_for_a_frame_vanishes():
     shots = read([key(0), key(1.01, cut=True), key(1.02, (7, 1, 5), cut=True), key(2, (8, 1, 5))])
     assert shots.cuts == {11}
@@ -200,6 +216,8 @@ def test_any_keys_give_rigid_poses_within_their_hull(rows):
         ([], {}, "at least one key"),
         ([key(0), key(0)], {}, "key 2: time 0 does not follow 0"),
         ([key(0, hold=2), key(1)], {}, "key 2: time 1 does not follow 2"),
+        ([key(0, hold=2), key(2)], {}, "key 2: time 2 does not follow 2"),
+        ([key(0, hold=2), key(1, cut=True)], {}, "key 2: time 1 does not follow 2"),
         ([key(0, hold=-1)], {}, "key 1: hold is -1"),
         ([key(0, cut=1)], {}, "key 1: cut is 1; it must be true or false"),
         ([key(0, target=[0, 1, 5])], {"frames": 1}, "key 1: .* can't look at"),

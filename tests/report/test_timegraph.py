@@ -5,6 +5,7 @@ import pytest
 
 from enfilade.report.timegraph import plot_comparison, time_figure
 
+FIRST = 101  # number of the first frame
 BANDS = [[14.0, 20.0], [7.0, 14.0], [0.0, 7.0]]
 
 
@@ -12,6 +13,7 @@ def made_up(frames=5, *, is_flickering=True):
     rows = [
         {
             "name": f"{i}.png",
+            "number": FIRST + i,
             "score_jnd": 0.5 + 0.1 * i,
             "steady_jnd": 0.5,
             "transient_jnd": 0.1 * i if is_flickering else 0.0,
@@ -56,6 +58,14 @@ def test_visible_pixels_and_bands():
     np.testing.assert_allclose(np.reshape(mesh.get_array(), (3, 5))[:, -1], [0.1, 0.4, 0.3])
     labels = [label.get_text() for label in figure.axes[2].get_yticklabels()]
     assert labels == ["14 to 20", "7 to 14", "below 7"]
+
+
+def test_frames_have_their_own_numbers():
+    figure = time_figure(made_up())
+    score = next(line for line in figure.axes[0].lines if line.get_label() == "score")
+    assert list(score.get_xdata()) == [101, 102, 103, 104, 105]
+    (stairs,) = figure.axes[1].patches
+    assert list(stairs.get_data().edges) == [100.5, 101.5, 102.5, 103.5, 104.5, 105.5]
 
 
 def test_title_and_units():

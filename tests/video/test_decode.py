@@ -161,5 +161,5 @@ def test_mutated_files_are_read_or_refused(tmp_path, codec):
 
 
 def test_layers_of_a_video_are_refused(tmp_path):
-    with pytest.raises(ImageError, match=r"frame 1 of .*a\.mkv has no layers"):
+    with pytest.raises(ImageError, match=r"frame 2 of .*a\.mkv has no layers"):
         open_sequence(foreign(tmp_path / "a.mkv", "yuv444p", colorspace=1)).layers(1)

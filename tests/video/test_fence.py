@@ -30,7 +30,7 @@ def exrs(folder, count=3):
 
 def test_frames_names_and_layers_are_those_of_the_sequence(tmp_path):
     plain, fenced = open_sequence(exrs(tmp_path)), FencedSequence(tmp_path, LIMITS)
-    for name in ("width", "height", "fps", "exposure_ev", "numbers", "starts"):
+    for name in ("width", "height", "fps", "exposure_ev", "numbers", "starts", "note"):
         assert getattr(fenced, name) == getattr(plain, name)
     assert len(fenced) == len(plain) == 3
     for _ in range(2):  # a second iteration begins anew

@@ -33,7 +33,9 @@ DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would l
     "spatial_pooling",
     "transient",
 )
-IMAGES = frozenset({".exr", ".png", ".jpg", ".jpeg"})  # frames of which a heat map takes the name
+IMAGES = frozenset(  # frames of which a heat map takes the name: `SUFFIXES`, which --help can't ask either
+    {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp", ".ppm"}
+)
 
 
 def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
@@ -89,6 +91,15 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     "layers.",
 )
 @click.option(
+    "--layer",
+    "layers",
+    metavar="NAME",
+    multiple=True,
+    help="Layer or part of OpenEXR frames that is the picture: once for both sequences, or twice, the test's "
+    "and then the reference's.  [default: R G B without a name, else rgba, beauty, C or Combined, else the "
+    "only one of three channels]",
+)
+@click.option(
     "--device",
     type=click.Choice(("none", "auto", "cpu", "gpu")),
     default="none",
@@ -122,8 +133,8 @@ def command(
 ) -> None:
     """Judge TEST against REFERENCE with the animation quality metric.
 
-    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG), a pattern such as frames/%04d.exr, or a
-    video.
+    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP, PPM), a pattern such
+    as frames/%04d.exr, or a video.
 
     The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical, 1
     a difference that three viewers of four find when they look for it, everywhere and all the time. What is
@@ -160,10 +171,13 @@ def _terms(
     include: tuple[str, ...],
     leave_out: tuple[str, ...],
     flow: str,
+    layers: tuple[str, ...],
     device: str,
 ) -> Terms:
     from enfilade.pipeline.compare import FlowChoice, Terms, kernels_serve, metric_options
 
+    if len(layers) > 2:
+        raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx)
     options = metric_options(mode, include=include, leave_out=leave_out)
     if device != "none":
@@ -185,6 +199,7 @@ def _terms(
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
         has_kernels=device != "none",
         limits=settings.limits,
+        layers=(layers[0], layers[-1]) if layers else (None, None),
     )
 
 
@@ -222,13 +237,13 @@ def _painted(target: Path) -> Show:
 
 def _name(frame: JudgedFrame) -> str:
     file = Path(frame.difference.name)
-    return file.stem if file.suffix.lower() in IMAGES else f"{frame.index:06d}"
+    return file.stem if file.suffix.lower() in IMAGES else f"{frame.difference.number:06d}"
 
 
 def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
     of = frame.difference
     caption = (
-        f"frame {frame.index}    {of.score:.2f} JND (steady {of.steady.score:.2f}, transient "
+        f"frame {of.number}    {of.score:.2f} JND (steady {of.steady.score:.2f}, transient "
         f"{of.transient.score:.2f})    {of.percent_visible:.1f} % above 1 JND"
     )
     return painter.paint(frame.jnd, frame.grey, caption)

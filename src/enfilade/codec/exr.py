@@ -11,6 +11,7 @@ import errno
 import functools
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +24,7 @@ import OpenEXR
 from enfilade.codec.whole import unwritable, whole_file
 from enfilade.errors import ImageError
 
-__all__ = ["Array", "exr_pixels", "read_attributes", "read_exr", "write_exr"]
+__all__ = ["Array", "color_layers", "exr_pixels", "read_attributes", "read_exr", "write_exr"]
 
 Array = npt.NDArray[Any]
 
@@ -101,10 +102,11 @@ def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:
     Returns
     -------
     dict of str to (H, W), (H, W, 2) or (H, W, 3) array
-        Channels that end in R G B, X Y Z or u v, of one size and dtype, are one layer, named by what
-        stands before; every other channel is a layer of its own, with its full name. The size is that
-        of the display window; outside the data window is 0. Parts of a multi-part file come together;
-        where two parts share a name, the later one is prefixed with its part's name.
+        Channels that end in R G B, X Y Z or u v, of one size, are one layer, named by what stands before;
+        half and float together become float. Every other channel is a layer of its own, with its full
+        name. The size is that of the display window; outside the data window is 0. Parts of a multi-part
+        file come together: a channel without a layer's name of its own has its part's in front (`R` of
+        the part `beauty` belongs to the layer ``beauty``), and so has one that several parts share.
 
     Raises
     ------
@@ -115,12 +117,25 @@ def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:
     for header in headers:
         _check_part(file, header, max_pixels)
     channels: dict[str, Array] = {}
+    full = _full_names(headers)
     with _failures(file), OpenEXR.File(str(file), separate_channels=True) as image:
         for index, header in enumerate(headers):
             for name, channel in image.channels(index).items():
-                key = name if name not in channels else f"{header.get('name', index)}.{name}"
-                channels[key] = _placed(np.asarray(channel.pixels), header)
+                channels[full[index, name]] = _placed(np.asarray(channel.pixels), header)
     return _layers(channels)
+
+
+def color_layers(file: Path) -> tuple[str, ...]:
+    """Names of the layers of R G B, as :func:`read_exr` names them, from the headers alone.
+
+    Raises
+    ------
+    ImageError
+        The file is missing, is no OpenEXR, or its headers are damaged.
+    """
+    names = dict.fromkeys(_full_names(_part_headers(file)).values())
+    prefixes = [name[:-1] for name in names if name.rpartition(".")[2] == "R"]
+    return tuple(p.rstrip(".") or "RGB" for p in prefixes if {f"{p}G", f"{p}B"} <= set(names))
 
 
 def exr_pixels(file: Path) -> int:
@@ -191,11 +206,26 @@ def _layers(channels: Mapping[str, Array]) -> dict[str, Array]:
         stack = next((s for s in STACKS if letter and letter == s[0]), None)
         names = [f"{prefix}.{end}" if prefix else end for end in stack or ()]
         planes = [channels[n] for n in names if n in channels]
-        if names and len(planes) == len(names) and len({(p.shape, p.dtype) for p in planes}) == 1:
+        if names and len(planes) == len(names) and _are_alike(planes):
             layers[prefix or str(stack)] = np.stack(planes, axis=2)
             for used in names:
                 del rest[used]
     return {**layers, **rest}
+
+
+def _are_alike(planes: list[Array]) -> bool:
+    return len({(plane.shape, plane.dtype.kind) for plane in planes}) == 1  # half and float are of one kind
+
+
+def _full_names(headers: list[dict[str, Any]]) -> dict[tuple[int, str], str]:
+    """Names of channels by part and own name, with that of the part in front where it is needed."""
+    own = [(part, str(channel.name)) for part, header in enumerate(headers) for channel in header["channels"]]
+    if len(headers) == 1:
+        return {(part, name): name for part, name in own}
+    counts = Counter(name for _, name in own)
+    prefixes = [f"{header.get('name', part)}." for part, header in enumerate(headers)]
+    needed = {(part, name) for part, name in own if "." not in name or counts[name] > 1}
+    return {(part, name): prefixes[part] + name if (part, name) in needed else name for part, name in own}
 
 
 def _part_headers(file: Path) -> list[dict[str, Any]]:

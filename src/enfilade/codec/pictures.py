@@ -11,11 +11,14 @@ from enfilade.errors import ImageError
 __all__ = ["PICTURES", "picture_pixels"]
 
 PICTURES = frozenset({".exr", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".pfm", ".ppm", ".hdr", ".rgbe"})
-HEADER = 1 << 16  # bytes in which the size of a Radiance picture must stand
+HEADER = 256  # bytes in which the size of a portable float map must stand
+FORMATS = ("PNG", "JPEG", "BMP", "TGA", "PPM")  # Pillow's, of what Mitsuba reads
 
 
 def picture_pixels(file: Path) -> int:
-    """Pixels of a picture of any kind that Mitsuba reads, from its header alone.
+    """Pixels of a picture that Mitsuba reads, from its header alone.
+
+    Radiance's are not among them: Mitsuba finds their size in its own way (``backends.headers``).
 
     Raises
     ------
@@ -29,24 +32,14 @@ def picture_pixels(file: Path) -> int:
         raise ImageError(f"can't read {file}: {error.strerror}") from error
     if start.startswith(MAGIC):
         return exr_pixels(file)
-    if start.startswith(b"#?"):
-        return _radiance(file, start)
     if start[:2] in (b"PF", b"Pf"):
         return _portable(file, start)
     return _other(file)
 
 
-def _radiance(file: Path, start: bytes) -> int:
-    # Radiance's own format: lines of text, an empty one, then "-Y 480 +X 640".
-    words = start.partition(b"\n\n")[2].partition(b"\n")[0].split()
-    if len(words) == 4 and words[1].isdigit() and words[3].isdigit():
-        return int(words[1]) * int(words[3])
-    raise ImageError(f"{file} is a Radiance picture without a size")
-
-
 def _portable(file: Path, start: bytes) -> int:
     # Portable float map: "PF", width, height, and a scale, with white space between them.
-    words = start[:256].split(maxsplit=3)
+    words = start.split(maxsplit=3)
     if len(words) == 4 and words[1].isdigit() and words[2].isdigit():
         return int(words[1]) * int(words[2])
     raise ImageError(f"{file} is a portable float map without a size")
@@ -60,7 +53,7 @@ def _other(file: Path) -> int:
             warnings.simplefilter(
                 "ignore", Image.DecompressionBombWarning
             )  # the caller has a bound of its own
-            with Image.open(file) as image:
+            with Image.open(file, formats=FORMATS) as image:
                 width, height = image.size
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         raise ImageError(f"{file} is no picture that can be read: {error}") from error

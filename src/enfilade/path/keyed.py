@@ -21,6 +21,7 @@ from enfilade.path.shots import Shots
 
 FORMAT = "enfilade-path"
 CLOCK_TOLERANCE = 1e-6  # of a frame: times are written in decimals, frames fall at n / fps
+SUM_TOLERANCE = 1e-9  # of seconds, and relative: 0.1 s and a hold of 0.2 s end at 0.3 s
 
 _FILE_KEYS = ("format", "fps", "size", "up", "seconds", "frames", "keys")
 _KEYS = ("time", "eye", "target", "rotation", "up", "fov", "hold", "cut")
@@ -104,7 +105,7 @@ def _read_keys(table: Table) -> list[Key]:
     for row in table.tables("keys", "key"):
         row.allow_only(*_KEYS)
         key = _read_key(row, upward, keys[-1].fov_deg if keys else None)
-        if keys and key.time_s <= keys[-1].time_s:
+        if keys and not _follows(key, keys[-1]):
             raise row.fail(
                 f"time {key.time_s:g} does not follow {keys[-1].time_s:g}, the end of the key before"
             )
@@ -115,6 +116,12 @@ def _read_keys(table: Table) -> list[Key]:
         if hold > 0.0:
             keys.append(replace(key, time_s=key.time_s + hold, is_cut=False))
     return keys
+
+
+def _follows(key: Key, before: Key) -> bool:
+    if key.is_cut and math.isclose(key.time_s, before.time_s, rel_tol=SUM_TOLERANCE, abs_tol=SUM_TOLERANCE):
+        return True  # the shot before rests until the cut
+    return key.time_s > before.time_s
 
 
 def _read_key(row: Table, upward: Matrix, last_fov_deg: float | None) -> Key:

@@ -69,7 +69,7 @@ def time_figure(found: Mapping[str, Any]) -> Figure:
         "each band of spatial frequencies, pixel by pixel",
     ]
     figure, axes = new_figure(title, headings)
-    frames = list(range(len(rows)))
+    frames = [int(row["number"]) for row in rows]
     _draw_score(axes[0], frames, rows, found["score_jnd"])
     _draw_percent(axes[1], frames, rows)
     _draw_bands(figure, axes[2], frames, rows, found["bands_cpd"])

@@ -26,7 +26,7 @@ class _Decoder:
     def answer(self, what: str, value: Any) -> tuple[Any, dict[str, Any]]:
         match what:
             case "open":
-                return self._open(value), {}
+                return self._open(*value), {}
             case "rewind":
                 self._frames = iter(self._sequence)
                 return None, {}
@@ -39,8 +39,8 @@ class _Decoder:
                 return None, self._sequence.layers(value)
         raise ValueError(what)
 
-    def _open(self, source: str) -> dict[str, Any]:
-        self._sequence = found = open_sequence(source)
+    def _open(self, source: str, layer: str | None) -> dict[str, Any]:
+        self._sequence = found = open_sequence(source, layer=layer)
         return {
             "width": found.width,
             "height": found.height,
@@ -48,6 +48,7 @@ class _Decoder:
             "exposure_ev": found.exposure_ev,
             "numbers": found.numbers,
             "starts": None if found.starts is None else sorted(found.starts),
+            "note": found.note,
             "count": len(found),
         }
 

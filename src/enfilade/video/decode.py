@@ -1,4 +1,4 @@
-"""Decoding of video files, and of 16-bit PNG, which Pillow cuts to 8 bits."""
+"""Decoding of video files, and of images with 16 bits a channel, which Pillow cuts to 8."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from enfilade.pixels.tone import srgb_decode
 from enfilade.records import F32
 from enfilade.video.ycbcr import BT601, BT709, Plane, rgb_from_planes
 
-__all__ = ["DEMUXERS", "VideoFile", "deep_png"]
+__all__ = ["DEMUXERS", "VideoFile", "deep_pixels"]
 
 # The demuxer is chosen by suffix: FFmpeg would otherwise sniff it, and a playlist opens other files.
 DEMUXERS = {
@@ -63,6 +63,7 @@ class VideoFile:
     exposure_ev: float | None = None  # frames are as shown
     numbers: tuple[int, ...] | None = None
     starts: frozenset[int] | None = None
+    note: str = ""
 
     def __init__(self, file: Path) -> None:
         self.file = file
@@ -101,7 +102,7 @@ class VideoFile:
                     break
                 if (frame.height, frame.width) != (self.height, self.width):
                     raise ImageError(
-                        f"frame {done} of {self.file} has {frame.width}x{frame.height} pixels, not "
+                        f"frame {done + 1} of {self.file} has {frame.width}x{frame.height} pixels, not "
                         f"{self.width}x{self.height}"
                     )
                 encoded = _encoded_rgb(self.file, frame)
@@ -111,8 +112,8 @@ class VideoFile:
             raise _incomplete(self.file, self._count, done)
 
     def name(self, index: int) -> str:
-        """Name of a frame, for messages."""
-        return f"frame {index} of {self.file}"
+        """Name of a frame, for messages: they are counted from 1."""
+        return f"frame {index + 1} of {self.file}"
 
     def layers(self, index: int) -> dict[str, Plane]:
         """Refuse: a video has no layers.
@@ -125,8 +126,14 @@ class VideoFile:
         raise ImageError(f"{self.name(index)} has no layers; those are in OpenEXR frames")
 
 
-def deep_png(file: Path) -> F32:
-    """Encoded values of a 16-bit PNG, with the alpha that it has.
+def deep_pixels(file: Path, demuxer: str) -> F32:
+    """Encoded values of an image of 16 bits a channel, with the alpha that it has.
+
+    Parameters
+    ----------
+    file
+    demuxer
+        FFmpeg's: ``png_pipe``, ``tiff_pipe`` or ``ppm_pipe``.
 
     Returns
     -------
@@ -138,7 +145,7 @@ def deep_png(file: Path) -> F32:
     ImageError
         It is cut off or damaged.
     """
-    with _failures(file), av.open(str(file), format="png_pipe") as container:
+    with _failures(file), av.open(str(file), format=demuxer) as container:
         frame = next(iter(container.decode(video=0)), None)
         if frame is None or frame.is_corrupt:
             raise ImageError(f"{file} is cut off or damaged; write or copy it again")

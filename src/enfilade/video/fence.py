@@ -46,6 +46,8 @@ class FencedSequence:
         Whatever that reads.
     limits
         Memory of the process, and seconds for one frame.
+    layer
+        See there.
 
     Attributes
     ----------
@@ -54,6 +56,7 @@ class FencedSequence:
     fps, exposure_ev : float or None
     numbers : tuple of int or None
     starts : frozenset of int or None
+    note : str
 
     Raises
     ------
@@ -61,7 +64,7 @@ class FencedSequence:
         The sequence can't be read, or was too much for the process that tried to.
     """
 
-    def __init__(self, source: Path | str, limits: LimitSettings) -> None:
+    def __init__(self, source: Path | str, limits: LimitSettings, *, layer: str | None = None) -> None:
         self._source = str(source)
         self._limits = limits
         self._line, there = socket.socketpair()
@@ -77,13 +80,14 @@ class FencedSequence:
             )
         self._child = child
         self._end = weakref.finalize(self, _end, self._line, child)
-        opened, _ = self._ask("open", self._source)
+        opened, _ = self._ask("open", [self._source, layer])
         self.width, self.height = int(opened["width"]), int(opened["height"])
         self.fps: float | None = opened["fps"]
         self.exposure_ev: float | None = opened["exposure_ev"]
         numbers, starts = opened["numbers"], opened["starts"]
         self.numbers: tuple[int, ...] | None = None if numbers is None else tuple(numbers)
         self.starts: frozenset[int] | None = None if starts is None else frozenset(starts)
+        self.note = str(opened["note"])
         self._count = int(opened["count"])
 
     def __len__(self) -> int:

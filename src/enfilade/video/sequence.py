@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,8 @@ from enfilade.video.images import SUFFIXES, ImageFiles
 __all__ = ["Sequence", "open_sequence"]
 
 NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
+NUMBER = re.compile(r"^-?\d+|\d+")  # in a name; one that begins it may be negative
+MOST_LISTED = 6  # patterns of a folder, in a message
 
 
 class Sequence(Protocol):
@@ -28,6 +31,7 @@ class Sequence(Protocol):
     exposure_ev: float | None  # of a run, whose frames are scene-linear
     numbers: tuple[int, ...] | None  # by which the user knows the frames, rising
     starts: frozenset[int] | None  # of a run: indices of frames that do not follow the one before
+    note: str  # what to know of how it is read; empty where there is nothing
 
     def __len__(self) -> int:
         """Count the frames."""
@@ -49,15 +53,17 @@ class Sequence(Protocol):
         ...
 
 
-def open_sequence(source: Path | str) -> Sequence:
+def open_sequence(source: Path | str, *, layer: str | None = None) -> Sequence:
     """Open an image sequence to be read.
 
     Parameters
     ----------
     source
-        A folder of images of one kind (OpenEXR, PNG, JPEG), in natural order of their names; a run folder,
-        of which the finished frames are taken; one image; a pattern (``f.%04d.exr``, ``f.####.png``,
-        ``f*.jpg``); or a video.
+        A folder of images of one kind (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP, PPM), in natural order of
+        their names, which may differ in one number; a run folder, of which the finished frames are taken;
+        one image; a pattern (``f.%04d.exr``, ``f.####.png``, ``f*.jpg``); or a video.
+    layer
+        Of OpenEXR files, the layer or part that is the picture; of others it says nothing.
 
     Returns
     -------
@@ -66,38 +72,34 @@ def open_sequence(source: Path | str) -> Sequence:
     Raises
     ------
     ImageError
-        There is no such file, no image in the folder, or the first one can't be read.
+        There is no such file, no image in the folder, more than one sequence in it, or the first image
+        can't be read.
     """
     path = Path(source)
     if path.is_dir():
-        return _from_folder(path)
+        return _from_folder(path, layer)
     if path.is_file():
         suffix = path.suffix.lower()
         if suffix in DEMUXERS:
             return VideoFile(path)
         if suffix in SUFFIXES:
-            return ImageFiles([path])
+            return ImageFiles([path], layer=layer)
         known = ", ".join(sorted(SUFFIXES | set(DEMUXERS)))
         raise ImageError(f"{path}: can't tell what a {suffix or 'file without suffix'} is; read are: {known}")
     files = _matching(path)
     if not files:
         raise ImageError(f"there is no file, folder or pattern with files {path}")
-    return ImageFiles(files, numbers=_numbers(files))
+    return ImageFiles(files, numbers=_numbers(files), layer=layer)
 
 
-def _from_folder(folder: Path) -> ImageFiles:
+def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
     run = folder / "run.json"
     identity = read_json(run) if run.is_file() else None
     place = folder / "frames" if run.is_file() else folder
     files = _images(place.iterdir()) if place.is_dir() else []
     if not files:
         raise ImageError(f"{place} has no images in it; read are: {', '.join(sorted(SUFFIXES))}")
-    kinds = {file.suffix.lower() for file in files}
-    if len(kinds) > 1:
-        raise ImageError(
-            f"{place} has images of several kinds ({', '.join(sorted(kinds))}); give a pattern such as "
-            f"{place}/*{min(kinds)}"
-        )
+    _check_one_sequence(place, files)
     numbers = _numbers(files)
     fps = _number_at(identity, "identity", "path", "fps")
     return ImageFiles(
@@ -106,7 +108,50 @@ def _from_folder(folder: Path) -> ImageFiles:
         _number_at(identity, "identity", "settings", "viewing", "exposure_ev"),
         numbers=numbers,
         starts=None if numbers is None else _starts(numbers, _at(identity, "identity", "path")),
+        layer=layer,
     )
+
+
+def _check_one_sequence(folder: Path, files: list[Path]) -> None:
+    kinds = {file.suffix.lower() for file in files}
+    if len(kinds) > 1:
+        raise ImageError(
+            f"{folder} has images of several kinds ({', '.join(sorted(kinds))}); give a pattern such as "
+            f"{folder}/*{min(kinds)}"
+        )
+    patterns = _patterns(files)
+    if len(patterns) > 1:
+        listed = [f"{pattern} ({count})" for pattern, count in patterns.most_common(MOST_LISTED)]
+        more = f" and {len(patterns) - MOST_LISTED} more" if len(patterns) > MOST_LISTED else ""
+        raise ImageError(
+            f"{folder} has images whose names differ in more than a number: {', '.join(listed)}{more}; give "
+            f"one pattern, such as {folder}/{max(patterns, key=lambda p: patterns[p])}, or "
+            f"{folder}/*{min(kinds)} for all of them as one sequence"
+        )
+
+
+def _patterns(files: list[Path]) -> Counter[str]:
+    """Files by their names with the number that counts as #; one pattern where only one number varies."""
+    column = _column(files)
+    names: dict[tuple[str, ...], str] = {}
+    counts: Counter[str] = Counter()
+    for file in files:
+        found = list(NUMBER.finditer(file.stem))
+        chosen = found[-1 if column is None else column] if found else None
+        begin, end = chosen.span() if chosen else (len(file.stem), len(file.stem))
+        around = file.stem[:begin], file.stem[end:], "#" if chosen else "", file.suffix.lower()
+        digits = "#" * len(file.stem[begin:end].lstrip("-"))
+        counts[names.setdefault(around, f"{file.stem[:begin]}{digits}{file.stem[end:]}{file.suffix}")] += 1
+    return counts
+
+
+def _column(files: list[Path]) -> int | None:
+    """Which number of the names varies, from 0; None where none, several or anything else does."""
+    if len({tuple(NUMBER.split(file.stem)) for file in files}) > 1:
+        return None
+    columns = enumerate(zip(*(NUMBER.findall(file.stem) for file in files), strict=True))
+    varying = [column for column, numbers in columns if len(set(numbers)) > 1]
+    return varying[0] if len(varying) == 1 else None
 
 
 def _matching(pattern: Path) -> list[Path]:
@@ -133,9 +178,10 @@ def _natural(file: Path) -> tuple[list[tuple[int, int, str]], str]:
 
 
 def _numbers(files: list[Path]) -> tuple[int, ...] | None:
-    """Last number of each name; None unless all have one and they rise."""
-    found = [re.findall(r"^-?\d+|\d+", file.stem) for file in files]
-    numbers = tuple(int(of_name[-1]) for of_name in found if of_name)
+    """The number that varies in the names, else the last; None unless all have one and they rise."""
+    column = _column(files)
+    found = [NUMBER.findall(file.stem) for file in files]
+    numbers = tuple(int(of_name[-1 if column is None else column]) for of_name in found if of_name)
     rises = len(numbers) == len(files) and all(before < now for before, now in pairwise(numbers))
     return numbers if rises else None
 

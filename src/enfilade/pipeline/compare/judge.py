@@ -76,6 +76,8 @@ class Terms:
         :func:`kernels_serve`.
     limits
         Memory and time of the processes that decode.
+    layers
+        Of the test's and of the reference's OpenEXR frames: the layer or part that is the picture.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
@@ -87,6 +89,7 @@ class Terms:
     exposure_ev: float | None = None
     has_kernels: bool = False
     limits: LimitSettings = field(default_factory=LimitSettings)
+    layers: tuple[str | None, str | None] = (None, None)
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
@@ -130,12 +133,14 @@ def compare(
         A sequence can't be read, the two differ in length, size or frame rate, they are runs of other
         frames, or pixels are NaN or infinite. The message names the frame.
     """
-    pairs = open_pairs(test, reference, terms.limits, fps=terms.fps, exposure_ev=terms.exposure_ev)
+    pairs = open_pairs(
+        test, reference, terms.limits, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers
+    )
     conditions = terms.conditions(pairs.size, pairs.fps)
     motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
     monitor.say(motion.text)
-    if pairs.note:
-        monitor.say(pairs.note)
+    for note in filter(None, (pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note)))):
+        monitor.say(note)
     if pairs.exposure_ev:
         monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     if terms.display is None:
@@ -236,6 +241,7 @@ def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDiffe
     steady, transient = (Part(part.score, part.band_jnd) for part in (found.steady, found.transient))
     return FrameDifference(
         pair.name,
+        pair.number,
         found.percent_visible,
         found.score,
         steady,

@@ -32,6 +32,8 @@ class Pair:
         From 0.
     name : str
         Of the test's frame.
+    number : int
+        Of the test's frame; from 1 where it has none of its own.
     test, reference : (H, W) float32
         Luminance, cd/m2.
     reference_relative : (H, W) float32
@@ -42,6 +44,7 @@ class Pair:
 
     index: int
     name: str
+    number: int
     test: F32
     reference: F32
     reference_relative: F32
@@ -129,7 +132,9 @@ class Pairs:
         span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
         test, reference = (image * span + black for image in relative)
         error = _squared_error(*exposed)
-        return Pair(index, self.test.name(index), test, reference, relative[1], error)
+        name, numbers = self.test.name(index), self.test.numbers
+        number = index + 1 if numbers is None else numbers[index]
+        return Pair(index, name, number, test, reference, relative[1], error)
 
 
 def open_pairs(
@@ -139,6 +144,7 @@ def open_pairs(
     *,
     fps: float | None,
     exposure_ev: float | None,
+    layers: tuple[str | None, str | None] = (None, None),
 ) -> Pairs:
     """Open two sequences to be compared, each decoded by a process of its own.
 
@@ -150,14 +156,22 @@ def open_pairs(
         Memory and time of those processes.
     fps, exposure_ev
         See :class:`Pairs`.
+    layers
+        Of the test and the reference, where they are OpenEXR frames: what is the picture.
 
     Raises
     ------
     ImageError
-        One can't be read, they differ in length, size or frame rate, or are runs of other frames or of
-        different exposure.
+        One can't be read, a layer is asked for and none has layers, they differ in length, size or frame
+        rate, or are runs of other frames or of different exposure.
     """
-    sequences = [FencedSequence(source, limits) for source in (test, reference)]
+    sides = zip((test, reference), layers, strict=True)
+    sequences = [FencedSequence(source, limits, layer=layer) for source, layer in sides]
+    if any(layers) and not any(_is_exr(sequence) for sequence in sequences):
+        raise ImageError(
+            f"neither {sequences[0].name(0)} nor {sequences[1].name(0)} has layers; leave out --layer, which "
+            "chooses one of OpenEXR frames"
+        )
     return Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
 
 

@@ -45,6 +45,8 @@ class FrameDifference:
     ----------
     name : str
         Of the test's frame.
+    number : int
+        Of the test's frame; from 1 where it has none of its own.
     percent_visible : float
         Pixels above 1 JND, percent.
     score : float
@@ -61,6 +63,7 @@ class FrameDifference:
     """
 
     name: str
+    number: int
     percent_visible: float
     score: float
     steady: Part
@@ -73,6 +76,7 @@ class FrameDifference:
         """Figures as plain values for JSON; the PSNR of identical images is None."""
         return {
             "name": self.name,
+            "number": self.number,
             "score_jnd": self.score,
             "steady_jnd": self.steady.score,
             "transient_jnd": self.transient.score,
