@@ -101,7 +101,7 @@ def test_the_script_for_blender_writes_a_camera_path(tmp_path, monkeypatch):
     def frame_set(number):
         camera.matrix_world = Matrix.of([[1, 0, 0, 2], [0, 0, -1, number], [0, 1, 0, 1.6], [0, 0, 0, 1]])
 
-    size = {"resolution_x": 1280, "resolution_y": 960, "resolution_percentage": 50}
+    size = {"resolution_x": 1282, "resolution_y": 963, "resolution_percentage": 50}
     render = SimpleNamespace(**size, fps=30, fps_base=1.001)
     scene = SimpleNamespace(render=render, camera=camera, frame_start=5, frame_end=8, frame_set=frame_set)
     for name, members in {

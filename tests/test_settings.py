@@ -130,6 +130,18 @@ def test_layers_by_name(layers, chosen):
     assert OutputSettings(layers).chosen == frozenset(chosen)
 
 
+def test_layers_may_be_a_list():
+    made = Settings.from_tables({"output": {"layers": ["Z", "N"]}, "limits": {"allow": ["/a", "/b"]}})
+    assert (made.output.chosen, made.limits.allow) == ({"Z", "N"}, "/a:/b")
+    for layers, problem in (
+        (["Z", 3], "expected str"),
+        (["Z", "z"], "no layer 'z'"),
+        ([], "write all, none"),
+    ):
+        with pytest.raises(SettingsError, match=problem):
+            Settings.from_tables({"output": {"layers": layers}})
+
+
 def test_sections_check_themselves_when_made():
     with pytest.raises(SettingsError, match=r"\[viewing\] peak_cd_m2 = 0.5 is out of range"):
         ViewingSettings(peak_cd_m2=0.5)
@@ -140,6 +152,8 @@ def test_a_file_is_read(tmp_path):
     file.write_text("[keyframes]\nspacing = 12\nplacement = 'uniform'\n")
     settings = Settings.from_tables(read_tables(file))
     assert settings.keyframes == KeyframeSettings(Placement.UNIFORM, 12)
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())  # as Windows' editors write it
+    assert Settings.from_tables(read_tables(file)) == settings
 
 
 def test_files_that_cannot_be_read_are_named(tmp_path):

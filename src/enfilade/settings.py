@@ -26,9 +26,17 @@ def option(
     most: float | None = None,
     choices: tuple[str, ...] = (),
     is_odd: bool = False,
+    is_path: bool = False,
+    joined_by: str = "",
 ) -> Any:
-    """Declare a setting: default, one sentence of help, range (ends included) or words to choose from."""
-    metadata = {"help": text, "least": least, "most": most, "choices": choices, "is_odd": is_odd}
+    """Declare a setting: default, one sentence of help, range (ends included) or words to choose from.
+
+    One with `joined_by` may be given as a list, too.
+    """
+    metadata = {
+        "help": text, "least": least, "most": most, "choices": choices, "is_odd": is_odd,
+        "is_path": is_path, "joined_by": joined_by,
+    }  # fmt: skip
     return field(default=default, metadata=metadata)
 
 
@@ -155,10 +163,7 @@ class MaskSettings(Section):
         2.0, "A specular region with a difference above this is traced, JND.", least=0.0
     )
     specular_percent: float = option(
-        25.0,
-        "... or with more of its pixels above 1 JND than this, percent.",
-        least=0.0,
-        most=100.0,
+        25.0, "... or with more of its pixels above 1 JND than this, percent.", least=0.0, most=100.0
     )
     split_percent: float = option(
         10.0, "A segment with more of its unmasked pixels above 1 JND is split, percent.",
@@ -203,18 +208,13 @@ class LightSettings(Section):
     keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
     least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=2, most=4096)
     samples: int = option(
-        0,
-        "Camera rays of a pixel that shows an edge; 0: as many as the quality asks for.",
-        least=0,
-        most=4096,
-    )
+        0, "Camera rays of a pixel that shows an edge; 0: as many as the quality asks for.",
+        least=0, most=4096,
+    )  # fmt: skip
     lobe_samples: int = option(
-        0,
-        "Rays of a pixel that shows a glossy, mirroring or transparent surface, 2 or more; 0: as many as the "
-        "quality asks for.",
-        least=0,
-        most=4096,
-    )
+        0, "Rays of a pixel that shows a glossy, mirroring or transparent surface, 2 or more; 0: as many as "
+        "the quality asks for.", least=0, most=4096,
+    )  # fmt: skip
     denoiser: str = option(
         "none",
         "Quality of Open Image Denoise on the light of keyframes, in place of smoothing it along surfaces.",
@@ -242,8 +242,9 @@ class VideoSettings(Section):
 
     codec: str = option("h264", "Codec of the video.", choices=("h264", "ffv1", "av1", "prores"))
     quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
-    ocio: str = option("", "An OpenColorIO configuration for the view transform, in place of sRGB.")
+    ocio: str = option("", "An OpenColorIO configuration for the view, in place of sRGB.", is_path=True)
     view: str = option("", "The view of that configuration.")
+    display: str = option("", "Its display, one for sRGB, Rec.1886 or Rec.709; none: the first of these.")
 
 
 LAYERS = ("Z", "P", "N", "albedo", "item", "forward", "backward", "source")  # of delivered frames
@@ -257,6 +258,7 @@ class OutputSettings(Section):
         "forward,backward,source",
         f"Layers beside the colours: some of {','.join(LAYERS)}; or all, or none. Depth, position, normal, "
         "albedo, number of the item, image flow, and why a pixel has its value.",
+        joined_by=",",
     )
 
     def __post_init__(self) -> None:
@@ -279,8 +281,9 @@ class LimitSettings(Section):
     """What scenes and images may ask for before they are read; no result depends on it."""
 
     allow: str = option(
-        "", f"Folders beside the scene's own in which its files may lie, with {os.pathsep!r} between them."
-    )
+        "", f"Folders beside the scene's own in which its files may lie, with {os.pathsep!r} between them.",
+        is_path=True, joined_by=os.pathsep,
+    )  # fmt: skip
     file_mb: int = option(4096, "Largest file of a scene, megabytes.", least=1, most=1_000_000)
     megapixels: int = option(
         268, "Largest image or film of a scene, millions of pixels.", least=1, most=100_000
@@ -289,8 +292,7 @@ class LimitSettings(Section):
     trial_mb: int = option(
         16_384,
         "Memory in which a process of its own must be able to load a scene before it is rendered, or to "
-        "decode what is compared, MB.",
-        least=512, most=10_000_000,
+        "decode what is compared, MB.", least=512, most=10_000_000,
     )  # fmt: skip
     trial_s: float = option(600.0, "... and seconds, for a scene or a frame.", least=0.1, most=86_400.0)
 
@@ -359,7 +361,7 @@ def read_tables(path: Path) -> dict[str, Any]:
         The file can't be read or is no TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Windows' editors write a mark
     except OSError as error:
         raise SettingsError(f"can't read the settings {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # numbers of 5000 digits and deep nesting included
@@ -376,6 +378,9 @@ def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any
         return kind(value)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value) if abs(value) < 1e300 else math.inf  # which the check refuses
+    joined_by = f.metadata["joined_by"]
+    if joined_by and isinstance(value, list) and all(isinstance(part, str) for part in value):
+        return joined_by.join(value)
     if type(value) is not kind:
         raise SettingsError(f"{where} = {value!r}: expected {kind.__name__}")
     return value

@@ -1,6 +1,7 @@
 """Flags, the TOML file and defaults, in that order of strength."""
 
 import dataclasses
+import os
 
 import click
 import pytest
@@ -47,14 +48,32 @@ def test_a_flag_that_repeats_the_default_still_beats_the_file(settings, tmp_path
 def test_choices_switches_and_short_forms(settings):
     made = settings(
         *("--keyframes-placement", "equal-flow", "--metric-metering", "none", "--antialias-separate-items"),
-        *("--codec", "ffv1", "--method", "paper", "--spp", "3", "--ocio", "studio.ocio", "--view", "Film"),
+        *("--codec", "ffv1", "--method", "paper", "--spp", "3", "--ocio", "ocio://default", "--view", "Film"),
     )
     assert made.keyframes.placement is Placement.EQUAL_FLOW
     assert made.metric.metering is Metering.NONE
     assert made.antialias.separate_items
-    assert (made.video.codec, made.video.ocio, made.video.view) == ("ffv1", "studio.ocio", "Film")
+    assert (made.video.codec, made.video.ocio, made.video.view) == ("ffv1", "ocio://default", "Film")
     assert made.trace.spp == 3
     assert not settings("--antialias-no-separate-items", *PAPER).antialias.separate_items
+
+
+def test_paths_are_absolute_in_flags_from_here_and_in_a_file_from_there(settings, tmp_path, monkeypatch):
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    monkeypatch.chdir(here)
+    made = settings("--ocio", "a/../studio.ocio", "--allow", f"models{os.pathsep}/textures")
+    assert made.video.ocio == str(here / "studio.ocio")
+    assert made.limits.allow == f"{here / 'models'}{os.pathsep}/textures"
+    file = there / "look.toml"
+    file.write_text('[video]\nocio = "studio.ocio"\n[limits]\nallow = ["models", "/textures"]\n')
+    made = settings("--settings", "../there/look.toml")
+    assert made.video.ocio == str(there / "studio.ocio")
+    assert made.limits.allow == f"{there / 'models'}{os.pathsep}/textures"
+    assert settings("--settings", file, "--ocio", "").video.ocio == ""
+    file.write_text('[video]\nocio = "ocio://studio-config-latest"\n')
+    assert settings("--settings", file).video.ocio == "ocio://studio-config-latest"
 
 
 def test_a_flag_that_says_nothing_to_the_method_is_refused(run, camera_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from enfilade.codec import read_json, write_json
 from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
 from enfilade.monitor import Silence
 from enfilade.pipeline.crew import Crew
@@ -223,6 +224,14 @@ def test_a_scene_that_has_changed_is_refused(begun):
     scene = begun.parent / "scene.analytic.json"
     scene.write_text(scene.read_text().replace('"noise": 0.05', '"noise": 0.06'))
     with pytest.raises(RunFolderError, match="not the one with which the run began"):
+        share(begun, "plan")
+
+
+def test_a_video_that_this_host_can_not_encode_is_said_in_the_first_step(begun):
+    job = read_json(begun / "job.json")
+    job["settings"]["video"]["codec"] = "av1"
+    write_json(begun / "job.json", job)
+    with pytest.raises(SettingsError, match="can't encode 48x36 pixels"):
         share(begun, "plan")
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from enfilade.errors import ImageError, RunFolderError, SettingsError
-from enfilade.pixels.tone import srgb_encode
+from enfilade.pixels.tone import srgb_decode, srgb_encode
 from enfilade.settings import VideoSettings
 from enfilade.video import encode_video, exact_fps, join_videos, open_sequence, video_suffix
+from enfilade.video.codecs import odd_size_note
 
 CODECS = ("h264", "ffv1", "av1", "prores")
 BARS = np.float32(
@@ -73,6 +74,18 @@ def test_another_decoder_agrees(tmp_path):
     assert errors["itu601"] > 20
 
 
+def test_a_smooth_wall_has_no_bands(tmp_path):
+    # Two codes of luma over the whole width: without dither, the mean of a region is off by a half of one.
+    wanted = np.linspace(100.0, 102.0, 256, dtype=np.float32)
+    linear = srgb_decode((wanted - 16) / 219)
+    wall = np.ascontiguousarray(np.broadcast_to(linear[None, :, None], (64, 256, 3)))
+    file = encoded(tmp_path / "a.mp4", [wall] * 24)  # x264 looks ahead to see what stays
+    with av.open(str(file)) as container:
+        for frame in container.decode(video=0):
+            luma = frame.to_ndarray()[:64, :256].reshape(64, 16, 16)
+            assert abs(luma.mean(axis=(0, 2)) - wanted.reshape(16, 16).mean(axis=1)).max() < 0.2
+
+
 @pytest.mark.parametrize("codec", CODECS)
 def test_tags_say_what_was_encoded(tmp_path, codec):
     file = encoded(tmp_path / f"a{video_suffix(codec)}", bars(), codec=codec)
@@ -113,6 +126,24 @@ def test_exposure_and_clipping(tmp_path):
 def test_odd_sizes_keep_their_pixels(tmp_path, codec):
     file = encoded(tmp_path / f"a{video_suffix(codec)}", bars(65, 121), codec=codec)
     assert next(iter(open_sequence(file))).shape == (65, 121, 3)
+
+
+@pytest.mark.parametrize(
+    ("codec", "size", "even"),
+    [
+        ("h264", (640, 480), ""),
+        ("h264", (481, 271), "480x270"),
+        ("h264", (641, 480), "640x480"),
+        ("h264", (640, 361), "640x360"),
+        ("h264", (3, 3), "2x2"),
+        ("prores", (481, 271), ""),
+        ("ffv1", (481, 271), ""),
+    ],
+)
+def test_a_size_that_few_players_show_is_said_with_the_nearest_that_all_do(codec, size, even):
+    note = odd_size_note(codec, *size)
+    assert bool(note) == bool(even)
+    assert f"--size {even} is" in note or not even
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,25 @@ def test_opencolorio_gives_what_the_configuration_says(tmp_path, display, transf
     np.testing.assert_allclose(raw.encode(linear), linear, atol=1e-6)
 
 
+def test_a_display_by_its_name(tmp_path):
+    pytest.importorskip("PyOpenColorIO")
+    file = tmp_path / "config.ocio"
+    file.write_text(
+        CONFIG.format(display="sRGB", linear="lin_rec709").replace(
+            "active_displays",
+            "  Rec.1886:\n    - !<View> {name: Raw, colorspace: raw}\n  P3: []\nactive_displays",
+        )
+    )
+    linear = np.full((1, 1, 3), 0.25, np.float32)
+    view = open_view(VideoSettings(ocio=str(file), display="Rec.1886"), 0.0)
+    assert view.transfer == 1
+    np.testing.assert_allclose(view.encode(linear), linear, atol=1e-6)
+    with pytest.raises(SettingsError, match=r"no display 'P3' for sRGB or Rec\.709; it has: sRGB, Rec.1886"):
+        open_view(VideoSettings(ocio=str(file), display="P3"), 0.0)
+    with pytest.raises(SettingsError, match=r"display = 'sRGB' needs a configuration"):
+        open_view(VideoSettings(display="sRGB"), 0.0)
+
+
 @pytest.mark.parametrize(
     ("changes", "view", "message"),
     [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from enfilade.video.ycbcr import BT601, BT709, planes_from_rgb, quantized, rgb_from_planes
+from enfilade.video.ycbcr import BT601, BT709, DITHER, planes_from_rgb, quantized, rgb_from_planes
 
 # 75 % and 100 % bars, Y' Cb Cr of 8 bits: ITU-R BT.709-6 items 3.2-3.4 worked out by hand
 BARS = {
@@ -26,6 +26,42 @@ def test_primaries_have_the_numbers_of_the_standard(rgb, expected, bits):
         for plane, number in zip(planes, expected, strict=True):
             assert plane.dtype == (np.uint8 if bits == 8 else np.uint16)
             assert abs(plane.astype(float) / 2 ** (bits - 8) - number).max() <= 0.5
+
+
+@pytest.mark.parametrize(("rgb", "expected"), BARS.items())
+@pytest.mark.parametrize("is_halved", [False, True])
+def test_a_dithered_colour_is_right_in_the_mean_and_a_code_stays_what_it_is(rgb, expected, is_halved):
+    image = np.broadcast_to(np.float32(rgb), (32, 48, 3))
+    exact = planes_from_rgb(image, bits=16, is_halved=is_halved)
+    planes = planes_from_rgb(image, bits=8, is_halved=is_halved, is_dithered=True)
+    again = planes_from_rgb(image, bits=8, is_halved=is_halved, is_dithered=True)
+    for plane, same, code, number in zip(planes, again, exact, expected, strict=True):
+        wanted = code[0, 0] / 256
+        assert plane.dtype == np.uint8
+        np.testing.assert_array_equal(plane, same)
+        assert plane.mean() == pytest.approx(wanted, abs=1 / 128)  # a threshold in 64
+        assert np.ptp(plane) <= 1
+        if wanted == number:  # white, black and grey are codes
+            assert (plane == number).all()
+
+
+def test_a_dithered_ramp_has_no_bands():
+    # Eight codes over 512 pixels: rounding alone is off by up to half a code over 64 pixels.
+    wanted = np.linspace(100, 108, 512, dtype=np.float32)
+    grey = np.broadcast_to(((wanted - 16) / 219)[None, :, None], (8, 512, 3))
+    errors = {}
+    for is_dithered in (False, True):
+        luma, *chroma = planes_from_rgb(grey, bits=8, is_halved=True, is_dithered=is_dithered)
+        means = luma.reshape(8, 64, 8).mean(axis=(0, 2)) - wanted.reshape(64, 8).mean(axis=1)
+        errors[is_dithered] = abs(means).max()
+        assert all((plane == 128).all() for plane in chroma)
+    assert errors[False] > 0.4
+    assert errors[True] < 0.04
+
+
+def test_the_dither_has_no_mean_of_its_own():
+    assert DITHER.sum() == 0.0
+    np.testing.assert_allclose(np.sort(DITHER.ravel()), (np.arange(64) + 0.5) / 64 - 0.5)
 
 
 def test_there_and_back_within_rounding():

@@ -1,6 +1,7 @@
 """Flags made from the settings: one for each field, with its help, default and range.
 
-A flag beats the TOML file, the file beats the default.
+A flag beats the TOML file, the file beats the default. Paths are made absolute: workers elsewhere read them.
+Those of flags count from the working folder, those in a file from the file's.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ SHORT = {
     ("video", "codec"): "--codec",
     ("video", "ocio"): "--ocio",
     ("video", "view"): "--view",
+    ("video", "display"): "--display",
+    ("viewing", "exposure_ev"): "--exposure-ev",
 }
 
 
@@ -38,15 +41,17 @@ class SettingOption(click.Option):
         Name of the section, as in a TOML file.
     field
         The setting.
+    default
+        What help says it is without the flag; empty: the setting's own default.
     """
 
-    def __init__(self, section: str, field: dataclasses.Field[Any]) -> None:
+    def __init__(self, section: str, field: dataclasses.Field[Any], default: str = "") -> None:
         self.section = section
         self.field = field
         super().__init__(
             [*_names(section, field), f"{section}__{field.name}"],
             type=_kind(field),
-            help=f"{field.metadata['help']}  [{_limits(field)}]",
+            help=f"{field.metadata['help']}  [{_limits(field, default)}]",
             default=None,
             expose_value=False,
             callback=_remember,
@@ -69,11 +74,18 @@ class SettingsCommand(click.Command):
                 formatter.write_dl(records, col_max=34)
 
 
-def settings_options(*names: str) -> Callable[[Command], Command]:
-    """Decorate a command with ``--settings`` and flags for settings: ``section`` or ``section.name``."""
+def settings_options(*names: str, default: str = "") -> Callable[[Command], Command]:
+    """Decorate a command with ``--settings`` and flags for settings: ``section`` or ``section.name``.
+
+    Parameters
+    ----------
+    names
+    default
+        What help says they are without a flag; empty: their own defaults.
+    """
 
     def decorate(command: Command) -> Command:
-        options = [option for name in names for option in _options_of(name)]
+        options = [option for name in names for option in _options_of(name, default)]
         file = click.Option(
             ["--settings", "settings_file"],
             type=click.Path(path_type=Path),
@@ -88,10 +100,10 @@ def settings_options(*names: str) -> Callable[[Command], Command]:
     return decorate
 
 
-def _options_of(name: str) -> list[SettingOption]:
+def _options_of(name: str, default: str) -> list[SettingOption]:
     section, _, setting = name.partition(".")
     known = dataclasses.fields(sections()[section])
-    return [SettingOption(section, field) for field in known if setting in ("", field.name)]
+    return [SettingOption(section, field, default) for field in known if setting in ("", field.name)]
 
 
 def settings_of(ctx: click.Context) -> Settings:
@@ -102,13 +114,46 @@ def settings_of(ctx: click.Context) -> Settings:
     SettingsError
         The file can't be read; a setting is unknown, of the wrong type, or out of range.
     """
+    return Settings.from_tables(tables_of(ctx))
+
+
+def tables_of(ctx: click.Context) -> dict[str, Any]:
+    """What the file and the flags of this command set, unchecked, by section.
+
+    Raises
+    ------
+    SettingsError
+        The file can't be read.
+    """
     given = ctx.meta.get(_META, {})
-    tables: dict[str, Any] = read_tables(given["file"]) if "file" in given else {}
+    tables: dict[str, Any] = {}
+    if "file" in given:
+        tables = read_tables(given["file"])
+        _root(tables, given["file"].parent)
     for (section, name), value in given.get("flags", {}).items():
         table = tables.setdefault(section, {})
         if isinstance(table, dict):  # what is no table, from_tables refuses with a reason
             table[name] = value
-    return Settings.from_tables(tables)
+    _root(tables, Path())
+    return tables
+
+
+def _root(tables: dict[str, Any], folder: Path) -> None:
+    """Make the paths in tables absolute, which count from a folder. What is no path stays for the checks."""
+    for section, cls in sections().items():
+        table = tables.get(section)
+        for field in dataclasses.fields(cls):
+            if field.metadata["is_path"] and isinstance(table, dict) and field.name in table:
+                table[field.name] = _rooted(table[field.name], folder, field.metadata["joined_by"])
+
+
+def _rooted(value: Any, folder: Path, joined_by: str) -> Any:
+    if isinstance(value, list):
+        return [_rooted(part, folder, "") for part in value]
+    if not isinstance(value, str) or value == "" or "://" in value:
+        return value
+    parts = value.split(joined_by) if joined_by else [value]
+    return joined_by.join(str((folder / part).resolve()) if part else part for part in parts)
 
 
 def flags_given(ctx: click.Context) -> set[tuple[str, str]]:
@@ -163,12 +208,12 @@ def _kind(field: dataclasses.Field[Any]) -> click.ParamType[Any] | type:
     return click.Choice(choices) if choices else type(field.default)
 
 
-def _limits(field: dataclasses.Field[Any]) -> str:
+def _limits(field: dataclasses.Field[Any], shown_default: str) -> str:
     default = field.default
     shown: object = default.value if isinstance(default, Enum) else default
     if isinstance(default, bool):
         shown = "yes" if default else "no"
-    text = f"default: {'none' if shown == '' else shown}"
+    text = f"default: {shown_default or ('none' if shown == '' else shown)}"
     least, most = field.metadata["least"], field.metadata["most"]
     if least is not None and most is not None:
         return f"{text}; {least:.10g} to {most:.10g}"

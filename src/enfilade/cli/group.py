@@ -15,6 +15,7 @@ COMMANDS = (
     "render",
     "work",
     "farm",
+    "encode",
     "plan",
     "compare",
     "report",

@@ -21,6 +21,8 @@ from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings, TraceSettings
 from enfilade.store import Run
+from enfilade.video import check_encodable
+from enfilade.video.view import view_identity
 from enfilade.viewing import Viewing
 
 ANALYTIC_SUFFIX = ".analytic.json"
@@ -75,12 +77,16 @@ class Job:
         ------
         SceneError
             The scene is missing or malformed.
+        SettingsError
+            The view of an OpenColorIO configuration can't be opened.
         """
         name, fingerprint = _renderer_and_fingerprint(self.scene)
         items = {} if renderer is None else {"items": len(renderer.describe().items)}
         settings = self.settings.to_tables()
         del settings["trace"]["chunk"]
         del settings["limits"]
+        view = view_identity(self.settings.video)
+        ocio = {"opencolorio": view["opencolorio"]} if view else {}
         return {
             "method": self.method,
             "scene": {"fingerprint": fingerprint, **items},
@@ -92,11 +98,13 @@ class Job:
                 "poses": _digest(self.path),
             },
             "settings": settings,
+            **({"view": {"processor": view["processor"]}} if view else {}),
             "versions": {
                 "enfilade": __version__,
                 "renderer": name,
                 "variant": _variant(self.scene),
                 **({"denoiser": denoiser_name()} if self._denoises else {}),
+                **ocio,
             },
         }
 
@@ -135,6 +143,20 @@ class Job:
             self.check_light(
                 try_scene(self.scene, self.settings.trace, self.settings.limits, active().variant)
             )
+
+    def check_video(self) -> None:
+        """Refuse a video that can't be encoded here, before a night of rendering.
+
+        Raises
+        ------
+        SettingsError
+        """
+        check_encodable(
+            self.settings.video,
+            width=self.path.width,
+            height=self.path.height,
+            exposure_ev=self.settings.viewing.exposure_ev,
+        )
 
     def check_light(self, why_no_light: str) -> None:
         """Refuse a scene that can't be asked for light, where the method asks for it.
@@ -227,8 +249,8 @@ def check_identity(job: Job, run: Run) -> None:
     """
     if job.identity() != run.identity:
         raise RunFolderError(
-            f"{run.folder}: on {socket.gethostname()}, the scene, the device, or the version of enfilade, "
-            "Mitsuba or the denoiser is not the one with which the run began; "
+            f"{run.folder}: on {socket.gethostname()}, the scene, the device, the view, or the version of "
+            "enfilade, Mitsuba, the denoiser or OpenColorIO is not the one with which the run began; "
             "`enfilade render` says what differs"
         )
 

@@ -81,7 +81,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
     RunFolderError
         It holds no run, one command has it to itself, or this host would render otherwise.
     SettingsError
-        There is no such step.
+        There is no such step, or this host can't encode the video.
     UnfinishedError
         The path is not surveyed yet, units of an earlier step are missing, another command holds the share,
         or some units failed again and again.
@@ -89,6 +89,7 @@ def do_share(folder: Path, share: Share, monitor: Monitor, crew: Crew) -> None:
     job = read_job(folder)
     step = step_named(job, share.step)
     job.check_scene()
+    job.check_video()
     is_shared = _is_shared(folder)
     wait = _Patience(monitor, PATIENCE_S).wait if is_shared else None
     late = _Patience(monitor, PATIENCE_S if is_shared else 0.0)

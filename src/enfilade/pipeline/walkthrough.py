@@ -10,12 +10,13 @@ from enfilade.errors import RunFolderError, SettingsError
 from enfilade.executors.opener import check_executor
 from enfilade.monitor import Monitor
 from enfilade.pipeline.crew import Crew, carry_out
+from enfilade.pipeline.encode import encode_instead, is_of_video
 from enfilade.pipeline.job import JOB_FILE, Job
 from enfilade.pipeline.summary import summarize
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.store.identity import RUN_FILE
-from enfilade.video import check_encodable
+from enfilade.video.codecs import odd_size_note
 
 METHODS = ("decoupled", "paper", "reference")
 LEAST_SPP = 2  # of the paper's method
@@ -69,8 +70,8 @@ def render(
     _check(job, crew)
     if is_tried:
         _try(job, folder)
-    with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
-        for note in run.notes:
+    with Run.open(folder, job.identity(), kept=lambda keys: _compared(job, folder, keys)) as run:
+        for note in (*run.notes, *_video_notes(job)):
             monitor.say(note)
         _write_job(run, job)
         if is_verified:
@@ -107,11 +108,19 @@ def kept(method: str, keys: list[str]) -> str:
     keys
         Such as ``settings.video.codec``.
     """
-    sections = {key.split(".")[1] if key.startswith("settings.") else key for key in keys}
+    sections = {
+        "video" if is_of_video(key) else key.split(".")[1] if key.startswith("settings.") else key
+        for key in keys
+    }
     found = {KEPT.get(method, {}).get(section, "") for section in sections}
     if len(found) != 1 or "" in found:
         return ""
     return f"Of what is there, this would be the same: {found.pop()}\n"
+
+
+def _compared(job: Job, folder: Path, keys: list[str]) -> str:
+    """What can be had of another run, for the message that refuses its folder."""
+    return kept(job.method, keys) + encode_instead(job, folder, keys)
 
 
 def prepare(job: Job, folder: Path, *, is_tried: bool = False) -> None:
@@ -130,8 +139,16 @@ def prepare(job: Job, folder: Path, *, is_tried: bool = False) -> None:
     _check(job, Crew())
     if is_tried:
         _try(job, folder)
-    with Run.open(folder, job.identity(), kept=lambda keys: kept(job.method, keys)) as run:
+    with Run.open(folder, job.identity(), kept=lambda keys: _compared(job, folder, keys)) as run:
         _write_job(run, job)
+
+
+def _video_notes(job: Job) -> list[str]:
+    """What one should know of the video before its frames are rendered."""
+    video = job.settings.video
+    odd = odd_size_note(video.codec, job.path.width, job.path.height)
+    unseen = f"what is seen of noise is judged by the sRGB curve, clipped at 1, not by a view of {video.ocio}"
+    return [note for note in (odd, unseen if video.ocio else "") if note]
 
 
 def _write_job(run: Run, job: Job) -> None:
@@ -163,12 +180,7 @@ def _check(job: Job, crew: Crew) -> None:
     job.check_scene()
     if job.method not in METHODS:
         raise ValueError(f"there is no method {job.method!r}")
-    check_encodable(
-        job.settings.video,
-        width=job.path.width,
-        height=job.path.height,
-        exposure_ev=job.settings.viewing.exposure_ev,
-    )
+    job.check_video()
     if job.method == "paper" and job.settings.trace.spp < LEAST_SPP:
         raise SettingsError(
             f"--method paper needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "

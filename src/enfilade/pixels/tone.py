@@ -1,7 +1,8 @@
 """From linear radiance to what the screen emits: sRGB transfer (IEC 61966-2-1) and the display.
 
 The viewer, and so the metric, sees the image after the view transform of the video (exposure, sRGB
-encoding, clipping at white) and the screen that undoes the encoding.
+encoding, clipping at white) and the screen that undoes the encoding. The metric takes this view also where
+the video has one of an OpenColorIO configuration, which may show more or less of what is bright or dark.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from enfilade.errors import SettingsError
 
-__all__ = ["Codec", "codec_named", "video_suffix"]
+__all__ = ["Codec", "codec_named", "odd_size_note", "video_suffix"]
 
 
 @dataclass(frozen=True)
@@ -129,3 +129,27 @@ def video_suffix(codec: str) -> str:
         There is none of that name.
     """
     return codec_named(codec).suffix
+
+
+def odd_size_note(codec: str, width: int, height: int) -> str:
+    """Say where few players show a video because its width or height is odd; empty where it is not so.
+
+    Parameters
+    ----------
+    codec
+        Its name in the settings.
+    width, height
+        Pixels.
+
+    Returns
+    -------
+    str
+        With the even size next below.
+    """
+    known = codec_named(codec)
+    if known.pixels_for(width, height) == known.pixels:
+        return ""
+    return (
+        f"{width}x{height} pixels: of odd sizes {codec} makes 4:4:4 video, which QuickTime, Safari, Firefox "
+        f"and most hardware can't play; --size {max(width // 2 * 2, 2)}x{max(height // 2 * 2, 2)} is even"
+    )

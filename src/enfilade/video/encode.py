@@ -45,7 +45,7 @@ def encode_video(
     H.264 is 8 bit 4:2:0, or 4:4:4 where width or height is odd (few players show that); AV1 10 bit 4:2:0,
     even sizes only; ProRes 10 bit 4:4:4; FFV1 12 bit R'G'B', without loss beyond that rounding. Y'CbCr
     has the BT.709 matrix and limited range, primaries are BT.709, the transfer is sRGB's or that of the
-    OpenColorIO display.
+    OpenColorIO display. To 8 bits it is rounded with an ordered dither, so that smooth walls show no bands.
 
     Parameters
     ----------
@@ -273,7 +273,8 @@ def _picture(encoded: F32, pixels: str, bits: int) -> Any:
     if _is_rgb(pixels):
         planes = tuple(quantized(encoded[..., c], bits, unit=2.0**bits - 1.0) for c in (1, 2, 0))
     else:
-        planes = planes_from_rgb(encoded, bits=bits, is_halved="420" in pixels)
+        is_dithered = bits == 8  # in 10 bits, bands are seen nowhere
+        planes = planes_from_rgb(encoded, bits=bits, is_halved="420" in pixels, is_dithered=is_dithered)
     picture = av.VideoFrame(width, height, pixels)
     for plane, values in zip(picture.planes, planes, strict=True):
         rows = np.zeros((plane.height, plane.line_size), np.uint8)

@@ -13,7 +13,7 @@ from enfilade.pixels.tone import srgb_encode
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
 
-__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "open_view"]
+__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "open_view", "view_identity"]
 
 BT709_TRANSFER = 1  # ITU-T H.273, table 3
 SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
@@ -49,8 +49,8 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     Parameters
     ----------
     settings
-        ``ocio`` and ``view`` choose; without a view, the default one of the display. The display is the
-        configuration's first one for sRGB, else for Rec.1886 or Rec.709: wide-gamut and HDR displays
+        ``ocio``, ``display`` and ``view`` choose; without a view, the default one of the display. The display
+        is one for sRGB, Rec.1886 or Rec.709, unnamed the first one of these: wide-gamut and HDR displays
         aren't encoded.
     exposure_ev
         Stops, before the transform.
@@ -63,16 +63,50 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     """
     gain = np.float32(2.0**exposure_ev)
     if not settings.ocio:
-        if settings.view:
-            raise SettingsError(
-                f"[video] view = {settings.view!r} needs a configuration: set [video] ocio too"
-            )
+        for name in ("view", "display"):
+            if value := getattr(settings, name):
+                raise SettingsError(f"[video] {name} = {value!r} needs a configuration: set [video] ocio too")
         return View(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
-    apply, transfer = _open_ocio(settings.ocio, settings.view)
-    return View(lambda linear: apply(np.ascontiguousarray(linear * gain, np.float32)), transfer)
+    processor, transfer = _open_ocio(settings)
+    apply = processor.getDefaultCPUProcessor().applyRGB
+
+    def encode(linear: F32) -> F32:
+        values = np.ascontiguousarray(linear * gain, np.float32)
+        apply(values)
+        return np.clip(values, 0.0, 1.0)
+
+    return View(encode, transfer)
 
 
-def _open_ocio(file: str, view: str) -> tuple[Callable[[F32], F32], int]:
+def view_identity(settings: VideoSettings) -> dict[str, str]:
+    """What makes the values of an OpenColorIO view what they are; empty for sRGB.
+
+    Parameters
+    ----------
+    settings
+
+    Returns
+    -------
+    dict
+        ``opencolorio``, its version, and ``processor``, its hash of all steps of the view with the tables in
+        them, wherever the files lie.
+
+    Raises
+    ------
+    SettingsError
+        As of :func:`open_view`.
+    """
+    if not settings.ocio:
+        return {}
+    processor, _ = _open_ocio(settings)
+    import PyOpenColorIO
+
+    return {"opencolorio": str(PyOpenColorIO.GetVersion()), "processor": str(processor.getCacheID())}
+
+
+def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
+    """OpenColorIO's processor for a view, and the transfer of its display."""
+    file, view = settings.ocio, settings.view
     try:
         import PyOpenColorIO
     except ImportError as error:
@@ -81,31 +115,29 @@ def _open_ocio(file: str, view: str) -> tuple[Callable[[F32], F32], int]:
         ) from error
     try:
         config = PyOpenColorIO.Config.CreateFromFile(file)
-        display, transfer = _display(config, file)
+        display, transfer = _display(config, settings)
         views = list(config.getViews(display))
         chosen = view or config.getDefaultView(display)
         if chosen not in views:
             raise SettingsError(f"{file} has no view {chosen!r} of {display!r}; it has: {', '.join(views)}")
         processor = config.getProcessor(
             _linear_rec709(config, file), display, chosen, PyOpenColorIO.TRANSFORM_DIR_FORWARD
-        ).getDefaultCPUProcessor()
+        )
     except (PyOpenColorIO.Exception, PyOpenColorIO.ExceptionMissingFile) as error:
         raise SettingsError(f"OpenColorIO can't use {file}: {error}") from error
-
-    def apply(linear: F32) -> F32:
-        processor.applyRGB(linear)
-        return np.clip(linear, 0.0, 1.0)
-
-    return apply, transfer
+    return processor, transfer
 
 
-def _display(config: Any, file: str) -> tuple[str, int]:
+def _display(config: Any, settings: VideoSettings) -> tuple[str, int]:
     names = list(config.getDisplays())
     for start, transfer in DISPLAYS:
         for name in names:
-            if name.lower().startswith(start):
+            if name.lower().startswith(start) and settings.display in ("", name):
                 return name, transfer
-    raise SettingsError(f"{file} has no display for sRGB or Rec.709; it has: {', '.join(names)}")
+    named = f" {settings.display!r}" if settings.display else ""
+    raise SettingsError(
+        f"{settings.ocio} has no display{named} for sRGB or Rec.709; it has: {', '.join(names)}"
+    )
 
 
 def _linear_rec709(config: Any, file: str) -> str:
