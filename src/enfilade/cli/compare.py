@@ -188,7 +188,8 @@ def _terms(
             )
         from enfilade.device import activate
 
-        activate(cast('Literal["auto", "cpu", "gpu"]', device))
+        if note := activate(cast('Literal["auto", "cpu", "gpu"]', device)).note:
+            click.echo(f"note    judged on the CPU: {note}", err=True)
     return Terms(
         viewing=settings.viewing,
         metric=settings.metric,
