@@ -351,7 +351,7 @@ def test_a_scene_opened_earlier_is_no_hindrance(tmp_path):
 def test_paths_go_on_alike_whatever_the_chunks(tmp_path):
     renderer, camera = _opened(tmp_path, MATERIALS), _camera()
     # Of the last paths of a chunk, too, whose lanes fill up what a kernel takes.
-    one, many = (_shaded(renderer, LightCache(), camera, 4, chunk=chunk) for chunk in (1 << 20, 1000))
+    one, many = (_shaded(renderer, LightCache(), camera, 4, chunk=chunk) for chunk in (1 << 20, 256))
     np.testing.assert_array_equal(one.color, many.color)
 
 

@@ -101,7 +101,7 @@ class _Work:
         totals: dict[str, tuple[str, int | None]] = {"survey": ("path surveyed", 1)}
         if self._method == "paper":
             totals |= {"keyframe": ("keyframes", None), "segment": ("segments judged", None)}
-            totals |= {"raw": ("frames before antialiasing", self._raws)}
+            totals |= {"raw": ("frames before antialiasing", count)}
         if self._method == "decoupled":
             totals |= {"draft": ("drafts of keyframes", None), "cells": ("cells beside the drafts", None)}
             totals |= {"pilot": ("pilots", None), "keyframe": ("keyframes", None)}

@@ -19,9 +19,7 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
-
-
-LAMBERT = ("MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse")  # of them a material has Lambert's lobe, and holes
+LAMBERT = ("MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse")  # made of these alone it is Lambert's lobe with holes
 
 
 class Lobes:
