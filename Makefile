@@ -36,7 +36,7 @@ browser:
 	@sh setup/browser.sh
 
 test: setup browser
-	$(BIN)/python -m pytest -n $(or $(JOBS),2) --dist loadfile $(TESTS)
+	$(BIN)/python -m pytest -n $(or $(JOBS),2) --dist loadfile --max-worker-restart 0 $(TESTS)
 
 validate-metric: setup
 	$(BIN)/enfilade validate $(VALIDATE)

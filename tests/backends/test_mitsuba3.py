@@ -486,6 +486,17 @@ def test_one_thread_opens_a_scene_with_openexr_files(tmp_path):
     assert done.stdout.strip() == "1"
 
 
+@pytest.mark.parametrize(("sky", "asked"), [("holes.exr", [2, 1]), ("", [])])
+def test_no_thread_is_begun_for_nothing(tmp_path, monkeypatch, sky, asked):
+    write_holes(tmp_path)
+    light = f'<emitter type="envmap"><string name="filename" value="{sky}"/></emitter>' if sky else SKY
+    file, counts = write(tmp_path, placed("sphere", "ball", (0, 0, 0), DIFFUSE), sky=light), []
+    monkeypatch.setattr(dr, "thread_count", lambda: 1)
+    monkeypatch.setattr(dr, "set_thread_count", counts.append)
+    opened(file)
+    assert counts == asked
+
+
 def compiled_since():
     return [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT and not k["cache_hit"]]
 

@@ -15,7 +15,7 @@ from defusedxml.ElementTree import DefusedXMLParser, parse
 from enfilade.backends.parameters import Parameters
 from enfilade.errors import SceneError
 
-__all__ = ["Demands", "Name", "SceneFile", "as_loaded", "fingerprint"]
+__all__ = ["Demands", "Name", "SceneFile", "as_loaded", "fingerprint", "named_files"]
 
 MB = 1_000_000
 XML_MB = 256  # of a scene file itself: meshes stand in files of their own
@@ -208,21 +208,32 @@ def as_loaded(scene: Path) -> list[Path]:
     return [scene] if is_same else [scene, whole]
 
 
-def fingerprint(scene: Path) -> str:
-    """SHA-256 over a scene file and every file that it names: what Mitsuba reads first, then the rest.
+def named_files(scene: Path) -> list[Path]:
+    """A scene file and every file that it names, each once: what Mitsuba reads first, then the rest.
 
     Raises
     ------
     SceneError
-        A file can't be read or is malformed.
+        A scene file can't be read or is malformed.
     """
     read = SceneFile(scene)
     files = {scene: None}
     for _, _, names in read.elements():
         files.update((name.place, None) for name in names)
     files.update((name.place, None) for _, name in read.strings())
+    return list(files)
+
+
+def fingerprint(scene: Path) -> str:
+    """SHA-256 over a scene file and every file that it names.
+
+    Raises
+    ------
+    SceneError
+        A file can't be read or is malformed.
+    """
     digest = hashlib.sha256()
-    for file in files:
+    for file in named_files(scene):
         if file.is_file():
             with file.open("rb") as stream:
                 digest.update(hashlib.file_digest(stream, "sha256").digest())

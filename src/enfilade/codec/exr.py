@@ -24,7 +24,7 @@ import OpenEXR
 from enfilade.codec.whole import unwritable, whole_file
 from enfilade.errors import ImageError
 
-__all__ = ["Array", "color_layers", "exr_pixels", "read_attributes", "read_exr", "write_exr"]
+__all__ = ["Array", "color_layers", "exr_pixels", "is_exr", "read_attributes", "read_exr", "write_exr"]
 
 Array = npt.NDArray[Any]
 
@@ -138,6 +138,18 @@ def color_layers(file: Path) -> tuple[str, ...]:
     return tuple(p.rstrip(".") or "RGB" for p in prefixes if {f"{p}G", f"{p}B"} <= set(names))
 
 
+def is_exr(file: Path) -> bool:
+    """Whether a file begins as OpenEXR files do, whatever it is called.
+
+    Raises
+    ------
+    OSError
+        It can't be read.
+    """
+    with file.open("rb") as raw:
+        return raw.read(len(MAGIC)) == MAGIC
+
+
 def exr_pixels(file: Path) -> int:
     """Pixels of an OpenEXR file, the largest window of all parts, from its headers alone.
 
@@ -230,12 +242,10 @@ def _full_names(headers: list[dict[str, Any]]) -> dict[tuple[int, str], str]:
 
 def _part_headers(file: Path) -> list[dict[str, Any]]:
     try:
-        with file.open("rb") as raw:
-            start = raw.read(len(MAGIC))
+        if not is_exr(file):
+            raise ImageError(f"{file} is no OpenEXR file")
     except OSError as error:
         raise ImageError(f"can't read {file}: {error.strerror}") from error
-    if start != MAGIC:
-        raise ImageError(f"{file} is no OpenEXR file")
     with _failures(file), OpenEXR.File(str(file), separate_channels=True, header_only=True) as image:
         headers = [dict(part.header) for part in image.parts]
     if not headers:

@@ -24,8 +24,9 @@ from enfilade.backends.mitsuba3.integrators import scene_integrator, shortened, 
 from enfilade.backends.mitsuba3.lamps import find_lamps
 from enfilade.backends.mitsuba3.light import Light
 from enfilade.backends.mitsuba3.lobes import has_lobe
-from enfilade.backends.scenefile import fingerprint
+from enfilade.backends.scenefile import fingerprint, named_files
 from enfilade.camera import Camera
+from enfilade.codec.exr import is_exr
 from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.pixels.estimate import estimate
@@ -76,7 +77,7 @@ class MitsubaRenderer:
         mi.set_log_level(mi.LogLevel.Error)
         try:
             # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
-            with _several_threads():
+            with _threads_to_read(file):
                 scene = mi.load_file(str(file), optimize=False)
         except MemoryError:
             raise
@@ -269,14 +270,22 @@ class MitsubaRenderer:
 
 
 @contextmanager
-def _several_threads() -> Iterator[None]:
-    """With one thread Mitsuba waits forever for an OpenEXR file, which it reads by tasks of its own."""
-    threads = dr.thread_count()
-    dr.set_thread_count(max(threads, 2))
+def _threads_to_read(scene: Path) -> Iterator[None]:
+    """Another thread where there is one and the scene names OpenEXR files.
+
+    Mitsuba reads those by tasks that it waits for without doing them. No thread is begun for nothing: it
+    would have to be given a core, for which the waiting thread competes.
+    """
+    needs_more = dr.thread_count() == 1 and any(
+        file.is_file() and is_exr(file) for file in named_files(scene)
+    )
+    if needs_more:
+        dr.set_thread_count(2)
     try:
         yield
     finally:
-        dr.set_thread_count(threads)
+        if needs_more:
+            dr.set_thread_count(1)
 
 
 @dataclass(frozen=True)
