@@ -1,5 +1,7 @@
 """Units are offered when what they need is finished, those of one group to one worker."""
 
+import pytest
+
 from enfilade.executors import Graph, Unit
 
 
@@ -53,19 +55,53 @@ def test_gates_open_by_themselves():
     assert [u.name for u in graph.unfinished()] == ["z"]
 
 
-def test_a_worker_stays_with_its_group_and_out_of_others():
+def in_groups(count, size):
     graph = Graph()
-    for number in range(6):
-        graph.add(Unit(f"u{number}", "", order=(1, number), group=f"g{number // 2}"))
-    graph.add(Unit("next", "", order=(2,), group="g0"))
-    assert taken(graph, group="g1") == "u2"
-    assert taken(graph, group="none", busy={"g1"}) == "u0"
-    assert taken(graph, group="none", busy={"g0", "g1"}) == "u4"
-    assert taken(graph, group="g0") == "u1"
+    units = [Unit(f"u{n}", "", order=(1, n), group=f"g{n // size}") for n in range(count)]
+    for unit in units:
+        graph.add(unit)
+    return graph, units
+
+
+def test_a_worker_stays_with_its_group_and_out_of_others():
+    graph, units = in_groups(6, 2)
+    later = Unit("later", "", order=(2,), group="g0")
+    graph.add(later)
+    assert taken(graph, last=units[3]) == "u2"
+    assert taken(graph, busy=[units[2]]) == "u0"
+    assert taken(graph, busy=[units[0], units[2]]) == "u4"
+    assert taken(graph, last=units[0]) == "u1"
     # A unit of a later stage waits for those of the present one, also where its group is at hand.
-    assert taken(graph, group="g0", busy={"g1"}) == "u5"
-    assert taken(graph, group="g0", busy={"g1"}) == "u3"
-    assert taken(graph) == "next"
+    assert taken(graph, last=later, busy=[units[2]]) == "u5"
+    assert taken(graph, last=units[5], busy=[units[2]]) == "u3"  # rather the group of another than nothing
+    assert taken(graph) == "later"
+
+
+def test_one_worker_alone_does_all_in_order():
+    graph, units = in_groups(12, 3)
+    last = None
+    for unit in units:
+        last = graph.take(last)
+        assert last is unit
+
+
+@pytest.mark.parametrize("workers", [2, 3, 7])
+def test_workers_go_on_with_what_follows(workers):
+    graph, units = in_groups(400, 4)
+    lasts: list[Unit | None] = [None] * workers
+    hands: list[Unit | None] = [None] * workers
+    done, jumps = [], 0
+    while len(done) < len(units):
+        for slot in range(workers):  # all are equally fast
+            if hands[slot] is not None:
+                done.append(hands[slot])
+            others = [unit for at, unit in enumerate(hands) if at != slot and unit is not None]
+            last, unit = lasts[slot], graph.take(lasts[slot], others)
+            if unit is not None and last is not None:
+                jumps += not last.order < unit.order <= (1, last.order[1] + 4)
+            lasts[slot], hands[slot] = unit or last, unit
+    assert sorted(unit.order for unit in done) == [unit.order for unit in units]
+    assert jumps < 8 * workers  # of 100 groups
 
 
 def test_what_was_set_aside_before_it_came_is_not_offered():

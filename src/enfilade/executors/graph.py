@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from bisect import bisect_right
 from collections.abc import Collection
 
 from enfilade.executors.unit import Unit
@@ -58,21 +59,26 @@ class Graph:
         """Give a unit up, also before it is taken up; what needs it is never ready."""
         self._aside.add(name)
 
-    def take(self, group: str = "", busy: Collection[str] = ()) -> Unit | None:
+    def take(self, last: Unit | None = None, busy: Collection[Unit] = ()) -> Unit | None:
         """Take the unit that is to be begun next; None if none is ready.
 
         Parameters
         ----------
-        group
-            Of what its worker did last: of equal stage, its units come first.
+        last
+            What its worker did last. Of equal stage, units of its group come first, then those of the group
+            that follows, unless others work on it.
         busy
-            Groups that others work on: of equal stage, their units come last.
+            What others have in hand. Who comes to the end of his stretch takes the middle of the longest
+            that nobody works on: so each does groups that follow one another, and what is in memory serves
+            for longest.
         """
-        heaps = {name: heap for name, heap in self._ready.items() if heap}
-        if not heaps:
+        heads = {group: heap[0][0] for group, heap in self._ready.items()}
+        if not heads:
             return None
-        chosen = min(heaps, key=lambda g: (heaps[g][0][0][:1], g != group, g in busy, heaps[g][0]))
-        _, name = heapq.heappop(heaps[chosen])
+        stage = min(heads.values())[:1]
+        groups = sorted((group for group in heads if heads[group][:1] == stage), key=heads.__getitem__)
+        chosen = _chosen({group: heads[group] for group in groups}, last, busy)
+        _, name = heapq.heappop(self._ready[chosen])
         if not self._ready[chosen]:
             del self._ready[chosen]
         return self._units[name]
@@ -94,3 +100,21 @@ class Graph:
             self.finish(unit.name)
         else:
             heapq.heappush(self._ready.setdefault(unit.group, []), (unit.order, unit.name))
+
+
+def _chosen(ready: dict[str, tuple[int, ...]], last: Unit | None, busy: Collection[Unit]) -> str:
+    """Which of some groups, in order, each with that of its first unit, a worker goes on with."""
+    if last is not None and last.group in ready:
+        return last.group
+    taken = {unit.group for unit in busy}
+    free = [group for group in ready if group not in taken] or list(ready)
+    if not busy:
+        return free[0]
+    marks = sorted(unit.order for unit in (*busy, last) if unit is not None)
+    stretches: dict[int, list[str]] = {}  # by how many workers stand before them
+    for group in free:
+        stretches.setdefault(bisect_right(marks, ready[group]), []).append(group)
+    if last is not None and (following := stretches.get(bisect_right(marks, last.order))):
+        return following[0]
+    at, longest = max(stretches.items(), key=lambda item: len(item[1]))
+    return longest[len(longest) // 2 if at else 0]  # its first half is for him who stands before it

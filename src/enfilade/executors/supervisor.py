@@ -89,7 +89,7 @@ class _Loop:
         self._is_done = is_done
         self._failed = failed
         self._in_hand: dict[int, Unit] = {}
-        self._last: dict[int, str] = {}  # group of what a worker did last
+        self._last: dict[int, Unit] = {}  # what a worker did last
         self._failures: dict[str, list[Failure]] = {}
         self._counts: dict[str, int] = {}  # of them, those that count
         self._delayed: list[tuple[float, str, Unit]] = []
@@ -126,14 +126,13 @@ class _Loop:
                 return
 
     def _begin(self, slot: int) -> bool:
-        busy = {unit.group for unit in self._in_hand.values()}
-        unit = self._graph.take(self._last.get(slot, ""), busy)
+        unit = self._graph.take(self._last.get(slot), self._in_hand.values())
         if unit is None and self._trouble.is_on and self._held:
             unit = self._held.popleft()  # last: what has failed least is tried first
         if unit is None:
             return False
         self._in_hand[slot] = unit
-        self._last[slot] = unit.group
+        self._last[slot] = unit
         self._trial = slot if self._trouble.is_on else None
         try:
             self._executor.begin(slot, unit, share=self._share(unit))

@@ -218,7 +218,8 @@ class Blueprint:
             window = around(self._job.path, shot, frame, REACH)
             needs = tuple(f"raw {self._numbers[f]}" for f in window)
             unit = self._frame(frame, "decoupled", stage="frames", needs=needs, facts={"shot": index})
-            yield replace(unit, order=(FRAMES, max(window[-1], frame), 1))
+            last = max(window[-1], frame)  # whoever shades it has the others in memory
+            yield replace(unit, order=(FRAMES, last, 1), group=f"frame {last // BLOCK}")
 
     def _light_at(self, frame: int, shot: int, kind: str, stage: int) -> Unit:
         facts, group = {"frame": frame, "shot": shot}, f"{kind} {frame // BLOCK}"
