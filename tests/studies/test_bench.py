@@ -68,6 +68,7 @@ def test_more_paths_are_judged_better_and_the_box_has_its_own_reference(held):
     if "denoised-2" in rows:
         assert rows["denoised-2"]["pixel_filter"] == "box"
         assert set(found["reference"]["filters"]) == {"box", "gaussian"}
+        assert {of["variant"] for of in found["reference"]["filters"].values()} == {"llvm"}
         assert set(rows["denoised-2"]["cost"]["stages"]) == {"start", "frames"}
 
 

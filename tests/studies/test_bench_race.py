@@ -1,11 +1,16 @@
 """Processes of contestants: what they are charged, and how they end."""
 
+import multiprocessing
+import pickle
+import sys
+
 import pytest
 
 from bench_tasks import HELD_MIB, SPIN_S, Dies, Fails, Holds, Spins
+from enfilade.device import Device
 from enfilade.errors import EnfiladeError, SceneError
 from enfilade.monitor import Silence
-from enfilade.studies.bench.race import race
+from enfilade.studies.bench.race import _run, race
 
 
 def test_cpu_time_is_charged_by_stage_and_sleep_is_none(tmp_path):
@@ -36,3 +41,13 @@ def test_one_that_dies_is_an_error_and_not_a_wait(tmp_path):
 def test_an_error_of_ours_comes_through(tmp_path):
     with pytest.raises(SceneError, match="no such scene"):
         race(Fails(), tmp_path / "run", tmp_path / "notes", Silence())
+
+
+def test_a_gpu_that_is_not_taken_is_told(tmp_path, monkeypatch):
+    module = sys.modules[race.__module__]
+    monkeypatch.setattr(module, "activate", lambda _: Device("llvm", "llvm_ad_rgb", (15,), "no OptiX"))
+    monkeypatch.setattr(module.signal, "signal", lambda *_: None)  # this process still hears ^C
+    ours, theirs = multiprocessing.Pipe(duplex=False)
+    _run(theirs, "auto", pickle.dumps(Spins()), tmp_path / "run")
+    kind, arguments, _ = ours.recv()
+    assert (kind, *arguments) == ("say", "rendered on the CPU: no OptiX")

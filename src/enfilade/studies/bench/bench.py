@@ -165,7 +165,10 @@ class _Race:
         self._job, self._terms, self._run, self._monitor = job, terms, run, monitor
 
     def reference(self, pixel_filter: PixelFilter) -> dict[str, Any]:
-        """Render a reference. Its random numbers are not those of any contestant."""
+        """Render a reference: its cost, and Mitsuba's name of what it ran on.
+
+        Its random numbers are not those of any contestant.
+        """
         from enfilade.studies.bench.tasks import EveryFrame
 
         trace = self._job.settings.trace
@@ -174,7 +177,8 @@ class _Race:
         job = replace(self._job, method="reference", settings=settings)
         task = EveryFrame(job, pixel_filter, has_layers=True)
         folder = self._reference_folder(pixel_filter)
-        return self._rendered(folder.name, task, folder, {}, self._terms.reference_device)
+        cost = self._rendered(folder.name, task, folder, {}, self._terms.reference_device)
+        return cost | {"variant": Run.existing(folder).identity["versions"]["variant"]}
 
     def _reference_folder(self, pixel_filter: PixelFilter) -> Path:
         return self._run.folder / "references" / f"reference-{pixel_filter.name.lower()}"

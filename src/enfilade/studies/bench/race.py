@@ -152,7 +152,8 @@ def _run(connection: Connection, device: Choice, task: bytes, folder: Path) -> N
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the bench hears it, and ends this process
     meter = _Meter(connection)
     try:
-        activate(device)  # before the task brings the modules that bind Dr.Jit's types
+        if note := activate(device).note:  # before the task brings the modules that bind Dr.Jit's types
+            meter.tell("say", f"rendered on the CPU: {note}")
         work = pickle.loads(task)  # noqa: S301  (our own, from our own process)
         work.warm_up()
         work.run(folder, meter)
