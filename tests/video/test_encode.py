@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import os
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import numpy as np
@@ -61,6 +63,24 @@ def test_colours_come_back(tmp_path, codec):
     # in code values of sRGB: what 8 bits and a rate factor of 10 leave; FFV1 only rounds
     tolerance = 0.5 / 4095 if codec == "ffv1" else 0.012
     assert abs(srgb_encode(middles) - srgb_encode(BARS)).max() < tolerance + 1e-5
+
+
+def scheduling():
+    return {os.sched_getscheduler(int(thread.name)) for thread in Path("/proc/self/task").iterdir()}
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_no_thread_is_scheduled_otherwise(tmp_path, codec):
+    before, meanwhile = scheduling(), set()
+
+    def frames():
+        for frame in bars():
+            yield frame
+            meanwhile.update(scheduling())
+
+    file, settings = tmp_path / f"a{video_suffix(codec)}", VideoSettings(codec=codec)
+    encode_video(file, frames(), fps=24.0, width=128, height=64, settings=settings, exposure_ev=0.0)
+    assert meanwhile | scheduling() == before
 
 
 def test_another_decoder_agrees(tmp_path):

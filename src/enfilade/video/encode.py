@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -78,9 +79,38 @@ def encode_video(
         stream = _stream(container, codec, exact_fps(fps), options)
         stream.width, stream.height, stream.pix_fmt = width, height, pixels
         _tag(stream.codec_context, view, pixels)
+        with _usual_scheduling():
+            stream.codec_context.open()
         for picture in pictures:
             container.mux(stream.encode(picture))
         container.mux(stream.encode(None))
+
+
+@contextmanager
+def _usual_scheduling() -> Iterator[None]:
+    """Give threads that are begun meanwhile, and those that are changed, the scheduling they should have.
+
+    Opened by root, as in most containers, SVT-AV1 makes its threads and the one that opens it real-time
+    threads. What that one begins later inherits it, so that nothing else gets to run where all cores are
+    busy.
+    """
+    usual = os.sched_getscheduler(0), os.sched_getparam(0)
+    before = dict(_scheduling())
+    try:
+        yield
+    finally:
+        for thread, (policy, _) in _scheduling():
+            wanted = before.get(thread, usual)
+            if policy != wanted[0]:
+                with contextlib.suppress(ProcessLookupError):  # it has ended
+                    os.sched_setscheduler(thread, *wanted)
+
+
+def _scheduling() -> Iterator[tuple[int, tuple[int, os.sched_param]]]:
+    """The threads of this process, each with its scheduling policy and the parameters of that."""
+    for thread in (int(entry.name) for entry in Path("/proc/self/task").iterdir()):
+        with contextlib.suppress(ProcessLookupError):
+            yield thread, (os.sched_getscheduler(thread), os.sched_getparam(thread))
 
 
 def join_videos(

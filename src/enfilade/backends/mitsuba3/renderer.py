@@ -273,8 +273,7 @@ class MitsubaRenderer:
 def _threads_to_read(scene: Path) -> Iterator[None]:
     """Another thread where there is one and the scene names OpenEXR files.
 
-    Mitsuba reads those by tasks that it waits for without doing them. No thread is begun for nothing: it
-    would have to be given a core, for which the waiting thread competes.
+    Mitsuba reads those by tasks that it waits for without doing them.
     """
     needs_more = dr.thread_count() == 1 and any(
         file.is_file() and is_exr(file) for file in named_files(scene)
