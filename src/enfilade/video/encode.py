@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
@@ -102,14 +101,14 @@ def _usual_scheduling() -> Iterator[None]:
         for thread, (policy, _) in _scheduling():
             wanted = before.get(thread, usual)
             if policy != wanted[0]:
-                with contextlib.suppress(ProcessLookupError):  # it has ended
+                with suppress(ProcessLookupError):  # it has ended
                     os.sched_setscheduler(thread, *wanted)
 
 
 def _scheduling() -> Iterator[tuple[int, tuple[int, os.sched_param]]]:
     """The threads of this process, each with its scheduling policy and the parameters of that."""
     for thread in (int(entry.name) for entry in Path("/proc/self/task").iterdir()):
-        with contextlib.suppress(ProcessLookupError):
+        with suppress(ProcessLookupError):
             yield thread, (os.sched_getscheduler(thread), os.sched_getparam(thread))
 
 
