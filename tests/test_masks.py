@@ -133,11 +133,18 @@ def test_a_group_does_not_reach_over_items():
 def test_regions_of_one_item_are_judged_separately():
     # A small region, all of it different, and a large one that is not: together less than a quarter.
     item = np.ones((H, W), int)
-    item[2:5, 2:3] = 2  # 3 pixels: no group can be of 4
+    item[2:6, 2:5] = 2
     item[8:18, 5:25] = 2
-    jnd = differences((slice(2, 5), 2, 1.5))
+    jnd = differences((slice(2, 6), slice(2, 5), 1.5))
     assert seen(jnd, item) == {2}
     assert seen(np.zeros((H, W)), item) == frozenset()
+
+
+def test_a_splinter_does_not_decide_by_its_share():
+    item = np.ones((H, W), int)
+    item[2:5, 2] = 2  # 3 pixels of 203: no group can be of 4
+    item[8:18, 5:25] = 2
+    assert seen(differences((slice(2, 5), 2, 9.0)), item) == frozenset()
 
 
 def test_other_surfaces_are_not_judged():

@@ -10,6 +10,7 @@ from enfilade.settings import MaskSettings
 
 JUDGED_SHARE = 0.5  # of an item's pixels: with fewer judged nothing is known of the item
 HIDDEN = 1.01  # times the farthest depth around: a lamp beyond that is not seen
+PART = 0.05  # of an item's judged pixels: of a smaller region a quarter is no share of the item
 GROUP = 4  # fewest connected pixels that count as a group: less is an outlier, not a feature
 EIGHT_CONNECTED = np.ones((3, 3), bool)
 
@@ -24,7 +25,8 @@ def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSe
 
     Each connected region of a specular item is judged by itself: when a group of its pixels differs
     by more than 2 JND, or when more than a quarter of them differ by more than 1 JND, its item is
-    seen. What can't be judged is taken for seen: an item of which both keyframes show less than half.
+    seen; the latter not by splinters, of which items have many behind leaves and railings. What can't
+    be judged is taken for seen: an item of which both keyframes show less than half.
 
     Parameters
     ----------
@@ -51,7 +53,8 @@ def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSe
             continue
         regions, _ = scipy.ndimage.label(judged, EIGHT_CONNECTED)
         boxes = enumerate(scipy.ndimage.find_objects(regions), 1)
-        if not any(_is_seen(jnd[box], regions[box] == region, settings) for region, box in boxes):
+        part = PART * np.count_nonzero(judged)
+        if not any(_is_seen(jnd[box], regions[box] == region, part, settings) for region, box in boxes):
             unseen.add(int(item))
     return frozenset(unseen)
 
@@ -108,10 +111,12 @@ def lamp_pixels(lamps: Lamps, geometry: Geometry) -> Mask:
     return mask
 
 
-def _is_seen(jnd: F32, region: Mask, settings: MaskSettings) -> bool:
+def _is_seen(jnd: F32, region: Mask, part: float, settings: MaskSettings) -> bool:
     import scipy.ndimage
 
-    if (region & (jnd > 1.0)).sum() * 100.0 > settings.specular_percent * region.sum():
+    size = np.count_nonzero(region)
+    share = np.count_nonzero(region & (jnd > 1.0)) * 100.0
+    if size >= part and share > settings.specular_percent * size:
         return True
     groups, count = scipy.ndimage.label(region & (jnd > settings.specular_jnd), EIGHT_CONNECTED)
     return count > 0 and int(np.bincount(groups.ravel())[1:].max()) >= GROUP

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, Float, UInt
+from enfilade.irradiance import cells as module
 from enfilade.irradiance.cells import LEAST_ESTIMATES, LEVELS, Estimates, cell_key
 
 
@@ -69,6 +70,16 @@ def test_what_was_estimated_is_found_again():
         if first is not None:
             np.testing.assert_allclose(found[i], mean[place[first]], rtol=1e-5)
     assert 0.1 < is_known.mean() < 1.0
+
+
+def test_of_too_many_cells_those_with_most_estimates_are_kept(monkeypatch):
+    monkeypatch.setattr(module, "MOST", 50)
+    points, normals = random_points(200)
+    key = keys(points, normals, 0.01)
+    parts = [Estimates.of(k, np.ones((len(k), 3))) for k in (key, *[key] * 3, *[key[:40]] * 4)]
+    kept = set(np.array(Estimates.joined(parts).opened().keys).tolist())
+    assert len(kept) == 50
+    assert kept >= set(key[:40].tolist())
 
 
 def test_far_away_nothing_is_known():

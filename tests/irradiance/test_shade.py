@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from enfilade.arrays import lanes
 from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.camera import Camera, look_at
+from enfilade.codec import write_exr
 from enfilade.geometry import find_geometry, positions
 from enfilade.irradiance import (
     LightCache,
@@ -14,6 +16,7 @@ from enfilade.irradiance import (
     open_page,
     open_scattered,
     over_time,
+    smoothed,
 )
 from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
@@ -21,7 +24,11 @@ from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scenes import write_scene
 from enfilade.settings import TraceSettings
+from keyframes_analytic import geometry_of
+from scenes_analytic import wall
 
+PIXEL_ANGLE = 0.02  # radians
+CONSTANT = '<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>'
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 TINT = '<rgb name="{}" value="0.6, 0.4, 0.2"/>'
 ROUGH = '<float name="alpha" value="0.25"/>'
@@ -53,7 +60,7 @@ def _plane(name: str, transform: str, color: str) -> str:
     )
 
 
-def _scene(balls: dict[str, str]) -> str:
+def _scene(balls: dict[str, str], sky: str = CONSTANT) -> str:
     shapes = [
         f'<shape type="sphere" id="{name}"><float name="radius" value="0.42"/>'
         f'<point name="center" x="{i % 4 - 1.5}" y="{0.5 + i // 4}" z="0"/>{bsdf}</shape>'
@@ -65,16 +72,15 @@ def _scene(balls: dict[str, str]) -> str:
         '<shape type="rectangle" id="lamp"><transform name="to_world"><scale value="0.8"/>'
         '<rotate x="1" angle="90"/><translate y="4" z="1"/></transform>'
         '<emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>'
-        '<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>'
     )
     # No limit of depth: where a path is cut off, the two estimators cut differently.
     integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'
-    return f'<scene version="3.0.0">{integrator}{"".join(shapes)}{lamp}</scene>'
+    return f'<scene version="3.0.0">{integrator}{"".join(shapes)}{lamp}{sky}</scene>'
 
 
-def _opened(folder, balls: dict[str, str]) -> MitsubaRenderer:
+def _opened(folder, balls: dict[str, str], sky: str = CONSTANT) -> MitsubaRenderer:
     file = folder / "scene.xml"
-    file.write_text(_scene(balls))
+    file.write_text(_scene(balls, sky))
     return MitsubaRenderer(file, TraceSettings())
 
 
@@ -97,10 +103,11 @@ def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2
 
 
 def _shade(renderer, cache: LightCache):
-    shader = Shader(renderer, pixel_angle=0.02)
+    shader = Shader(renderer)
 
     def radiance(rays, rng, square):
-        return shader.seen(cache, cache, rays, rng).layers[0] + shader.scattered(cache, rays, rng, square)
+        seen = shader.seen(cache, cache, rays, rng, pixel_angle=PIXEL_ANGLE).layers[0]
+        return seen + shader.scattered(cache, rays, rng, square, pixel_angle=PIXEL_ANGLE)
 
     return radiance
 
@@ -250,11 +257,11 @@ def test_what_no_page_saw_is_traced(diffuse):
 
 
 def _gathered(renderer, cache: LightCache, camera: Camera, spp: int) -> list[Shading]:
-    shader = Shader(renderer, pixel_angle=0.02)
+    shader = Shader(renderer)
     light = Estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng, square: shader.gathered(cache, rays, rng, square),
+        lambda rays, rng, square: shader.gathered(cache, rays, rng, square, pixel_angle=PIXEL_ANGLE),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(8, 0, Purpose.LIGHT),
@@ -274,6 +281,55 @@ def test_light_is_gathered_as_it_is_path_traced(tmp_path):
             difference = (ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE
             deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
             assert abs(difference.sum()) < 4.0 * deviation + bias * (reference.color @ LUMINANCE).sum()
+
+
+def test_under_a_sky_lobes_that_send_nothing_are_counted(tmp_path):
+    rows = np.linspace(0.2, 0.6, 16, dtype=np.float32)
+    write_exr(tmp_path / "sky.exr", {"RGB": np.tile(rows[:, None, None], (1, 32, 3))}, is_portable=True)
+    sky = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
+    renderer, camera = _opened(tmp_path, {"blend": MATERIALS["blend"]}, sky), _camera()
+    gathered = _gathered(renderer, LightCache(), camera, 64)
+    page = _page(renderer, camera)
+    for ours, reference in zip(gathered, (page.direct, page.indirect), strict=True):
+        difference = (ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE
+        deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+        assert abs(difference.sum()) < 4.0 * deviation
+        assert ours.dropped == 0
+
+
+def test_metal_and_glass_have_no_diffuse_lobe(tmp_path):
+    balls = {
+        name: f'<bsdf type="principled"><float name="{name}" value="{share}"/></bsdf>'
+        for name, share in (("metallic", 1.0), ("spec_trans", 0.75), ("roughness", 1.0))
+    }
+    renderer = _opened(tmp_path, balls)
+    seen = find_geometry(renderer, _camera())
+    names = renderer.describe().items
+    albedos = [seen.albedo[seen.item == names.index(name) + 1].mean() for name in balls]
+    assert albedos == pytest.approx([0.0, 0.125, 0.5], abs=0.01)
+
+
+def test_light_in_a_thin_band_is_not_smoothed_away():
+    geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 32, 24))
+    size = geometry.item.shape
+    where = np.zeros(size, bool)
+    where[11:13] = True
+    light = np.random.default_rng(5).gamma(1.0, 1.0, (*size, 1)).astype(np.float32).repeat(3, axis=2)
+    band = Shading(light * where[..., None], np.where(where, 1.0, 0.0).astype(np.float32))
+    found = smoothed(geometry, band, where)
+    assert found.color[where].std() < 0.5 * light[where].std()
+    assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
+
+
+def test_pages_that_count_for_nothing_make_nothing_known(diffuse):
+    renderer, pages = diffuse
+    finer = find_geometry(
+        renderer, _camera(width=480, height=360, x=-0.5)
+    )  # some points have a hair of a tap
+    at = [lanes(values) for values in (positions(finer), finer.normal, finer.item)]
+    page = open_page(pages[0])
+    alone, filled = open_cache([page], [1.0]), open_cache([page] * 6, [1.0, *[0.0] * 5])
+    np.testing.assert_array_equal(np.array(alone.find(*at)[1]), np.array(filled.find(*at)[1]))
 
 
 def test_a_mirror_shows_things_as_far_behind_it(tmp_path):

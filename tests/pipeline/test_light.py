@@ -11,7 +11,7 @@ from enfilade.path import load_path
 from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.kept import either_side
-from enfilade.pipeline.light import LEAST_HOLES, LightTable
+from enfilade.pipeline.light import LEAST_HOLES, LEAST_SHARE, LightTable
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.workshop import Workshop
@@ -63,6 +63,12 @@ def test_pages_between_the_keyframes_fill_the_holes(lit):
     assert all(b <= a for b, a in zip(before, after, strict=True))
     (line,) = (line for line in workshop.run.lines() if line["unit"].startswith("light"))
     assert line["fills"]
+    # At the segment's ends, where its fills are not asked any more, they count for nothing.
+    assert {table._fill_shares(frame)[f] for frame in (0, 7) for f in table._fill_shares(frame)} == {
+        LEAST_SHARE
+    }
+    filled = FRAMES.index(line["fills"][0])
+    assert table._fill_shares(filled)[filled] == 1.0
     pages = [line for line in workshop.run.lines() if line["unit"].startswith("keyframe")]
     # A page that fills holes is small.
     whole = [p["rays"]["light"] for p in pages if p["frame"] in (20, 34)]

@@ -103,10 +103,14 @@ def test_the_other_side_of_a_surface_is_not_known(page):
 
 
 def test_footprints_grow_with_the_square_of_distance_and_at_grazing_angles():
-    eye, normal = vector3((0, 0, 0)), Array3f(0, 0, 1)
-    near = np.array(footprint(Array3f(0, 0, -1), normal, eye))[0]
-    assert np.array(footprint(Array3f(0, 0, -3), normal, eye))[0] == pytest.approx(9 * near, rel=1e-5)
-    tilted = np.array(footprint(Array3f(1, 0, -1), normal, eye))[0]
-    assert tilted == pytest.approx(2 * np.sqrt(2) * near, rel=1e-5)
-    grazing = np.array(footprint(Array3f(1000, 0, -1), normal, eye))[0]
-    assert grazing == pytest.approx(20 * (1000**2 + 1) * near, rel=1e-4)
+    def area(x, z, camera=CAMERA):
+        point, normal = Array3f(x, 0, z), Array3f(0, 0, 1)
+        return np.array(footprint(point, normal, vector3((0, 0, 0)), matrix3(camera.direction_from_pixel)))[0]
+
+    near = area(0, -1)
+    assert near == pytest.approx(CAMERA.pixel_angle**2, rel=1e-5)
+    assert area(0, -3) == pytest.approx(9 * near, rel=1e-5)
+    assert area(1, -1) == pytest.approx(2 * np.sqrt(2) * near, rel=1e-5)
+    assert area(1000, -1) == pytest.approx(20 * (1000**2 + 1) * near, rel=1e-4)
+    twice_as_fine = Camera(CAMERA.world_from_camera, CAMERA.fov_deg, 2 * WIDTH, 2 * HEIGHT)
+    assert area(0, -1, twice_as_fine) == pytest.approx(0.25 * near, rel=1e-5)

@@ -92,10 +92,11 @@ def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
     ImageError
         The file is missing, damaged, or holds no light.
     """
-    kinds = {"indirect": np.float32, "indirect variance": np.float32, "known": np.uint32}
-    layers = _required(file, kinds)
-    direct = read_shading(file)
-    indirect = Shading(layers["indirect"], layers["indirect variance"], direct.dropped)
+    values = ("RGB", "variance", "indirect", "indirect variance")
+    layers = _required(file, {**dict.fromkeys(values, np.float32), "known": np.uint32})
+    dropped = _dropped(file)
+    direct = Shading(layers["RGB"], layers["variance"], dropped)
+    indirect = Shading(layers["indirect"], layers["indirect variance"], dropped)
     return direct, indirect, layers["known"] > 0
 
 

@@ -67,7 +67,7 @@ class LightCache:
             found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
             total += share * sum(found.totals, Array3f(0))
             weight += share * found.weight
-            known += found.weight
+            known += dr.select(share > 0.0, found.weight, 0.0)
         is_known = known > KNOWN
         return dr.select(is_known, total / weight, 0.0), is_known
 
@@ -124,12 +124,23 @@ def light_of(page: Page) -> F32:
     return image(sum(page.values, Array3f(0)), page.height, page.width)
 
 
-def smoothed(geometry: Geometry, shading: Shading) -> Shading:
-    """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left."""
+def smoothed(geometry: Geometry, shading: Shading, where: Mask) -> Shading:
+    """Smooth what surfaces scatter, along them, as far as its noise asks for; with the noise that is left.
+
+    Parameters
+    ----------
+    geometry
+        Of the frame, with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`).
+    shading : Shading
+        (H, W).
+    where : (H, W) bool
+        Pixels that were asked. Others of the same items have nothing to tell them.
+    """
     # Virtual images: their normals are not those of the planes in which they seem to lie.
     geometry = replace(geometry, depth=np.where(geometry.item < BEHIND, geometry.depth, np.float32(0)))
     noise = EVEN * lanes(shading.variance)
-    light, variance = _smooth(geometry, geometry.item, _without_speckles(shading), noise)
+    groups = np.where(where, geometry.item, np.uint32(0))
+    light, variance = _smooth(geometry, groups, _without_speckles(shading), noise)
     size = shading.variance.shape
     light = with_soft_edges(
         light, lanes(geometry.item), width=size[1], height=size[0], sigma=GAUSSIAN_SIGMA_PX
@@ -239,18 +250,22 @@ def _gathered(
         lanes(geometry.normal),
         lanes(geometry.item),
     )
-    own = footprint(position, normal, vector3(geometry.camera.eye))
+    camera = geometry.camera
+    own = footprint(position, normal, vector3(camera.eye), matrix3(camera.direction_from_pixel))
     layers = range(len(pages[0].values))
     totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
     weight, known = Float(0), Float(0)
+    dr.eval(position, own)
     for page, share in zip(pages, shares, strict=True):
         found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
-        counts = opaque(float(share)) * dr.minimum(own / footprint(position, normal, page.eye), 1.0)
+        its = footprint(position, normal, page.eye, page.direction_from_pixel)
+        counts = opaque(float(share)) * dr.minimum(own / its, 1.0)
         for layer in layers:
             totals[layer] += counts * found.totals[layer]
             variances[layer] += counts * counts * found.variances[layer] * found.weight
         weight += counts * found.weight
         known += found.weight
+        dr.eval(totals, variances, weight, known)  # so that one kernel serves any number of pages
     is_known = known > KNOWN
     light = [dr.select(is_known, total / weight, 0.0) for total in totals]
     variance = [dr.select(is_known, v / (weight * weight), 0.0) for v in variances]

@@ -19,7 +19,8 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 LEAST_ESTIMATES = 4  # in a cell that is believed
-STEPS = 22  # of the binary search: up to 4 million cells
+STEPS = 22  # of the binary search
+MOST = 1 << STEPS  # cells that are looked up: of more, those with most estimates
 COORDINATE_BITS = 14  # of a cell's place along an axis, which wraps around
 LEVEL_BITS = 6
 ITEM_BITS = 13
@@ -165,6 +166,8 @@ class Estimates:
         chosen = np.flatnonzero(self.counts >= LEAST_ESTIMATES)
         if not len(chosen):
             return None
+        if len(chosen) > MOST:
+            chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MOST]])
         light = (self.sums[chosen] / self.counts[chosen, None]).astype(np.float32)
         cells = Cells(lanes(self.keys[chosen]), lanes(light[None]), opaque(len(chosen) - 1, UInt))
         dr.eval(cells)

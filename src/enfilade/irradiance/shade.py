@@ -90,13 +90,10 @@ class Shader:
     Parameters
     ----------
     renderer
-    pixel_angle
-        Of the camera, radians: what is seen sharply is cached in finer cells.
     """
 
-    def __init__(self, renderer: LightRenderer, pixel_angle: float) -> None:
+    def __init__(self, renderer: LightRenderer) -> None:
         self._renderer = renderer
-        self._spread = CELL_PX * pixel_angle
 
         def state() -> Any:
             return renderer.state
@@ -108,7 +105,9 @@ class Shader:
         self._estimate = recorded(self._estimate_kernel, state)
         self._finish = recorded(self._finish_kernel, state)
 
-    def seen(self, view: LightCache, cache: LightCache, rays: Rays, rng: Any) -> Samples:
+    def seen(
+        self, view: LightCache, cache: LightCache, rays: Rays, rng: Any, *, pixel_angle: float
+    ) -> Samples:
         """Radiance that the surfaces seen send by emission and by their diffuse lobes.
 
         Parameters
@@ -121,13 +120,15 @@ class Shader:
             From the camera, one a lane.
         rng : PCG32
             One generator a lane.
+        pixel_angle
+            Of the camera, radians: what is seen sharply is cached in finer cells.
 
         Returns
         -------
         Samples
             Marked where the surface does more: there :meth:`scattered` must be asked.
         """
-        step = self._meet(view, begun(rays, rng, self._spread))
+        step = self._meet(view, begun(rays, rng, CELL_PX * pixel_angle))
         radiance = Array3f(step.sent)
         self._add_missing(radiance, cache, step, jitter=1.0, is_asked=False)
         return Samples((radiance,), step.goes_on)
@@ -139,6 +140,8 @@ class Shader:
         rng: Any,
         square: Any,
         heard: Callable[[Estimates], None] | None = None,
+        *,
+        pixel_angle: float,
     ) -> Any:
         """Radiance that the surfaces seen send by all their other lobes.
 
@@ -156,7 +159,7 @@ class Shader:
         Array3f
         """
         radiance = dr.zeros(Array3f, dr.width(rng.state))
-        self._follow(radiance, cache, begun(rays, rng, self._spread), 0, heard, square)
+        self._follow(radiance, cache, begun(rays, rng, CELL_PX * pixel_angle), 0, heard, square)
         return radiance
 
     def gathered(
@@ -166,6 +169,8 @@ class Shader:
         rng: Any,
         square: Any,
         heard: Callable[[Estimates], None] | None = None,
+        *,
+        pixel_angle: float,
     ) -> Samples:
         """Light on the diffuse surfaces seen, by lights sampled and one bounce into the cache.
 
@@ -183,7 +188,7 @@ class Shader:
             straight from emitters, and by all other.
         """
         dr.eval(square)  # for the same reason as in begun
-        direct, step = self._gather(cache, begun(rays, rng, self._spread), square)
+        direct, step = self._gather(cache, begun(rays, rng, CELL_PX * pixel_angle), square)
         indirect = Array3f(step.sent)
         self._add_missing(indirect, cache, step, heard=heard)
         self._follow(indirect, cache, chosen(step.path, dr.compress(step.goes_on)), 1, heard)
@@ -282,7 +287,8 @@ class Shader:
         )
         sent, is_missing = _known(cache, spot)
         step = _Step(sent, is_missing, Bool(lit.has_lobe), path, spot)
-        return Array3f(path.throughput * lit.emission), step
+        # Where a lobe sends nothing, its direction is none, and so may be what the environment emits there.
+        return Array3f(dr.select(path.carries, path.throughput * lit.emission, 0.0)), step
 
     def _go_on_kernel(self, cache: LightCache, path: Path, least: Any, square: Any) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""

@@ -91,10 +91,10 @@ class DecoupledFrames:
         view = workshop.views[frame]
         with workshop.costs.of("gather"):
             near, cache = table.around(frame)
-            estimate = _seen(workshop, table, frame, near, cache)
+            estimate = _seen(workshop, frame, near, cache)
         with workshop.costs.of("scatter"):
             shown = workshop.virtual_images.of(view.geometry)
-            scattered, lobe_rays = _scattered(workshop, table, shown, frame, cache, estimate)
+            scattered, lobe_rays = _scattered(workshop, shown, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
         dropped = scattered.dropped + estimate.shading.dropped
@@ -135,13 +135,14 @@ def _parts(
     return _Parts(view, shown, seen, page, source)
 
 
-def _seen(workshop: Workshop, table: LightTable, frame: int, view: LightCache, cache: LightCache) -> Estimate:
+def _seen(workshop: Workshop, frame: int, view: LightCache, cache: LightCache) -> Estimate:
     """What surfaces emit and scatter diffusely; edges and fine textures get more camera rays."""
     path, settings = workshop.job.path, workshop.job.settings
+    camera = path.cameras[frame]
     seen = Estimate(
-        path.cameras[frame],
+        camera,
         np.arange(path.width * path.height, dtype=np.uint32),
-        lambda rays, rng: table.shader.seen(view, cache, rays, rng),
+        lambda rays, rng: workshop.shader.seen(view, cache, rays, rng, pixel_angle=camera.pixel_angle),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.GATHER),
@@ -171,7 +172,7 @@ def _source(
 
 
 def _scattered(
-    workshop: Workshop, table: LightTable, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
+    workshop: Workshop, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
 ) -> tuple[Shading, int]:
     """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and by how many rays.
 
@@ -183,10 +184,13 @@ def _scattered(
     if not where.any():
         size = path.height, path.width
         return Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)), 0
+    camera = path.cameras[frame]
     scattered = Estimate(
-        path.cameras[frame],
+        camera,
         np.flatnonzero(where).astype(np.uint32),
-        lambda rays, rng, square: table.shader.scattered(cache, rays, rng, square),
+        lambda rays, rng, square: workshop.shader.scattered(
+            cache, rays, rng, square, pixel_angle=camera.pixel_angle
+        ),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.SCATTER),
@@ -194,7 +198,7 @@ def _scattered(
     )
     light = settings.light
     scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
-    return smoothed(shown, scattered.shading.spread(where)), scattered.paths
+    return smoothed(shown, scattered.shading.spread(where), where), scattered.paths
 
 
 def _between(samples: tuple[float, int, int], quality: float) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from enfilade.codec import read_arrays, read_light, write_arrays, write_light
 from enfilade.geometry import find_geometry
-from enfilade.irradiance import Estimates, LightCache, Shader, open_cache, open_page, pooled
+from enfilade.irradiance import Estimates, LightCache, open_cache, open_page, pooled
 from enfilade.irradiance.cells import Cells
 from enfilade.pipeline.kept import Kept, nearest
 from enfilade.pipeline.workshop import Workshop
@@ -37,14 +37,12 @@ class Drafts:
     Parameters
     ----------
     workshop
-    shader
     keyframes
         Frames.
     """
 
-    def __init__(self, workshop: Workshop, shader: Shader, keyframes: list[int]) -> None:
+    def __init__(self, workshop: Workshop, keyframes: list[int]) -> None:
         self._workshop = workshop
-        self._shader = shader
         self._keyframes = keyframes
         # More than one frame asks for, so that going along the path makes each once.
         self._traced: Kept[LightPage] = Kept(2 * POOL + 1 + PAGES)
@@ -143,11 +141,14 @@ class Drafts:
         return estimates
 
     def _heard_by_lobes(self, frame: int, parts: list[Estimates]) -> int:
-        path, cache = self._workshop.job.path, self._pages(frame)
+        path, cache, shader = self._workshop.job.path, self._pages(frame), self._workshop.shader
+        camera = path.cameras[frame]
         rays = Estimate(
-            path.cameras[frame],
+            camera,
             np.arange(path.width * path.height, dtype=np.uint32),
-            lambda rays, rng, square: self._shader.scattered(cache, rays, rng, square, parts.append),
+            lambda rays, rng, square: shader.scattered(
+                cache, rays, rng, square, parts.append, pixel_angle=camera.pixel_angle
+            ),
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.BOX,
             random=self._workshop.random(frame, Purpose.SCOUT),
@@ -157,11 +158,14 @@ class Drafts:
         return rays.paths
 
     def _heard_by_gathering(self, frame: int, parts: list[Estimates]) -> int:
-        page, cache = self.trace(frame), self._pages(frame)
+        page, cache, shader = self.trace(frame), self._pages(frame), self._workshop.shader
+        angle = self._workshop.job.path.cameras[frame].pixel_angle
         bounces = Estimate(
             page.geometry.camera,
             np.flatnonzero(page.is_known).astype(np.uint32),
-            lambda rays, rng, square: self._shader.gathered(cache, rays, rng, square, parts.append),
+            lambda rays, rng, square: shader.gathered(
+                cache, rays, rng, square, parts.append, pixel_angle=angle
+            ),
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.CENTRE,
             random=self._workshop.random(frame, Purpose.DRAFT_SCOUT),

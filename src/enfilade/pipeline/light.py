@@ -56,12 +56,10 @@ class LightTable:
 
     def __init__(self, workshop: Workshop, segments: list[Segment]) -> None:
         self._path = workshop.job.path
-        first = self._path.cameras[segments[0].first]
-        self.shader = workshop.shader(1.0 / first.focal_px)
         self._workshop = workshop
         self.segments = segments
         self.keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
-        self.drafts = Drafts(workshop, self.shader, self.keyframes)
+        self.drafts = Drafts(workshop, self.keyframes)
         settings = workshop.job.settings.light
         self._quality = settings.denoiser
         self._traced: Kept[LightPage] = Kept(TRACED)
@@ -106,19 +104,26 @@ class LightTable:
         return {f: max(1.0 - self._way(frame, f) / reach, LEAST_SHARE) for f in near}
 
     def _fill_shares(self, frame: int) -> dict[int, float]:
-        """The pages that fill holes on either side of a frame; one becomes the other."""
-        pair = either_side(self._fills_at(frame), frame)
-        way = self._way(pair[0], pair[-1]) if pair else 0
-        return {f: max(1.0 - self._way(frame, f) / way, LEAST_SHARE) if way else 1.0 for f in pair}
+        """The pages that fill holes on either side of a frame; one becomes the other.
+
+        The outermost count for nothing where their segment ends and those of the next take over.
+        """
+        segment = self._segment(frame)
+        pair = either_side(self._fills[segment], frame)
+        shares = {}
+        for fill in pair:
+            ends = [f for f in (*pair, segment.first, segment.last) if (f - fill) * (frame - fill) > 0]
+            reach = min((self._way(fill, end) for end in ends), default=0)
+            shares[fill] = max(1.0 - self._way(frame, fill) / reach, LEAST_SHARE) if reach else 1.0
+        return shares
 
     def _way(self, one: int, other: int) -> int:
         return abs(self._path.place(one) - self._path.place(other))
 
-    def _fills_at(self, frame: int) -> list[int]:
-        """Pages that fill the holes of a frame's own segment: others see other holes."""
+    def _segment(self, frame: int) -> Segment:
+        """A frame's own segment, whose fills it asks: others see other holes."""
         # The last segment ends where the camera comes to rest: what follows shows the same.
-        segment = next((s for s in self.segments if frame <= s.last), self.segments[-1])
-        return self._fills[segment]
+        return next((s for s in self.segments if frame <= s.last), self.segments[-1])
 
     @cached_property
     def _fills(self) -> dict[Segment, list[int]]:
@@ -200,10 +205,13 @@ class LightTable:
 
     def _light(self, frame: int, where: Mask, purpose: Purpose) -> Estimate:
         workshop, cache = self._workshop, self.drafts.cache(frame)
+        camera = workshop.job.path.cameras[frame]
         return Estimate(
-            workshop.job.path.cameras[frame],
+            camera,
             np.flatnonzero(where).astype(np.uint32),
-            lambda rays, rng, square: self.shader.gathered(cache, rays, rng, square),
+            lambda rays, rng, square: workshop.shader.gathered(
+                cache, rays, rng, square, pixel_angle=camera.pixel_angle
+            ),
             chunk=workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.CENTRE,
             random=workshop.random(frame, purpose),

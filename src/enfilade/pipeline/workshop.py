@@ -44,7 +44,6 @@ class Workshop:
         self.costs = Costs()
         self.views = Views(renderer, job.path, job.viewing, self.costs)
         self._keyframes: OrderedDict[int, Keyframe] = OrderedDict()
-        self._shaders: dict[float, Shader] = {}
 
     @cached_property
     def light_renderer(self) -> LightRenderer:
@@ -61,11 +60,10 @@ class Workshop:
         self.job.check_light(self.renderer.why_no_light)
         return self.renderer
 
-    def shader(self, pixel_angle: float) -> Shader:
-        """The shader for a camera, whose kernels all shots share that have this angle."""
-        if pixel_angle not in self._shaders:
-            self._shaders[pixel_angle] = Shader(self.light_renderer, pixel_angle)
-        return self._shaders[pixel_angle]
+    @cached_property
+    def shader(self) -> Shader:
+        """The shader, whose kernels all shots share."""
+        return Shader(self.light_renderer)
 
     @cached_property
     def virtual_images(self) -> VirtualImages:

@@ -133,12 +133,14 @@ def _unpacked(word: Any) -> Any:
     return Array3f(word & 1023, (word >> 10) & 1023, word >> 20) * (2.0 / SCALE) - 1.0
 
 
-def footprint(position: Any, normal: Any, eye: Any) -> Any:
-    """Area of a surface that a pixel covers at points, in scene units squared per steradian; Float.
+def footprint(position: Any, normal: Any, eye: Any, direction_from_pixel: Any) -> Any:
+    """Area of a surface that a pixel in the middle of a view covers at points, scene units squared; Float.
 
     At grazing angles no more than twenty times that of a surface met head-on.
     """
     toward = position - eye
     squared = dr.squared_norm(toward)
     cosine = dr.abs(dr.dot(toward, normal)) * dr.rsqrt(squared * dr.squared_norm(normal))
-    return squared / dr.maximum(cosine, 0.05)
+    m = direction_from_pixel
+    across, down = Array3f(m[0, 0], m[1, 0], m[2, 0]), Array3f(m[0, 1], m[1, 1], m[2, 1])
+    return dr.norm(across) * dr.norm(down) * squared / dr.maximum(cosine, 0.05)

@@ -4,8 +4,9 @@ Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when a
 that component sends straight ahead: a coat that lets less light out the more obliquely it is seen is part of
 it, so that the light by the albedo is the same whoever looks. Some BSDFs do not divide themselves
 (``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
-diffuse lobe is Lambert's with their own albedo, as far as they are opaque, and the rest is what the whole
-BSDF has beyond it, which may be negative; a mask over a Lambert lobe has none where it is opaque.
+diffuse lobe is Lambert's with their own albedo, as far as they are opaque and no metal or glass, and the rest
+is what the whole BSDF has beyond it, which may be negative; a mask over a Lambert lobe has none where it is
+opaque.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from enfilade.arrays import Bool, UInt
 
 UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
+NOT_DIFFUSE = ("metallic", "spec_trans")  # shares of a surface that its base colour's diffuse lobe lacks
 LAMBERT = ("MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse")  # made of these alone it is Lambert's lobe with holes
 
 
@@ -55,21 +57,27 @@ class Lobes:
         number: Any = dr.reinterpret_array(UInt, material)
         return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
 
+    def _is_lamberts(self, seen: Any, material: Any) -> Any:
+        """Whether these hits are Lambert's lobe, perhaps with holes."""
+        number: Any = dr.reinterpret_array(UInt, material)
+        return dr.gather(Bool, self._is_lambert, number, seen.is_valid())
+
     def has_rest(self, seen: Any, material: Any) -> Any:
         """Whether these hits have more than a diffuse lobe."""
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
         has_rest = seen.is_valid() & ((material.flags() & beyond) != 0)
         if not self._has_undivided:
             return has_rest
-        number: Any = dr.reinterpret_array(UInt, material)
-        is_lambert = dr.gather(Bool, self._is_lambert, number, seen.is_valid())
+        is_lambert = self._is_lamberts(seen, material)
         is_whole = is_lambert & (self._opacity(seen, material, has_rest & is_lambert) >= 1.0)
         return (has_rest & ~is_whole) | (self.is_undivided(seen, material) & ~is_lambert)
 
     def has_spread_rest(self, seen: Any, material: Any) -> Any:
         """Whether what these hits have beyond the diffuse lobe is more than lobes of one direction each."""
         is_glossy = has_lobe(material.flags(), "GlossyReflection", "GlossyTransmission")
-        return is_glossy | self.is_undivided(seen, material)
+        if not self._has_undivided:
+            return is_glossy
+        return is_glossy | (self.is_undivided(seen, material) & ~self._is_lamberts(seen, material))
 
     def albedo(self, seen: Any, material: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1: what light is multiplied with, and what the rest is without."""
@@ -81,6 +89,9 @@ class Lobes:
             undivided &= is_diffuse
             own = material.eval_diffuse_reflectance(seen, undivided)
             own *= self._opacity(seen, material, undivided)
+            for name in NOT_DIFFUSE:
+                has_it = undivided & material.has_attribute(name, undivided)
+                own *= 1.0 - dr.select(has_it, material.eval_attribute_1(name, seen, has_it), 0.0)
             albedo = dr.select(undivided, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
@@ -116,12 +127,13 @@ class Lobes:
         """Direction, density, weight, and whether the direction is the only one (a delta lobe).
 
         What a whole BSDF has beyond Lambert's lobe is sampled by both in turn: where only the one or the
-        other is large, the weight stays bounded. Who makes the choice of the lobe, 0..1, gets a direction
-        of it, and no weight.
+        other is large, the weight stays bounded. A Lambert lobe with holes has nothing beyond but these. Who
+        makes the choice of the lobe, 0..1, gets a direction of it, and no weight.
         """
         undivided = self.is_undivided(seen, material)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-        is_turn = rng.next_float32() < 0.5
+        has_holes = undivided & self._is_lamberts(seen, material)
+        is_turn = has_holes | (rng.next_float32() < 0.5)
         if choice is not None:
             first, is_turn = choice, Bool(True)
         own, weight = material.sample(self._rest, seen, first, second, ~undivided)
@@ -133,7 +145,7 @@ class Lobes:
         mixed_wo = dr.select(is_turn, whole.wo, _cosine(seen, second))
         beyond, mixed_pdf = self._beyond(seen, material, mixed_wo, undivided & ~is_delta)
         beyond = dr.select(mixed_pdf > 0.0, beyond / mixed_pdf, 0.0)
-        beyond = dr.select(is_delta, 2.0 * whole_weight, beyond)
+        beyond = dr.select(is_delta, dr.select(has_holes, 1.0, 2.0) * whole_weight, beyond)
         mixed_pdf = dr.select(is_delta, whole.pdf, mixed_pdf)
 
         wo, pdf = dr.select(undivided, mixed_wo, own.wo), dr.select(undivided, mixed_pdf, own.pdf)
