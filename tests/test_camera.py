@@ -113,15 +113,6 @@ def test_numbers_out_of_range_are_refused(fov_deg, size):
         a_camera(*size, fov_deg=fov_deg)
 
 
-def test_another_size_keeps_the_vertical_field_of_view():
-    camera = a_camera()
-    half = camera.resized(320, 240)
-    assert half.focal_px == pytest.approx(camera.focal_px / 2)
-    np.testing.assert_allclose(
-        half.direction_from_pixel @ (16, 12, 1), camera.direction_from_pixel @ (32, 24, 1), atol=1e-12
-    )
-
-
 def test_views_are_the_same_only_when_all_is():
     camera = a_camera()
     assert camera.is_same_view(a_camera())

@@ -58,6 +58,11 @@ class Camera:
         return 0.5 * self.height / math.tan(math.radians(0.5 * self.fov_deg))
 
     @property
+    def pixel_angle(self) -> float:
+        """What a pixel in the middle of the image spans, radians."""
+        return 1.0 / self.focal_px
+
+    @property
     def eye(self) -> Matrix:
         """Position in the world, (3,)."""
         return self.world_from_camera[:3, 3]
@@ -84,10 +89,6 @@ class Camera:
         """Inverse of :attr:`direction_from_pixel`; the third row of the product is the depth, (3, 3)."""
         inverse: Matrix = np.linalg.inv(self.direction_from_pixel).astype(np.float64)
         return inverse
-
-    def resized(self, width: int, height: int) -> Camera:
-        """The same camera with another number of pixels; the vertical field of view stays."""
-        return Camera(self.world_from_camera, self.fov_deg, width, height)
 
     def is_same_view(self, other: Camera) -> bool:
         """Whether both see the very same image."""
