@@ -60,11 +60,14 @@ def write_run(
     *,
     selected: Sequence[int] | None = None,
     cuts: Sequence[int] = (),
+    poses: str | None = None,
     **options: Any,
 ) -> Path:
     """A run folder that has finished the frames of some numbers, of all those that were selected."""
     write_sequence(folder / "frames", images, numbers=numbers, **options)
-    path = {"fps": 30.0, "frames": list(selected or numbers), "cuts": list(cuts)}
+    path: dict[str, Any] = {"fps": 30.0, "frames": list(selected or numbers), "cuts": list(cuts)}
+    if poses is not None:
+        path["poses"] = poses
     (folder / "run.json").write_text(json.dumps({"format": 2, "identity": {"path": path}}))
     return folder
 

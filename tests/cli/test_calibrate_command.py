@@ -6,6 +6,8 @@ import pytest
 
 from enfilade.backends.analytic_scene import scene_text
 from enfilade.cli import main
+from enfilade.errors import RunFolderError
+from enfilade.report import cases
 from enfilade.studies.cases import threshold
 from scenes_analytic import room
 
@@ -46,6 +48,29 @@ def test_it_says_the_threshold_with_its_curve(run, inputs, tmp_path):
     assert "v_t     0 deg/s" in result.output
     assert "--masks-slow-deg-s 0" in result.output
     assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("flags", [(), ("--json",)])
+def test_a_curve_that_cannot_be_drawn_is_told(run, inputs, tmp_path, monkeypatch, flags):
+    found = {"threshold_deg_s": 0.5, "curve": []}
+    monkeypatch.setattr(threshold, "calibrate_job", lambda *_, **__: found)
+    drawn = []
+
+    def draw(curves, file):
+        drawn.extend(curves)
+        raise RunFolderError(f"can't write {file}")
+
+    monkeypatch.setattr(cases, "draw_threshold", draw)
+    monkeypatch.chdir(tmp_path)
+    line = ("calibrate", "threshold", "scene.analytic.json", *inputs[1:], "--device", "cpu", *flags)
+    result = run(*line, "--plot", "curve.png")
+    assert result.exit_code == 2
+    assert "0.5" in result.stdout
+    assert "can't write curve.png" in result.stderr
+    assert drawn == [tmp_path.name]
+    refused = run(*line, "--plot", "curve.svg")
+    assert "curve.svg: it is written as .png" in refused.stderr
+    assert refused.stdout == ""
 
 
 def test_json_has_all_of_it_and_traced_frames_are_kept(run, inputs, tmp_path):

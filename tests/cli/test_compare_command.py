@@ -268,3 +268,46 @@ def test_kernels_say_the_same(run, folders):
     ]
     assert found[0]["score_jnd"] > 1.0
     assert found[1]["score_jnd"] == pytest.approx(found[0]["score_jnd"], rel=1e-3)
+
+
+def contents(folder):
+    return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_what_is_compared_is_not_written_over(run, folders, tmp_path):
+    film, size = tmp_path / "film.mkv", {"width": 60, "height": 40}
+    frames = list(open_sequence(folders[0]))
+    encode_video(film, frames, fps=24.0, settings=VideoSettings(codec="ffv1"), exposure_ev=0.0, **size)
+    (tmp_path / "counted").mkdir()
+    for i in range(FRAMES):
+        (tmp_path / "counted" / f"{i + 1:06}.png").write_bytes((folders[1] / f"{i}.png").read_bytes())
+    (tmp_path / "link").symlink_to(folders[1])
+    before = contents(tmp_path)
+    for test, reference, flag, target in (
+        (*folders, "--heatmap", folders[0]),
+        (*folders, "--heatmap", tmp_path / "link"),
+        (folders[0] / "%d.png", folders[1], "--heatmap", folders[0]),
+        (film, folders[1], "--heatmap", film),
+        (film, tmp_path / "counted", "--heatmap", tmp_path / "counted"),
+        (*folders, "--graph", folders[1] / "3.png"),
+    ):
+        refused = run("compare", test, reference, flag, target)
+        assert refused.exit_code == 2, refused.output
+        assert f"{flag} would replace {target}" in refused.stderr
+        assert "is compared" in refused.stderr
+        assert "to do" not in refused.stderr
+    assert contents(tmp_path) == before
+
+
+def test_other_images_may_stand_beside_heat_maps(run, folders, tmp_path):
+    for folder in folders:
+        for i in range(2, FRAMES):
+            (folder / f"{i}.png").unlink()
+    film = tmp_path / "film.mkv"
+    frames = list(open_sequence(folders[0]))
+    settings = VideoSettings(codec="ffv1")
+    encode_video(film, frames, fps=24.0, width=60, height=40, settings=settings, exposure_ev=0.0)
+    before = contents(folders[1])
+    result = run("compare", film, folders[1], "--flow", "none", "--heatmap", folders[1])
+    assert result.exit_code == 0, result.output
+    assert before.items() < contents(folders[1]).items()

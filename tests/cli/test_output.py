@@ -38,6 +38,24 @@ def test_plan_prints_a_table_and_draws(run, jobs, camera_path, tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_plan_that_cannot_be_drawn_is_told(run, jobs, camera_path, tmp_path):
+    jobs.answer = made_up_plan()
+    (tmp_path / "file").write_text("")
+    line = ("plan", "s.xml", "--path", camera_path, "--plot", tmp_path / "file" / "plan.png")
+    for flags, words in (((), "4 initial keyframes: 1, 21, 41, 60"), (("--json",), '"keyframes"')):
+        result = run(*line, *flags)
+        assert result.exit_code == 2
+        assert words in result.stdout
+        assert "can't write" in result.stderr
+
+
+def test_a_plan_is_drawn_as_png(run, jobs, camera_path, tmp_path):
+    result = run("plan", "s.xml", "--path", camera_path, "--plot", tmp_path / "plan.pdf")
+    assert result.exit_code == 2
+    assert "plan.pdf: it is written as .png" in result.stderr
+    assert jobs.seen == []
+
+
 def test_plan_as_json(run, jobs, camera_path):
     jobs.answer = made_up_plan()
     assert json.loads(run("plan", "s.xml", "--path", camera_path, "--json").stdout) == made_up_plan()

@@ -98,6 +98,21 @@ def test_a_bar_knows_the_time_left_of_units_that_take_long():
         assert progress.tasks[0].time_remaining == 6 * 45
 
 
+def test_a_bar_that_grows_keeps_its_pace():
+    clock = Clock()
+    with bars(Console(file=io.StringIO(), force_terminal=True, width=80), clock) as progress:
+        monitor = BarMonitor(progress)
+        monitor.stage("segments", 4)
+        for _ in range(4):
+            clock.now += 45.0
+            monitor.advance()
+        assert progress.tasks[0].finished
+        monitor.extend(2)
+        assert progress.tasks[0].time_remaining == 2 * 45
+        monitor.extend(-2)
+        assert progress.tasks[0].finished
+
+
 def traced_lines(folder, monkeypatch, *, done, count=20, damaged=()):
     """What a log says of a run of `count` frames of a minute each, `done` of them before."""
     clock, lines, numbers = Clock(), [], tuple(range(1, count + 1))

@@ -2,6 +2,7 @@
 
 import json
 
+import drjit
 import pytest
 
 import scenes_analytic
@@ -181,3 +182,47 @@ def test_who_does_the_work(run, jobs, camera_path, tmp_path):
     refused = run(*line, "--executor", "threads")
     assert refused.exit_code == 2
     assert "choose one of in-process, processes, ray, ray:ADDRESS" in refused.stderr
+
+
+@pytest.mark.parametrize("flags", [(), ("--executor", "in-process")])
+def test_more_workers_than_this_process_are_refused(run, jobs, camera_path, tmp_path, flags):
+    line = ("render", "s.xml", "--path", camera_path, "--out", tmp_path / "run", *flags)
+    refused = run(*line, "--workers", "2")
+    assert refused.exit_code == 2
+    assert "--executor in-process, which is one worker; add --executor processes" in refused.stderr
+    assert jobs.seen == []
+    assert run(*line, "--workers", "1").exit_code == 0
+
+
+def test_threads_are_those_of_this_process(run, jobs, camera_path, tmp_path):
+    before = drjit.thread_count()
+    line = ("render", "s.xml", "--path", camera_path, "--out", tmp_path / "run", "--threads")
+    try:
+        drjit.set_thread_count(3)
+        for threads, expected in (("0", 3), ("2", 2)):
+            assert run(*line, threads).exit_code == 0
+            assert drjit.thread_count() == expected
+        assert run(*line, "1", "--executor", "processes").exit_code == 0
+        assert drjit.thread_count() == 2
+    finally:
+        drjit.set_thread_count(before)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (("work", "--chunk", "2"), "say which with --step"),
+        (("work", "--of", "2"), "say which with --step"),
+        (("farm", "--slurm", "cpus_per_task=16"), "add --submit slurm"),
+        (("farm", "--out", "a.json", "--submit", "local"), "writes no template"),
+        (("report", "--out", "a.html", "--serve"), "--out says nothing to --serve"),
+        (("report", "--port", "8080"), "--port says nothing without --serve"),
+    ],
+)
+def test_flags_that_would_say_nothing_are_refused(run, begun, tmp_path, monkeypatch, line, words):
+    monkeypatch.setattr("enfilade.report.live.Live.wait", lambda _: None)
+    command, *flags = line
+    refused = run(command, tmp_path / "run", *flags)
+    assert refused.exit_code == 2, refused.output
+    assert words in refused.stderr
+    assert refused.stdout == ""

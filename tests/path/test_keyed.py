@@ -233,6 +233,8 @@ def test_any_keys_give_rigid_poses_within_their_hull(rows):
         ([key(0), key(1)], {"size": [640]}, "list of 2"),
         ([key(0), key(1)], {"size": [640, 20000]}, "size is 640x20000"),
         ([key(0), key(1)], {"fps": 0}, "fps is 0"),
+        ([key(0), key(1)], {"fps": 0.009}, "fps is 0.009; it must be from 0.01 to 10000"),
+        ([key(0), key(1)], {"fps": 10001}, "fps is 10001; it must be from"),
         ([key(0), key(1, (0, 1, -5))], {}, "between two keys .* can't look at"),
     ],
 )

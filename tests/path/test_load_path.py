@@ -63,6 +63,8 @@ def test_the_size_that_is_proposed_fits(width, aspect):
         ({"frames": ()}, "no frames"),
         ({"frames": (3, 2)}, "must rise"),
         ({"fps": 0.0}, "0 frames per second"),
+        ({"fps": 0.009}, "0.009 frames per second .* give 0.01 to 10000"),
+        ({"fps": 10_001.0}, "10001 frames per second"),
         ({"fps": float("nan")}, "nan frames per second"),
     ],
 )

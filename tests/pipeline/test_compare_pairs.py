@@ -89,6 +89,26 @@ def test_numbers_that_differ_are_paired_in_order_and_that_is_said_once(sequence)
         assert not any("numbers differ" in text for text in notes.said)
 
 
+@pytest.mark.parametrize(
+    ("poses", "selected", "is_said"),
+    [
+        ("a", range(1, 4), False),
+        ("b", range(1, 4), True),
+        ("b", range(1, 9), False),
+        (None, range(1, 4), False),
+    ],
+)
+def test_another_camera_path_is_told(tmp_path, poses, selected, is_said):
+    images, numbers = [textured()] * 3, (1, 2, 3)
+    test = write_run(tmp_path / "t", images, numbers, poses="a")
+    reference = write_run(tmp_path / "r", images, numbers, selected=selected, poses=poses)
+    notes = Notes()
+    judged(test, reference, notes)
+    said = [text for text in notes.said if "different camera paths" in text]
+    assert len(said) == is_said
+    assert all(str(test) in text and str(reference) in text for text in said)
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("role", ["test", "reference"])
 def test_pixels_that_are_no_numbers_are_named(sequence, value, role):

@@ -3,14 +3,16 @@
 import pytest
 
 from enfilade.camera import Camera, look_at
-from enfilade.errors import SettingsError
+from enfilade.errors import InputError, SettingsError
 from enfilade.monitor import Silence
+from enfilade.pipeline import plan as module
 from enfilade.pipeline import rehearsal
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.kept import nearest
 from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.rehearsal import excerpt_of, forecast_decoupled
+from enfilade.pipeline.walkthrough import prepare
 from enfilade.records import CameraPath, Segment
 from enfilade.settings import Settings
 from enfilade.store import Run
@@ -25,6 +27,25 @@ def test_too_few_paths_to_know_their_noise_are_refused(tmp_path):
     job = job_of(tmp_path, wall(), slide(3), trace={"spp": 1})
     with pytest.raises(SettingsError, match="--method paper needs --spp 2 or more"):
         plan(job, Silence())
+
+
+@pytest.mark.parametrize(
+    ("size", "tables", "words"),
+    [
+        ((65, 48), {"video": {"codec": "av1"}}, "65x48"),
+        ((64, 48), {"video": {"codec": "ffv1", "view": "Film"}}, "Film"),
+        ((64, 48), {"viewing": {"black_cd_m2": 900.0}}, "less than peak_cd_m2"),
+    ],
+)
+def test_what_render_would_refuse_is_refused(tmp_path, monkeypatch, size, tables, words):
+    opened = []
+    monkeypatch.setattr(module, "open_renderer", lambda *_: opened.append(1))
+    job = job_of(tmp_path, wall(), slide(3, size=size), **tables)
+    with pytest.raises(InputError, match=words):
+        plan(job, Silence())
+    with pytest.raises(InputError, match=words):
+        prepare(job, tmp_path / "run")
+    assert not opened
 
 
 def test_a_scene_unfit_for_the_method_is_refused_before_its_frames_are_looked_at(tmp_path):
@@ -52,8 +73,34 @@ def test_a_rest_is_not_rehearsed():
     assert nearest(path, keyframes, 42, 3) == [3, 44, 0]
 
 
-def rehearse(job, folder, _monitor):
+class Bar:
+    """A monitor that counts: of each stage, what is done and what is to be done."""
+
+    def __init__(self):
+        self.counts, self.said, self.now = {}, [], ""
+
+    def stage(self, name, total):
+        self.now = name
+        self.counts.setdefault(name, [0, 0])[1] += total
+
+    def advance(self, count=1):
+        self.counts[self.now][0] += count
+
+    def extend(self, count):
+        self.counts[self.now][1] += count
+
+    def say(self, text):
+        self.said.append(text)
+
+
+def rehearse(job, folder, monitor):
     """Stands for a render of five frames of a shot that begins and ends with a keyframe."""
+    monitor.stage("survey", 1)
+    monitor.advance()
+    monitor.stage("light", 5)
+    monitor.extend(1)
+    monitor.advance(6)
+    monitor.say("light 1-5: it is tried again")
     assert len(job.path) == 5
     paths = paths_for(JND, QUALITY, 2)
     drafts, light = {"drafts": 3 * PIXELS}, {"light": paths * PIXELS}
@@ -81,7 +128,9 @@ def test_a_rehearsed_segment_is_multiplied_shot_by_shot(tmp_path, monkeypatch):
     light = {"quality": QUALITY, "denoiser": "none"}
     job = job_of(tmp_path, wall(), room_walk(20, size=(8, 6)), method="decoupled", light=light)
     shots = [[Segment(0, 4)], [Segment(first, first + 2) for first in range(5, 19, 2)]]
-    found = forecast_decoupled(job, shots, Silence())
+    bar = Bar()
+    found = forecast_decoupled(job, shots, bar)
+    assert (bar.counts, bar.said) == ({"rehearsal": [7, 7]}, ["light 1-5: it is tried again"])
     assert (paths_for(JND, QUALITY, 2), paths_for(JND, QUALITY, 8)) == (128, 32)
     mean = (2 * 128 + 8 * 32) / 10
     assert found["paths"] == round(mean)

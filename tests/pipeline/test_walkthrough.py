@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import json
 import math
+import os
 
 import drjit as dr
 import numpy as np
@@ -17,7 +18,7 @@ from enfilade.monitor import Silence
 from enfilade.pipeline.inbetween import make_keyframe, read_raw
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.plan import plan
-from enfilade.pipeline.walkthrough import kept, prepare
+from enfilade.pipeline.walkthrough import kept, prepare, render
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import CameraPath, Source, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
@@ -446,6 +447,27 @@ def test_a_scene_is_tried_before_its_run_begins_also_where_its_folder_is_there(t
     prepare(job, tmp_path / "run", is_tried=True)
     prepare(job, tmp_path / "run", is_tried=True)
     assert tried == [False, True, False]
+
+
+def test_a_folder_that_can_hold_no_run_is_refused_before_the_scene_is_tried(tmp_path, monkeypatch):
+    tried = []
+    monkeypatch.setattr(Job, "check_scene", lambda _, *, is_tried=False: tried.append(is_tried))
+    job = job_of(tmp_path, room(), PATH)
+    foreign, forbidden = tmp_path / "foreign", tmp_path / "forbidden"
+    foreign.mkdir()
+    (foreign / "letter.txt").write_text("")
+    monkeypatch.setattr(os, "access", lambda place, _mode: forbidden not in place.parents)
+    for folder, words in (
+        (foreign, "is not empty and holds no run"),
+        (foreign / "letter.txt" / "run", "can't make a run in"),
+        (forbidden / "run", "can't write in"),
+    ):
+        with pytest.raises(RunFolderError, match=words):
+            prepare(job, folder, is_tried=True)
+        with pytest.raises(RunFolderError, match=words):
+            render(job, folder, Silence(), is_tried=True)
+    assert True not in tried
+    assert not forbidden.exists()
 
 
 def test_the_sky_is_far_in_the_depth_that_is_delivered(tmp_path):

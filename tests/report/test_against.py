@@ -15,10 +15,10 @@ from enfilade.store import Run
 STEP_PX = 2.0  # by which all moves from each number to the next
 
 
-def made_up(folder, numbers, *, has_flow=True):
+def made_up(folder, numbers, *, has_flow=True, **path):
     """A finished run of a grey wall that passes by."""
     settings = json.loads(json.dumps(Settings().to_tables()))
-    path = {"frames": list(numbers), "size": [16, 12], "fps": 24.0, "cuts": []}
+    path = {"frames": list(numbers), "size": [16, 12], "fps": 24.0, "cuts": [], **path}
     identity = {"method": "reference", "path": path, "settings": settings, "versions": {}, "scene": {}}
     with Run.open(folder, identity) as run:
         (folder / "frames").mkdir()
@@ -82,3 +82,15 @@ def test_where_no_flow_fits_it_says_so_once(tmp_path, speeds):
         judge.beside(test.frame(index))
     assert speeds == [None, None]
     assert [note for note in judge.notes if "as if nothing moved" in note] == judge.notes[-1:]
+
+
+@pytest.mark.parametrize(
+    ("of_reference", "poses", "is_said"),
+    [(range(1, 4), "a", False), (range(1, 4), "b", True), (range(1, 6), "b", False)],
+)
+def test_another_camera_path_is_told(tmp_path, of_reference, poses, is_said):
+    test = made_up(tmp_path / "test", range(1, 4), poses="a")
+    reference = made_up(tmp_path / "reference", of_reference, poses=poses)
+    notes = Against(test, reference, has_metric=False).notes
+    said = [note for note in notes if "the reference reference is of another camera path" in note]
+    assert len(said) == is_said

@@ -8,7 +8,7 @@ from enfilade.pixels.tone import srgb_decode
 from enfilade.report import bench_pictures
 from enfilade.report.bench_pictures import write_differences
 from enfilade.report.bench_tables import bench_tables
-from enfilade.report.tables import as_text
+from printed import as_text
 
 GREY, DARK = 0.1, 0.05  # of the reference, and of the contestant
 

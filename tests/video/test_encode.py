@@ -283,3 +283,11 @@ def test_a_clip_that_is_damaged(tmp_path):
     with pytest.raises(ImageError, match=r"1\.mp4 is missing or damaged"):
         join_videos(tmp_path / "a.mp4", [(tmp_path / "1.mp4", 4)], fps=24.0, settings=VideoSettings())
     assert not (tmp_path / "a.mp4").exists()
+
+
+def test_a_colon_in_a_relative_name_is_no_protocol(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    clip = encoded(Path("walk:2/a.mkv"), bars(), codec="ffv1")
+    whole = Path("walk:2/whole.mkv")
+    join_videos(whole, [(clip, 3)], fps=24.0, settings=VideoSettings(codec="ffv1"))
+    assert len(list(open_sequence(whole))) == 3

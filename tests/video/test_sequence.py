@@ -179,6 +179,12 @@ def test_display_referred_images_are_decoded(tmp_path):
     np.testing.assert_allclose(jpeg[16, 16], srgb_decode(np.float32([200, 100, 50]) / 255), atol=0.01)
 
 
+def test_a_colon_in_a_relative_name_is_no_protocol(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    deep_png(tmp_path / "walk:1.png", RNG.integers(0, 65536, (5, 7, 3), np.uint16))
+    assert next(iter(open_sequence("walk:1.png"))).shape == (5, 7, 3)
+
+
 def test_sixteen_bits_keep_all_of_them(tmp_path):
     deep = RNG.integers(0, 65536, (5, 7, 3), np.uint16)
     deep_png(tmp_path / "a.png", deep)

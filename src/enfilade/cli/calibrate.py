@@ -11,6 +11,7 @@ import click
 from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import job_of, output_options, path_options
+from enfilade.cli.outcome import check_png
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -82,6 +83,7 @@ def threshold(
     A few frames are rendered with every pixel traced, and from keyframes; the metric says up to which
     velocity the one must replace the other. The result is for --masks-slow-deg-s.
     """
+    check_png("--plot", plot)
     if folder is not None:
         mark_resumable(ctx)
     job = job_of(ctx, method="paper", **inputs)
@@ -93,16 +95,16 @@ def threshold(
         found = calibrate_job(
             job, terms, probes=probes, is_plain=light == "plain", folder=folder, monitor=monitor
         )
+    if as_json:
+        click.echo(json.dumps(found, indent=2))
+    else:
+        _show(found, terms)
     if plot is not None:
         from enfilade.report.cases import draw_threshold
 
-        draw_threshold({job.scene.parent.name: found}, plot)
-    if as_json:
-        click.echo(json.dumps(found, indent=2))
-        return
-    _show(found, terms)
-    if plot is not None:
-        click.echo(f"plot    {plot}")
+        draw_threshold({job.scene.resolve().parent.name: found}, plot)
+        if not as_json:
+            click.echo(f"plot    {plot}")
 
 
 def _show(found: dict[str, Any], terms: Calibration) -> None:

@@ -13,6 +13,7 @@ import click
 from enfilade.cli.flags import SettingsCommand, given_in, settings_of, settings_options
 from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import json_option, quiet_option
+from enfilade.cli.outcome import check_png
 from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -140,9 +141,9 @@ def command(
     a difference that three viewers of four find when they look for it, everywhere and all the time. What is
     small or brief has a lower score than its own JND; where that is visible, the largest is said, too.
     """
+    check_png("--graph", graph)
     show = None if heatmap is None else _painted(heatmap)
-    if graph is not None and graph.suffix.lower() != ".png":
-        raise SettingsError(f"--graph {graph}: it is written as .png")
+    _check_apart(test, reference, heatmap, graph)
     terms = _terms(ctx, **choices)
     from enfilade.cli.progress import watch
     from enfilade.pipeline.compare import compare
@@ -220,7 +221,7 @@ def _painted(target: Path) -> Show:
         write_heatmap_video,
     )
 
-    is_folder = target.is_dir() or not target.suffix
+    is_folder = _is_folder(target)
     if not is_folder and target.suffix.lower() not in VIDEO_CODECS:
         raise SettingsError(f"--heatmap {target}: give a folder, or a file {', '.join(VIDEO_CODECS)}")
 
@@ -234,6 +235,39 @@ def _painted(target: Path) -> Show:
             write_heatmap_video(target, pictures, size=size, fps=viewing.fps)
 
     return show
+
+
+def _is_folder(target: Path) -> bool:
+    return target.is_dir() or not target.suffix
+
+
+def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | None) -> None:
+    """Refuse to write over what is compared."""
+    if heatmap is None and graph is None:
+        return
+    from enfilade.video import files_of
+
+    ours, theirs = files_of(test), files_of(reference)
+    read = {_place_on_disk(file) for file in (*ours, *theirs)} - {None}
+    pictures = [heatmap] if heatmap is not None else []
+    if heatmap is not None and _is_folder(heatmap):
+        # The frames of a video are counted, and as many as the reference's.
+        counted = [f"{number:06d}" for number in range(1, len(theirs) + 1)]
+        names = [file.stem for file in ours if file.suffix.lower() in IMAGES] or counted
+        pictures = [heatmap / f"{name}.png" for name in names]
+    for flag, files in (("--heatmap", pictures), ("--graph", [graph] if graph is not None else [])):
+        for file in files:
+            if _place_on_disk(file) in read:
+                raise SettingsError(f"{flag} would replace {file}, which is compared; write it elsewhere")
+
+
+def _place_on_disk(file: Path) -> tuple[int, int] | None:
+    """Device and number of a file, whatever names lead to it; None where there is none."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _name(frame: JudgedFrame) -> str:

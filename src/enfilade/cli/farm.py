@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option
+from enfilade.errors import SettingsError
 
 
 @click.command("farm", short_help="Give a run to a render farm (Open Job Description) or to Slurm.")
@@ -47,6 +48,10 @@ def command(
     All hosts must see the folder, and the scene, under the same names. Each task is an `enfilade work`
     command and can be given to any host again.
     """
+    if options and cluster is None:
+        raise SettingsError("--slurm says nothing to a job template; add --submit slurm, or leave it out")
+    if file is not None and cluster is not None:
+        raise SettingsError("--out says nothing to --submit, which writes no template; leave one of them out")
     from enfilade.pipeline.farm import TEMPLATE, submit, write_template
 
     if cluster is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from enfilade.cli.flags import SHORT, flags_given, settings_of
-from enfilade.device import Choice, activate
+from enfilade.device import Choice, activate, load
 from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def crew_options(command: Command) -> Command:
             type=click.IntRange(0),
             default=0,
             show_default=True,
-            help="Threads of each worker process; 0: its share of the cores.",
+            help="Threads of each worker, in process too; 0: its share of the cores.",
         ),
         click.option(
             "--workers",
@@ -138,16 +138,23 @@ def crew_options(command: Command) -> Command:
 
 
 def crew_of(executor: str, workers: int | None, threads: int) -> Crew:
-    """Who does the work. The device must be active.
+    """Who does the work. The device must be active; this process takes its threads now, if it is who.
 
     Raises
     ------
     SettingsError
-        There is no such executor.
+        There is no such executor, or it has not as many workers.
     """
     from enfilade.executors.opener import check_executor
 
     check_executor(executor)
+    if executor == "in-process" and (workers or 1) > 1:
+        raise SettingsError(
+            f"--workers {workers} says nothing to --executor in-process, which is one worker; add --executor "
+            "processes, or leave it out"
+        )
+    if executor == "in-process" and threads:
+        load().set_thread_count(threads)
     from enfilade.pipeline.crew import Crew
 
     return Crew(executor, workers, threads)

@@ -1,4 +1,4 @@
-"""What a command that finished a run leaves: plots, and where everything is."""
+"""What a command leaves when it has finished: plots, and where everything is."""
 
 from __future__ import annotations
 
@@ -7,7 +7,20 @@ from typing import Any
 
 import click
 
+from enfilade.errors import SettingsError
+
 LEDGER = "ledger.jsonl"
+
+
+def check_png(flag: str, file: Path | None) -> None:
+    """Refuse a picture under a name that another format has, before any work.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if file is not None and file.suffix.lower() != ".png":
+        raise SettingsError(f"{flag} {file}: it is written as .png")
 
 
 def ledger_bytes(folder: Path) -> int:

@@ -11,6 +11,7 @@ import click
 from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_options
+from enfilade.cli.outcome import check_png
 
 
 @click.command("plan", cls=SettingsCommand, short_help="What rendering would take, before it begins.")
@@ -26,23 +27,26 @@ from enfilade.cli.inputs import JOB_SECTIONS, job_of, job_options, output_option
 @click.pass_context
 def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: bool, **inputs: Any) -> None:
     """Say what rendering SCENE would take: image flow, keyframes, expected holes, forecast of cost."""
+    check_png("--plot", plot)
     job = job_of(ctx, **inputs)
     from enfilade.cli.progress import watch
     from enfilade.pipeline.plan import plan
 
     with watch(quiet=quiet) as monitor:
         made = plan(job, monitor).to_dict()
+    if as_json:
+        click.echo(json.dumps(made, indent=2))
+    else:
+        _show(made)
     if plot is not None:
         from enfilade.report.plots import plot_plan
 
         plot_plan(made, plot)
-    if as_json:
-        click.echo(json.dumps(made, indent=2))
-        return
-    _show(made, plot)
+        if not as_json:
+            click.echo(f"plot    {plot}")
 
 
-def _show(made: dict[str, Any], plot: Path | None) -> None:
+def _show(made: dict[str, Any]) -> None:
     from rich.console import Console
 
     from enfilade.report.tables import plan_tables
@@ -50,5 +54,3 @@ def _show(made: dict[str, Any], plot: Path | None) -> None:
     console = Console()
     for table in plan_tables(made):
         console.print(table)
-    if plot is not None:
-        click.echo(f"plot    {plot}")

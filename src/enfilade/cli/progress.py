@@ -56,9 +56,12 @@ class BarMonitor:
     def extend(self, count: int) -> None:
         """Lengthen the present bar."""
         if self._now is not None:
-            task = self._tasks[self._now]
-            total = self._progress.tasks[self._progress.task_ids.index(task)].total or 0
-            self._progress.update(task, total=total + count)
+            task = self._progress.tasks[self._progress.task_ids.index(self._tasks[self._now])]
+            # Told of a total, Progress.update would forget the pace, and with it the time left.
+            task.total = (task.total or 0) + count
+            if task.completed < task.total:
+                task.finished_time = task.finished_speed = None
+            self._progress.update(task.id)
 
     def say(self, text: str) -> None:
         """Print a line above the bars."""

@@ -10,6 +10,7 @@ import click
 
 from enfilade.cli.group import debug_option
 from enfilade.cli.inputs import quiet_option
+from enfilade.errors import SettingsError
 
 PAGE = "report.html"
 
@@ -74,6 +75,10 @@ def command(
     The page is one file that needs no network. A running run is shown as far as it has come; it is not
     disturbed, and nothing is rendered.
     """
+    if is_served and file is not None:
+        raise SettingsError("--out says nothing to --serve, which writes no page; leave one of them out")
+    if port and not is_served:
+        raise SettingsError("--port says nothing without --serve; add that, or leave it out")
     from enfilade.cli.progress import watch
     from enfilade.path import parse_frames
     from enfilade.report.page import Wishes, write_page

@@ -11,7 +11,7 @@ from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.inputs import crew_of, crew_options, device_option, quiet_option
 from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
 from enfilade.device import Choice, activate
-from enfilade.errors import RunFolderError
+from enfilade.errors import RunFolderError, SettingsError
 
 
 @click.command("work", short_help="Go on with a run, or do a share of it beside other commands.")
@@ -48,6 +48,8 @@ def command(
     many hosts: each step after the one before, all chunks of a step at the same time. On a run that was
     shared before, what others hold, or have not done yet, is waited for up to two minutes.
     """
+    if step is None and (chunk, count) != (1, 1):
+        raise SettingsError("--chunk and --of share a step out: say which with --step, or leave them out")
     mark_resumable(ctx)
     activate(_device_of(run) if device == "auto" else device)
     crew = crew_of(**who)

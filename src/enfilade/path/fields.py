@@ -15,6 +15,7 @@ from enfilade.errors import CameraPathError
 
 LARGEST_NUMBER = 1e15  # beyond it float32 can't square a coordinate without losing all meaning
 LARGEST_SIZE = 16384  # pixels a side
+LEAST_FPS, MOST_FPS = 0.01, 10_000.0  # wider than anybody needs; a video can say 1/1001
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,13 @@ class Table:
         value = self.number("fov")
         if not 0.0 < value < 180.0:
             raise self.fail(f"fov is {value:g} degrees; it must lie between 0 and 180")
+        return value
+
+    def fps(self) -> float:
+        """Frames per second under the key ``fps``."""
+        value = self.number("fps")
+        if not LEAST_FPS <= value <= MOST_FPS:
+            raise self.fail(f"fps is {value:g}; it must be from {LEAST_FPS:g} to {MOST_FPS:g}")
         return value
 
     def _finite(self, key: str, value: Any) -> float:

@@ -71,7 +71,7 @@ def read_keyed(table: Table, *, fps: float | None = None) -> Shots:
         Something is missing, malformed, unknown or contradictory.
     """
     table.allow_only(*_FILE_KEYS)
-    own = table.positive("fps") if "fps" in table or fps is None else fps
+    own = table.fps() if "fps" in table or fps is None else fps
     rate = own if fps is None else fps
     keys = _read_keys(table)
     count = _frame_count(table, keys, own, rate)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from itertools import pairwise
 from pathlib import Path
 
 from enfilade.camera import Camera
 from enfilade.errors import CameraPathError
-from enfilade.path.fields import LARGEST_SIZE, read_table
+from enfilade.path.fields import LARGEST_SIZE, LEAST_FPS, MOST_FPS, read_table
 from enfilade.path.keyed import FORMAT, read_keyed
 from enfilade.path.nerfstudio import read_nerfstudio
 from enfilade.path.shots import Shots
@@ -36,17 +35,19 @@ def load_path(
         Numbers of the frames to take, rising; the first camera of the file is frame 1. What is left is a
         walkthrough of its own: the frame after 1 of ``1,3,5`` is 3, and flow goes from one to the other.
     fps
-        Frames per second in place of the file's. Keyed poses are sampled at this rate; a nerfstudio path
-        keeps its frames and plays faster or slower.
+        Frames per second in place of the file's, from 0.01 to 10000. Keyed poses are sampled at this rate; a
+        nerfstudio path keeps its frames and plays faster or slower.
 
     Raises
     ------
     CameraPathError
-        The file is missing or malformed, a pose is not rigid, a frame is not on the path, or the size does
-        not fit the path's aspect.
+        The file is missing or malformed, a pose is not rigid, a frame is not on the path, the size does
+        not fit the path's aspect, or the frame rate is out of range.
     """
-    if fps is not None and not (math.isfinite(fps) and fps > 0.0):
-        raise CameraPathError(f"{fps:g} frames per second can't be rendered; give a number above 0")
+    if fps is not None and not LEAST_FPS <= fps <= MOST_FPS:
+        raise CameraPathError(
+            f"{fps:g} frames per second can't be rendered; give {LEAST_FPS:g} to {MOST_FPS:g}"
+        )
     table = read_table(file)
     if table.values.get("format") == FORMAT:
         shots = read_keyed(table, fps=fps)

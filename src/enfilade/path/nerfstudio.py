@@ -14,7 +14,7 @@ import numpy as np
 from enfilade.camera import Matrix, check_rigid
 from enfilade.errors import CameraPathError
 from enfilade.path.cuts import find_jumps
-from enfilade.path.fields import LARGEST_SIZE, Table
+from enfilade.path.fields import LARGEST_SIZE, LEAST_FPS, MOST_FPS, Table
 from enfilade.path.shots import Shots
 
 
@@ -83,5 +83,12 @@ def _aspect(frames: list[Table], size: tuple[int, int] | None) -> float | None:
 
 def _fps(table: Table, count: int) -> float:
     if "fps" in table or "seconds" not in table:
-        return table.positive("fps")
-    return count / table.positive("seconds")
+        return table.fps()
+    seconds = table.positive("seconds")
+    rate = count / seconds
+    if not LEAST_FPS <= rate <= MOST_FPS:
+        raise table.fail(
+            f"{count} frames in {seconds:g} seconds are {rate:g} a second; "
+            f"they must be from {LEAST_FPS:g} to {MOST_FPS:g}"
+        )
+    return rate

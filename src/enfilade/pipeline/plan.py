@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.errors import SettingsError
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
@@ -16,7 +15,7 @@ from enfilade.pipeline.rehearsal import forecast_decoupled
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
-from enfilade.pipeline.walkthrough import LEAST_SPP
+from enfilade.pipeline.walkthrough import check_job
 from enfilade.records import Keyframe, Segment, Shading
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.warp import composite, warp_keyframe
@@ -72,17 +71,11 @@ def plan(job: Job, monitor: Monitor) -> Plan:
 
     Raises
     ------
-    SceneError
-    SettingsError
-        The method asks for more paths, or more of the scene than it has.
+    InputError
+        What :func:`~enfilade.pipeline.walkthrough.render` would refuse: the scene, or a setting.
     DeviceError
     """
-    job.check_scene()
-    if job.method == "paper" and job.settings.trace.spp < LEAST_SPP:
-        raise SettingsError(
-            f"--method paper needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "
-            "what is noise and what is a difference"
-        )
+    check_job(job)
     renderer = open_renderer(job.scene, job.settings.trace)
     if isinstance(renderer, LightRenderer):
         job.check_light(renderer.why_no_light)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from enfilade.monitor import Monitor, Silence
+from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.walkthrough import render
@@ -59,9 +59,7 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
     segment = max(segments, key=lambda s: (_views(job.path, s), -abs(s.first + s.last - len(job.path))))
     small = _smaller(job, segment)
     count = len(small.path)
-    monitor.stage("rehearsal", count)
-    identity, lines = _rehearsed(small)
-    monitor.advance(count)
+    identity, lines = _rehearsed(small, _OneStage(monitor))
 
     pilot = next((line for line in lines if "jnd" in line), None)
     keyframes = [len({s.first for s in shot} | {s.last for s in shot}) for shot in shots]
@@ -96,17 +94,41 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
     }
 
 
+class _OneStage:
+    """A monitor that takes all stages of a rehearsal for one: it is a single step of the plan."""
+
+    def __init__(self, monitor: Monitor) -> None:
+        self._monitor = monitor
+
+    def stage(self, name: str, total: int) -> None:
+        """Begin the one stage, or add to it."""
+        del name
+        self._monitor.stage("rehearsal", total)
+
+    def advance(self, count: int = 1) -> None:
+        """Pass it on."""
+        self._monitor.advance(count)
+
+    def extend(self, count: int) -> None:
+        """Pass it on."""
+        self._monitor.extend(count)
+
+    def say(self, text: str) -> None:
+        """Pass it on."""
+        self._monitor.say(text)
+
+
 def _smaller(job: Job, segment: Segment) -> Job:
     """A segment of a walkthrough. Its frames may have an odd number of lines, which not every codec takes."""
     settings = replace(job.settings, video=replace(job.settings.video, codec="ffv1"))
     return replace(job, path=excerpt_of(job.path, segment), settings=settings)
 
 
-def _rehearsed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def _rehearsed(job: Job, monitor: Monitor) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Identity and ledger of a run that is rendered and thrown away."""
     with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
         folder = Path(place) / "run"
-        render(job, folder, Silence())
+        render(job, folder, monitor)
         run = Run.existing(folder)
         return run.identity, list(run.lines())
 

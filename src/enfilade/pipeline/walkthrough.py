@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from enfilade.pipeline.summary import summarize
 from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.store.identity import RUN_FILE
+from enfilade.store.identity import prepare as make_fit
 from enfilade.video.codecs import odd_size_note
 
 METHODS = ("decoupled", "paper", "reference")
@@ -67,7 +70,8 @@ def render(
         Some units failed again and again; the rest is done.
     """
     crew = crew or Crew()
-    _check(job, crew)
+    check_executor(crew.executor)
+    check_job(job)
     if is_tried:
         _try(job, folder)
     with Run.open(folder, job.identity(), kept=lambda keys: _compared(job, folder, keys)) as run:
@@ -136,7 +140,7 @@ def prepare(job: Job, folder: Path, *, is_tried: bool = False) -> None:
     InputError
         The scene, the settings, or a folder that holds another run.
     """
-    _check(job, Crew())
+    check_job(job)
     if is_tried:
         _try(job, folder)
     with Run.open(folder, job.identity(), kept=lambda keys: _compared(job, folder, keys)) as run:
@@ -168,14 +172,34 @@ def _verify(run: Run, monitor: Monitor) -> None:
 
 
 def _try(job: Job, folder: Path) -> None:
-    """Let a process of its own load the scene of a run that is not begun yet."""
-    if not (folder / RUN_FILE).exists():
+    """Let a process of its own load the scene of a run that is not begun yet, if there is a place for it."""
+    if (folder / RUN_FILE).exists():
+        return
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        _check_place(folder)
         job.check_scene(is_tried=True)
+    except BaseException:
+        for place in made:  # what is refused leaves nothing
+            with suppress(OSError):
+                place.rmdir()
+        raise
 
 
-def _check(job: Job, crew: Crew) -> None:
-    """Refuse now what would fail, or mislead, after a night of rendering."""
-    check_executor(crew.executor)
+def _check_place(folder: Path) -> None:
+    make_fit(folder)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RunFolderError(f"can't write in {folder}; choose another --out")
+
+
+def check_job(job: Job) -> None:
+    """Refuse now what would fail, or mislead, after a night of rendering; the scene is not loaded.
+
+    Raises
+    ------
+    InputError
+        The scene, the screen, the video or the paths that are asked for.
+    """
     _ = job.viewing  # what is wrong with it raises here
     job.check_scene()
     if job.method not in METHODS:

@@ -168,8 +168,21 @@ def _oddities(test: SeenRun, reference: SeenRun) -> list[str]:
     scenes = [s.identity.get("scene", {}).get("fingerprint") for s in (test, reference)]
     if scenes[0] != scenes[1]:
         notes.append(f"the reference {reference.name} is of another scene, or of another version of it")
+    if _has_other_poses(test, reference):
+        notes.append(
+            f"the reference {reference.name} is of another camera path (its run.json has other poses): "
+            "frames of one number may show different views"
+        )
     if test.exposure_ev != reference.exposure_ev:
         notes.append(f"both runs are shown at this run's exposure, {test.exposure_ev:+g} stops")
     if not reference.is_finished:
         notes.append(f"the reference {reference.name} is not finished")
     return notes
+
+
+def _has_other_poses(test: SeenRun, reference: SeenRun) -> bool:
+    """Whether two runs say that they saw the same frames from elsewhere."""
+    ours, theirs = (s.identity["path"] for s in (test, reference))
+    # Of all frames that were selected, so that those of others can't be compared.
+    is_told = "poses" in ours and "poses" in theirs and ours["frames"] == theirs["frames"]
+    return bool(is_told and ours["poses"] != theirs["poses"])

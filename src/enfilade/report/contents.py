@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -29,7 +30,7 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         None: without one.
     film
     """
-    ahead = forecast(seen.identity, seen.lines, workers=sum(one["workers"] for one in seen.writers))
+    ahead = _ahead(seen)
     made = panels(seen.figures, seen.numbers, seen.speed_deg_s, film.beside)
     return {
         "name": seen.name,
@@ -53,6 +54,13 @@ def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, 
         "data": json.dumps(_data(seen, film, made), ensure_ascii=True).replace("<", "\\u003c"),
         "has_reference": reference is not None,
     }
+
+
+def _ahead(seen: SeenRun) -> Forecast:
+    found = forecast(seen.identity, seen.lines, workers=sum(one["workers"] for one in seen.writers))
+    if seen.silent_since is None:
+        return found
+    return replace(found, left_s=None, text="the time left is not known: perhaps nobody is at work any more")
 
 
 def _effort(figures: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,7 +106,11 @@ def _state(seen: SeenRun) -> dict[str, str]:
         first, *others = seen.writers
         who = f"process {first['pid']} on {first['host']}, since {first['started']}"
         who += f", and {len(others)} more" if others else ""
-        return {"word": "running", "text": f"{count} finished; {who}"}
+        if seen.silent_since is None:
+            return {"word": "running", "text": f"{count} finished; {who}"}
+        last = f"{seen.silent_since:%Y-%m-%d %H:%M} UTC"
+        gone = f"nothing was finished since {last}: it may be gone, and then the same command goes on"
+        return {"word": "unfinished", "text": f"{count} finished; {who}, but {gone}"}
     return {
         "word": "unfinished",
         "text": f"{count} finished, and nobody is at work; the same command goes on",

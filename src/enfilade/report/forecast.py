@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Forecast", "Step", "forecast"]
+__all__ = ["Forecast", "Step", "forecast", "wall_s"]
 
 RECENT = 20  # units from which the pace is taken: scenes are not equally dear everywhere
 TWICE = {  # methods that make each frame in two goes: what the first makes, and what the second does
@@ -151,13 +151,13 @@ class _Work:
         return len(self._units.get(kind, []))
 
     def _spent(self, kind: str) -> float:
-        return sum(_wall(line) for line in self._units.get(kind, []))
+        return sum(wall_s(line) for line in self._units.get(kind, []))
 
     def _left_of(self, kind: str) -> float | None:
         left = (self._raws if kind == "raw" else len(self._numbers)) - self._done(kind)
         if left <= 0:
             return 0.0
-        recent = [_wall(line) for line in self._units.get(kind, []) if not _is_given(line)][-RECENT:]
+        recent = [wall_s(line) for line in self._units.get(kind, []) if not _is_given(line)][-RECENT:]
         rounds = math.ceil(left / max(self._workers, 1))
         return rounds * sum(recent) / len(recent) if recent else None
 
@@ -170,7 +170,8 @@ class _Work:
         return len(judged) / max(len(self._numbers), 1)
 
 
-def _wall(line: Mapping[str, Any]) -> float:
+def wall_s(line: Mapping[str, Any]) -> float:
+    """Wall-clock seconds that a unit took, by its line of the ledger."""
     return sum(float(stage["wall_s"]) for stage in line.get("cost", {}).values())
 
 

@@ -23,6 +23,7 @@ from typing import Any, Self
 
 from enfilade.errors import EnfiladeError
 from enfilade.monitor import Monitor, Silence
+from enfilade.report.alive import silence
 from enfilade.report.page import Wishes, write_page
 from enfilade.store.checksum import size_of
 from enfilade.store.identity import LEDGER_FILE
@@ -222,12 +223,15 @@ class _Pages:
 
 @dataclass(frozen=True)
 class _Progress:
-    """How far a run has come, told without reading it: sizes of its ledgers by name, and who writes."""
+    """How far a run has come, without reading it: sizes of ledgers by name, who writes, and their silence."""
 
     sizes: dict[str, int | None]
     writers: list[dict[str, Any]]
+    silence: int
 
 
 def _progress(folder: Path) -> _Progress:
     ledgers = (folder / LEDGER_FILE, *sorted((folder / PARTS).glob("*.jsonl")))
-    return _Progress({file.name: size_of(file) for file in ledgers}, writers_of(folder))
+    writers = writers_of(folder)
+    sizes = {file.name: size_of(file) for file in ledgers}
+    return _Progress(sizes, writers, silence(folder, writers))

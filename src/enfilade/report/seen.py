@@ -13,6 +13,7 @@ from enfilade import __version__
 from enfilade.codec import read_exr
 from enfilade.errors import ImageError, RunFolderError
 from enfilade.records import F32, U8, Flow
+from enfilade.report.alive import silent_since
 from enfilade.settings import MaskSettings, VideoSettings, ViewingSettings
 from enfilade.store import Run, tally
 from enfilade.store.lock import writers_of
@@ -79,6 +80,8 @@ class SeenRun:
     video : VideoSettings
     writers : list of dict
         Who worked on it when it was opened, see :func:`~enfilade.store.lock.writers_of`.
+    silent_since : datetime or None
+        When they gave the last sign, where that is long ago; see :func:`~enfilade.report.alive.silent_since`.
     notes : list of str
         What is odd about the run, for the user to know.
 
@@ -95,6 +98,7 @@ class SeenRun:
         self.notes = list(self.run.notes)
         self.lines = list(self.run.lines())
         try:
+            self.silent_since = silent_since(folder, self.writers, self.lines)
             self._read()
         except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError) as error:
             raise RunFolderError(

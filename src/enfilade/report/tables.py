@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from io import StringIO
 from typing import Any
 
 from rich import box
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -162,13 +160,6 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
         f"{len(rows)} frames, {width}x{height}, {density}, {found['fps']:g} fps, mode {found['mode']}"
     )
     return table
-
-
-def as_text(table: Table, width: int = 100) -> str:
-    """A table as plain text without colours, for a log or a file."""
-    out = StringIO()
-    Console(file=out, width=width, color_system=None).print(table)
-    return out.getvalue()
 
 
 def percent(value: float) -> str:

@@ -145,7 +145,7 @@ def deep_pixels(file: Path, demuxer: str) -> F32:
     ImageError
         It is cut off or damaged.
     """
-    with _failures(file), av.open(str(file), format=demuxer) as container:
+    with _failures(file), av.open(str(file.absolute()), format=demuxer) as container:
         frame = next(iter(container.decode(video=0)), None)
         if frame is None or frame.is_corrupt:
             raise ImageError(f"{file} is cut off or damaged; write or copy it again")
@@ -264,4 +264,6 @@ def _incomplete(file: Path, announced: int, found: int) -> ImageError:
 
 def _opened(file: Path, options: dict[str, str] | None = None) -> Any:
     kind = DEMUXERS[file.suffix.lower()]
-    return av.open(str(file), format=kind, options=options or {}, metadata_errors="replace")
+    # absolute: FFmpeg takes what a relative name has before a colon for a protocol
+    name = str(file.absolute())
+    return av.open(name, format=kind, options=options or {}, metadata_errors="replace")

@@ -164,7 +164,7 @@ def _delay(clip: Path, rate: Fraction) -> int:
 
 def _opened(clip: Path) -> Any:
     try:
-        return av.open(str(clip))
+        return av.open(str(clip.absolute()))
     except MemoryError:
         raise
     except (av.FFmpegError, OSError) as error:
@@ -255,11 +255,12 @@ def _written(file: Path, codec: Codec) -> Iterator[Any]:
 
 
 def _container(file: Path, codec: Codec) -> Any:
+    # absolute: FFmpeg takes what a relative name has before a colon for a protocol
     # bitexact: Matroska would otherwise carry a random number, MP4 the name of the muxer's version
     options = {"fflags": "+bitexact"}
     if codec.container != "matroska":
         options["movflags"] = "+faststart+write_colr"
-    return av.open(str(file), "w", format=codec.container, container_options=options)
+    return av.open(str(file.absolute()), "w", format=codec.container, container_options=options)
 
 
 def _stream(container: Any, codec: Codec, fps: Fraction, options: dict[str, str]) -> Any:

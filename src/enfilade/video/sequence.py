@@ -15,8 +15,9 @@ from enfilade.records import F32
 from enfilade.video.decode import DEMUXERS, VideoFile
 from enfilade.video.images import SUFFIXES, ImageFiles
 
-__all__ = ["Sequence", "open_sequence"]
+__all__ = ["Sequence", "files_of", "open_sequence"]
 
+RUN_FILE = "run.json"
 NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
 NUMBER = re.compile(r"^-?\d+|\d+")  # in a name; one that begins it may be negative
 MOST_LISTED = 6  # patterns of a folder, in a message
@@ -92,11 +93,29 @@ def open_sequence(source: Path | str, *, layer: str | None = None) -> Sequence:
     return ImageFiles(files, numbers=_numbers(files), layer=layer)
 
 
+def files_of(source: Path | str) -> list[Path]:
+    """Files from which :func:`open_sequence` takes the frames, by their names alone: none is opened.
+
+    Parameters
+    ----------
+    source
+        See there. Where it leads to nothing, there are no files.
+    """
+    path = Path(source)
+    if path.is_dir():
+        place = _place(path)
+        return _images(place.iterdir()) if place.is_dir() else []
+    return [path] if path.is_file() else _matching(path)
+
+
+def _place(folder: Path) -> Path:
+    """Where a folder has its frames: a run keeps them in one of its own."""
+    return folder / "frames" if (folder / RUN_FILE).is_file() else folder
+
+
 def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
-    run = folder / "run.json"
+    run, place, files = folder / RUN_FILE, _place(folder), files_of(folder)
     identity = read_json(run) if run.is_file() else None
-    place = folder / "frames" if run.is_file() else folder
-    files = _images(place.iterdir()) if place.is_dir() else []
     if not files:
         raise ImageError(f"{place} has no images in it; read are: {', '.join(sorted(SUFFIXES))}")
     _check_one_sequence(place, files)

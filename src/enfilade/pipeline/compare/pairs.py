@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from enfilade.codec import read_json
 from enfilade.errors import ImageError
 from enfilade.monitor import Monitor
 from enfilade.pixels.tone import display_luminance, srgb_encode
@@ -70,7 +72,7 @@ class Pairs:
         Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
         says so.
     note : str
-        What to know of how the frames are paired; empty where there is nothing.
+        What to know of how the frames are paired, or of what they can show; empty where there is nothing.
 
     Raises
     ------
@@ -172,7 +174,9 @@ def open_pairs(
             f"neither {sequences[0].name(0)} nor {sequences[1].name(0)} has layers; leave out --layer, which "
             "chooses one of OpenEXR frames"
         )
-    return Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
+    pairs = Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
+    pairs.note = pairs.note or _note_on_paths(test, reference)
+    return pairs
 
 
 def _squared_error(test: F32, reference: F32) -> float:
@@ -223,6 +227,28 @@ def _check_same_frames(test: Sequence, reference: Sequence) -> None:
         f"(first {lacks.name(0)}) does not: give runs of the same --frames, finish the one that lacks it, or "
         "give patterns of frames that both have"
     )
+
+
+def _note_on_paths(test: Path | str, reference: Path | str) -> str:
+    ours, theirs = _path_of(test), _path_of(reference)
+    # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
+    # them: another host may round the same poses otherwise.
+    is_told = "poses" in ours and "poses" in theirs and ours.get("frames") == theirs.get("frames")
+    if not is_told or ours["poses"] == theirs["poses"]:
+        return ""
+    return (
+        f"camera: {test} and {reference} are of different camera paths (other poses in run.json): "
+        "frames of one number may show different views"
+    )
+
+
+def _path_of(source: Path | str) -> dict[str, Any]:
+    """The camera path as a run folder's ``run.json`` has it; nothing where there is none."""
+    file = Path(source) / "run.json"
+    found: Any = read_json(file) if file.is_file() else None
+    for key in ("identity", "path"):
+        found = found.get(key) if isinstance(found, dict) else None
+    return found if isinstance(found, dict) else {}
 
 
 def _note_on_numbers(test: Sequence, reference: Sequence) -> str:
