@@ -49,14 +49,9 @@ class FlowEstimator:
     def __init__(self, width: int, height: int) -> None:
         cv2.setNumThreads(1)
         self._size = (width, height)
-        self._factor = _factor(width, height)
+        self._reduced_size = _reduced(width, height)
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._grid = _grid(self._reduced_size)
-
-    @property
-    def _reduced_size(self) -> tuple[int, int]:
-        width, height = (max(round(n * self._factor), LEAST_PX) for n in self._size)
-        return width, height
 
     def luma(self, linear: F32) -> U8:
         """Image as the search takes it: 8 bits, encoded as for a screen, at its own size.
@@ -144,13 +139,12 @@ def _blocks(image: F32) -> F32:
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _factor(width: int, height: int) -> float:
-    if min(width, height) < LEAST_PX:
-        return LEAST_PX / min(width, height)
+def _reduced(width: int, height: int) -> tuple[int, int]:
+    """Size at which a flow is searched: halved until its longer side is short enough."""
     factor = 1.0
-    while width * factor > WIDEST_PX:
+    while max(width, height) * factor > WIDEST_PX:
         factor *= 0.5
-    return factor
+    return max(round(width * factor), LEAST_PX), max(round(height * factor), LEAST_PX)
 
 
 def _grid(size: tuple[int, int]) -> npt.NDArray[np.float32]:

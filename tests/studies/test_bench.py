@@ -15,12 +15,13 @@ from enfilade.monitor import Silence
 from enfilade.report.bench import plot_bench
 from enfilade.report.bench_pictures import plot_crops, plot_slices, write_differences
 from enfilade.report.bench_tables import bench_tables
-from enfilade.report.tables import as_text
+from enfilade.settings import Metering
 from enfilade.studies.bench import bench as module
 from enfilade.studies.bench.bench import Terms, bench
 from enfilade.studies.bench.contestants import Preset, chosen, lineup, read_presets
 from enfilade.studies.bench.race import Spent
 from enfilade.video import open_sequence
+from printed import as_text
 from scenes_analytic import room, room_walk
 from small_runs import Told, job_of
 
@@ -158,18 +159,36 @@ def test_the_pictures_and_tables(held, tmp_path):
 def test_who_can_not_take_part_is_named(held, tmp_path, monkeypatch):
     job, *_ = held
     monkeypatch.setattr(module, "why_no_denoiser", lambda: "no denoiser here")
-    monkeypatch.setattr(module, "why_missing", lambda name: "no FLIP here" if name == "flip" else "")
+    reasons = {name: "" if name == "psnr" else f"no {name} here" for name in JUDGES}
+    monkeypatch.setattr(module, "why_missing", reasons.get)
     told = Told()
-    everybody = lineup(job, traced=(), denoised=(1,), presets=())
+    everybody = lineup(job, traced=(), denoised=(1,), presets=(Preset("light", "decoupled"), *PRESETS[:1]))
     found = bench(job, everybody, TERMS, tmp_path / "bench", told)
-    assert found["left_out"] == [
-        "no FLIP here",
-        "path tracing, denoised does not take part: no denoiser here",
-    ]
-    assert told.said[:2] == found["left_out"]
-    assert "flip" not in found["judges"]
-    with pytest.raises(SettingsError, match="no FLIP here"):
+    assert [row["name"] for row in found["contestants"]] == ["paper-2"]
+    *judges, denoised, light = found["left_out"]
+    assert judges == [reason for reason in reasons.values() if reason]
+    assert denoised == "path tracing, denoised does not take part: no denoiser here"
+    assert light.startswith("decoupled does not take part:")
+    assert "no light to ask for" in light
+    assert told.said[: len(judges) + 2] == found["left_out"]
+    assert list(found["judges"]) == ["psnr"]
+    with pytest.raises(SettingsError, match="no flip here"):
         bench(job, everybody, Terms(64, judges=("flip",)), tmp_path / "other", told)
+    with pytest.raises(SettingsError, match=r"nobody can take part.*no light to ask for"):
+        bench(job, everybody[-2:-1], TERMS, tmp_path / "other", told)
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_folder_of_another_path_or_another_eye_is_refused(held, tmp_path):
+    job, everybody, folder, *_ = held
+    turned = dataclasses.replace(job.path, cameras=job.path.cameras[::-1])
+    still = dataclasses.replace(job.settings.metric, metering=Metering.NONE)
+    for other in (
+        dataclasses.replace(job, path=turned),
+        dataclasses.replace(job, settings=dataclasses.replace(job.settings, metric=still)),
+    ):
+        with pytest.raises(RunFolderError, match=r"poses|metering"):
+            bench(other, everybody, TERMS, folder, Told())
 
 
 def test_of_one_frame_no_flicker_is_counted(tmp_path):

@@ -90,13 +90,7 @@ class Job:
         return {
             "method": self.method,
             "scene": {"fingerprint": fingerprint, **items},
-            "path": {
-                "size": [self.path.width, self.path.height],
-                "fps": self.path.fps,
-                "frames": list(self.path.numbers),
-                "cuts": sorted(self.path.numbers[i] for i in self.path.cuts),
-                "poses": _digest(self.path),
-            },
+            "path": path_identity(self.path),
             "settings": settings,
             **({"view": {"processor": view["processor"]}} if view else {}),
             "versions": {
@@ -288,6 +282,17 @@ def _renderer_and_fingerprint(scene: Path) -> tuple[str, str]:
 def _variant(scene: Path) -> str:
     device = active()
     return device.backend if scene.name.endswith(ANALYTIC_SUFFIX) else device.variant
+
+
+def path_identity(path: CameraPath) -> dict[str, Any]:
+    """What tells one camera path from another: plain values for JSON."""
+    return {
+        "size": [path.width, path.height],
+        "fps": path.fps,
+        "frames": list(path.numbers),
+        "cuts": sorted(path.numbers[i] for i in path.cuts),
+        "poses": _digest(path),
+    }
 
 
 def _digest(path: CameraPath) -> str:

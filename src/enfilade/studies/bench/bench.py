@@ -25,7 +25,7 @@ from enfilade.device import Choice
 from enfilade.errors import RunFolderError, SceneError, SettingsError
 from enfilade.judges import JUDGES, SCALES, why_missing
 from enfilade.monitor import Monitor
-from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job
+from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job, path_identity
 from enfilade.renderer import PixelFilter
 from enfilade.settings import Settings
 from enfilade.store import Run
@@ -95,14 +95,18 @@ def bench(
     InputError
         The scene, the settings, or a folder that holds another bench.
     SettingsError
-        A judge that was asked for by name can't be had here; none has anything to say of these frames.
+        A judge that was asked for by name can't be had here; none has anything to say of these frames; no
+        contestant can render the scene.
     """
     judges, left_out = _judges(terms.judges)
-    reasons = {c.family: why for c in contestants if (why := _why_unable(c))}
+    first = {c.family: c for c in reversed(contestants)}
+    reasons = {family: why for family in FAMILIES if family in first and (why := _why_unable(first[family]))}
     left_out += [f"{FAMILIES[family]} does not take part: {why}" for family, why in reasons.items()]
-    able = [c for c in contestants if not _why_unable(c)]
+    able = [c for c in contestants if c.family not in reasons]
     for text in left_out:
         monitor.say(text)
+    if not able:
+        raise SettingsError(f"nobody can take part: {'; '.join(left_out)}")
     with Run.open(folder, _identity(job, terms)) as run:
         for note in run.notes:
             monitor.say(note)
@@ -318,8 +322,12 @@ def _why_unable(one: Contestant) -> str:
             return why_no_denoiser()
         case "interpolated":
             return why_no_interpolation()
-        case _:
-            return ""
+        case "decoupled":
+            try:
+                one.job.check_scene(is_tried=True)
+            except SettingsError as error:
+                return str(error)
+    return ""
 
 
 def _identity(job: Job, terms: Terms) -> dict[str, Any]:
@@ -329,15 +337,12 @@ def _identity(job: Job, terms: Terms) -> dict[str, Any]:
     return {
         "method": "bench",
         "scene": _scene_digest(job.scene),
-        "path": {
-            "size": [job.path.width, job.path.height],
-            "fps": job.path.fps,
-            "frames": list(job.path.numbers),
-        },
+        "path": path_identity(job.path),
         "reference_spp": terms.reference_spp,
         "seed": trace.seed,
         "max_depth": trace.max_depth,
         "viewing": viewing,
+        "metering": settings.metric.metering.value,
     }
 
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from enfilade import __version__
-from enfilade.codec import read_exr, write_exr, write_result
+from enfilade.codec import write_exr, write_result
 from enfilade.denoise import denoise, denoiser_name
 from enfilade.monitor import Monitor, Silence
 from enfilade.pipeline.cost import Costs
@@ -173,8 +173,11 @@ class Interpolated:
             return
         tracer = EveryFrame(self.job, PixelFilter.GAUSSIAN)
         keyframes = {frame: tracer.color(renderer, frame, costs) for frame in chosen}
+        rests = {frame: self.job.path.original(frame) for frame in shot}
+        keyframes |= {frame: keyframes[first] for frame, first in rests.items() if first in keyframes}
         files = []
-        for frame, image in _between(keyframes, shot, exact_fps(self.job.path.fps)):
+        exposure = np.float32(2.0**self.job.settings.viewing.exposure_ev)
+        for frame, image in _between(keyframes, shot, exact_fps(self.job.path.fps), exposure):
             files.append(run.file("frames", self.job.path.numbers[frame]))
             _write_color(files[-1], image)
         run.finish(unit, files=files, facts={"keyframes": chosen, "cost": costs.take()})
@@ -218,12 +221,14 @@ def _warm(work: Any, job: Job) -> None:
         work(small, Path(folder) / "run")
 
 
-def _between(keyframes: Mapping[int, F32], shot: range, fps: Any) -> Iterator[tuple[int, F32]]:
-    """All frames of a shot; keyframes as they were traced."""
-    made = interpolate(keyframes, fps) if len(keyframes) > 1 else iter(keyframes.items())
+def _between(
+    keyframes: Mapping[int, F32], shot: range, fps: Any, exposure: np.float32
+) -> Iterator[tuple[int, F32]]:
+    """All frames of a shot; keyframes as they were traced. The filter sees the others as they are shown."""
     still = {frame: keyframes[max(k for k in keyframes if k <= frame)] for frame in shot}  # rests at the end
-    for frame, image in made:
-        still[frame] = keyframes.get(frame, image)
+    shown = {frame: image * exposure for frame, image in keyframes.items()}
+    for frame, image in interpolate(shown, fps) if len(shown) > 1 else ():
+        still[frame] = keyframes.get(frame, image / exposure)
     yield from still.items()
 
 
@@ -243,10 +248,3 @@ def _identity(job: Job, renderer: Renderer, facts: Mapping[str, Any]) -> dict[st
         "trace": kept,
         "versions": {**whole["versions"], "enfilade": __version__},
     }
-
-
-def read_color(folder: Path, number: int) -> F32:
-    """Colours of a frame that a task has made, (H, W, 3) float32."""
-    sign = "-" if number < 0 else ""
-    color: F32 = read_exr(folder / "frames" / f"{sign}{abs(number):04d}.exr")["RGB"].astype(np.float32)
-    return color
