@@ -259,7 +259,7 @@ def kill_at_point(work: Work, out: Path, chance: random.Random) -> str | None:
     line = command(work.inputs, out)[3:]
     own = [sys.executable, __file__, "--die", f"{point}:{number}", *line]
     done = subprocess.run(own, capture_output=True, check=False, timeout=TIMEOUT_S)
-    return f"killed {point} number {number}" if done.returncode == -signal.SIGKILL else None
+    return struck(f"killed {point} number {number}", done.returncode)
 
 
 def kill_all(work: Work, out: Path, chance: random.Random) -> str | None:
@@ -271,7 +271,14 @@ def kill_all(work: Work, out: Path, chance: random.Random) -> str | None:
         process.wait(moment)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-    return f"{who[1]}, all killed after {moment:.2f} s" if process.wait() == -signal.SIGKILL else None
+    return struck(f"{who[1]}, all killed after {moment:.2f} s", process.wait())
+
+
+def struck(what: str, code: int) -> str | None:
+    """Say what was killed, and how it ended where that is not why; None where it had ended well before."""
+    if code == 0:
+        return None
+    return what if code == -signal.SIGKILL else f"{what}, exit code {code}"
 
 
 def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
@@ -282,7 +289,7 @@ def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
 def strike_worker(
     work: Work, out: Path, chance: random.Random, blow: signal.Signals, who: str = "processes"
 ) -> str | None:
-    """One worker gets a signal at a random moment; None where there was no worker."""
+    """One worker gets a signal at a random moment; None where there was no worker and nothing went wrong."""
     moment = chance.uniform(0.3, 1.0) * work.seconds
     process = start(command(work.inputs, out, "--executor", who, "--workers", "2"))
     time.sleep(moment)
@@ -290,7 +297,7 @@ def strike_worker(
     if workers:
         kill(chance.choice(workers), blow)
     code = process.wait(TIMEOUT_S)
-    return f"{blow.name} for a worker after {moment:.2f} s, exit code {code}" if workers else None
+    return f"{blow.name} for a worker after {moment:.2f} s, exit code {code}" if workers or code else None
 
 
 def try_stops(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:

@@ -2,11 +2,12 @@
 
 import errno
 import os
+import stat
 
 import numpy as np
 import pytest
 
-from enfilade.codec import exr, read_exr, whole, write_exr
+from enfilade.codec import exr, read_exr, whole, write_exr, write_json
 from enfilade.errors import ImageError, RunFolderError
 
 PIXELS = np.ones((4, 4, 3), np.float32)
@@ -70,3 +71,28 @@ def test_what_may_pass_is_not_told_to_make_room(tmp_path, number):
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, None])
 def test_what_stays_as_it_is(number):
     assert not whole.is_passing(OSError("no reason") if number is None else OSError(number, "it said so"))
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP])
+def test_a_file_system_that_can_not_flush_folders_need_not(tmp_path, monkeypatch, number):
+    really, refused = os.fsync, [stat.S_ISDIR]
+
+    def flush(handle):
+        if refused[0](os.fstat(handle).st_mode):
+            raise OSError(number, os.strerror(number))
+        really(handle)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    write_json(tmp_path / "deep" / "file.json", {})
+    refused[0] = stat.S_ISREG
+    with pytest.raises(RunFolderError, match=os.strerror(number)):
+        write_json(tmp_path / "deep" / "other.json", {})
+
+
+def test_a_folder_that_a_disk_could_not_flush_is_said(tmp_path, monkeypatch):
+    def flush(_handle):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", flush)
+    with pytest.raises(OSError, match="Input/output"):
+        whole.flush(tmp_path)

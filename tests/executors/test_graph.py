@@ -1,5 +1,9 @@
 """Units are offered when what they need is finished, those of one group to one worker."""
 
+import random
+import time
+from bisect import bisect_right
+
 import pytest
 
 from enfilade.executors import Graph, Unit
@@ -120,3 +124,64 @@ def test_what_was_set_aside_holds_up_who_needs_it():
     graph.set_aside(taken(graph))
     assert taken(graph) is None
     assert [u.name for u in graph.unfinished()] == ["b"]
+
+
+def plainly(graph, last, busy):
+    """The unit that is to be begun next, as all groups that are ready are looked through."""
+    heads = {group: heap[0] for group, heap in graph._ready.items()}
+    if not heads:
+        return None
+    stage = min(order for order, _ in heads.values())[:1]
+    groups = sorted((g for g in heads if heads[g][0][:1] == stage), key=lambda g: heads[g][0])
+    return heads[chosen({group: heads[group][0] for group in groups}, last, busy)][1]
+
+
+def chosen(ready, last, busy):
+    if last is not None and last.group in ready:
+        return last.group
+    taken = {unit.group for unit in busy}
+    free = [group for group in ready if group not in taken] or list(ready)
+    if not busy:
+        return free[0]
+    marks = sorted(unit.order for unit in (*busy, last) if unit is not None)
+    stretches = {}
+    for group in free:
+        stretches.setdefault(bisect_right(marks, ready[group]), []).append(group)
+    if last is not None and (following := stretches.get(bisect_right(marks, last.order))):
+        return following[0]
+    at, longest = max(stretches.items(), key=lambda item: len(item[1]))
+    return longest[len(longest) // 2 if at else 0]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_choice_is_that_of_looking_through_all(seed):
+    chance = random.Random(seed)  # noqa: S311
+    graph, hands, lasts, added = Graph(), {}, {}, 0
+    for _ in range(400):
+        act = chance.random()
+        if act < 0.4:
+            for _ in range(chance.randrange(1, 9)):
+                place = chance.randrange(60)  # so few that some are alike
+                needs = (f"u{chance.randrange(added + 5)}",) if chance.random() < 0.2 else ()
+                order = (chance.randrange(3), place, 0)[: chance.randrange(1, 4)]
+                group = f"g{place // 4}" if chance.random() < 0.9 else ""
+                graph.add(Unit(f"u{added}", "", needs=needs, order=order, group=group))
+                added += 1
+        slot = chance.randrange(5)
+        if slot in hands:
+            unit = hands.pop(slot)
+            graph.finish(unit.name) if chance.random() < 0.8 else graph.put_back(unit)
+        else:
+            expected = plainly(graph, lasts.get(slot), hands.values())
+            unit = graph.take(lasts.get(slot), hands.values())
+            assert (unit and unit.name) == expected
+            if unit is not None:
+                hands[slot] = lasts[slot] = unit
+
+
+def test_many_groups_cost_one_unit_no_more():
+    graph, units = in_groups(20_000, 1)
+    begin = time.process_time()
+    for number in range(1000):
+        graph.take(units[number], units[number + 1 : number + 8])
+    assert time.process_time() - begin < 2.0  # 0.04 s; where all groups are looked through, half a minute

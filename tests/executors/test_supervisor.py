@@ -39,8 +39,9 @@ def test_all_is_done_also_what_follows(work, name):
     assert not ending.stopped
     assert not failures
     assert done(work) == ["a", "ax", "axx", "b", "bx", "bxx"]
-    assert sorted(line["unit"] for _, _, line in told) == done(work)
-    assert all(unit.name == line["unit"] for unit, _, line in told)
+    lines = [(unit, line) for unit, what, line in told if what == "line"]
+    assert sorted(line["unit"] for _, line in lines) == done(work)
+    assert all(unit.name == line["unit"] for unit, line in lines)
 
 
 @pytest.mark.parametrize("kind", ["killed", "exits"])
@@ -147,6 +148,21 @@ def test_workers_go_with_who_closes_them(tmp_path, monkeypatch):
     executor.close()
     assert not Path(f"/proc/{pid}").exists()
     assert time.monotonic() - begin < 4.0
+
+
+def test_all_workers_are_killed_before_one_is_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    recipe = Recipe("toy_worker:open_toy", {"folder": str(tmp_path)})
+    executor = Processes(recipe, nothing, workers=3, logs=tmp_path / "logs")
+    for slot in range(3):
+        executor.begin(slot, unit(f"h{slot}", "hangs"), share=1)
+    calls, kill, wait = [], subprocess.Popen.kill, subprocess.Popen.wait
+    monkeypatch.setattr(subprocess.Popen, "kill", lambda self: (calls.append("kill"), kill(self)))
+    monkeypatch.setattr(subprocess.Popen, "wait", lambda self, *s: (calls.append("wait"), wait(self, *s))[1])
+    executor.close()
+    assert calls[:3] == ["kill"] * 3
+    assert set(calls[3:]) == {"wait"}
+    assert not executor.pids
 
 
 def test_a_worker_that_the_kernel_holds_ends_nothing(tmp_path, monkeypatch):

@@ -41,10 +41,14 @@ class Crowd:
 
     def __init__(self, clock, slots, do, seconds=None):
         self.slots, self.attempts, self.retired, self.most = slots, [], [], []
+        self.shares, self.alive, self.scenes = [], set(), []
         self._clock, self._do, self._seconds, self._in_hand = clock, do, seconds or {}, {}
 
-    def begin(self, slot, unit, **_how):
+    def begin(self, slot, unit, *, share):
         self.attempts.append(unit.name)
+        self.shares.append(share)
+        self.alive.add(slot)
+        self.scenes.append(len(self.alive))
         end = self._clock.now + self._seconds.get(unit.name, 0.5)
         self._in_hand[slot] = end, unit
         self.most.append(len(self._in_hand))
@@ -63,6 +67,7 @@ class Crowd:
 
     def retire(self, slot):
         self.retired.append(slot)
+        self.alive.discard(slot)
 
 
 @pytest.fixture
@@ -174,13 +179,44 @@ def test_what_is_at_work_elsewhere_keeps_hope(spread, clock):
     assert clock.now > begin + 7200.0
 
 
-def test_where_workers_die_fewer_are_at_work(spread, crowds):
-    """Memory for five: where six are at work, one is killed."""
-    ending, crowd, _ = spread(300, lambda _: DIED if crowds[-1].most[-1] > 5 else None, slots=8)
+@pytest.mark.parametrize("kind", [DIED, MEMORY])
+def test_where_workers_die_fewer_are_at_work(spread, crowds, kind):
+    """Memory for five: where six are at work, one is killed, or told so."""
+    ending, crowd, _ = spread(300, lambda _: kind if crowds[-1].most[-1] > 5 else None, slots=8)
     assert not ending.aside
     assert ending.stopped is None
     assert sum(count > 5 for count in crowd.most) < len(crowd.most) / 3
     assert set(crowd.retired) > {6, 7}  # who is not needed keeps no scene in memory
+
+
+def test_who_is_not_needed_any_more_keeps_no_scene(spread):
+    once = {"u000", "u001", "u002"}
+
+    def act(unit):
+        if unit.name in once:
+            once.remove(unit.name)
+            return DIED
+        return None
+
+    _, crowd, _ = spread(18, act, slots=6, seconds={"u007": 0.7, "u009": 0.9, "u011": 0.6})
+    assert crowd.most[:8] == [1, 2, 3, 4, 5, 6, 6, 6]
+    assert max(crowd.most[8:]) == 3
+    assert max(crowd.scenes[8:]) == 3  # half as many are asked for; and none began anew while another waited
+    assert len(crowd.retired) == 5
+
+
+def test_where_memory_is_always_too_little_units_begin_with_less(spread, crowds):
+    seconds = {f"u{number:03d}": 10.0 for number in range(100)}
+    _, crowd, _ = spread(100, lambda _: MEMORY if crowds[-1].shares[-1] < 16 else None, 1, seconds)
+    assert crowd.shares[:6] == [1, 1, 4, 4, 16, 16]
+    assert crowd.shares.count(1) == 2
+    assert len(crowd.attempts) < 100 + 16  # after each 20 that succeeded, it is tried with more
+
+
+def test_a_unit_that_is_killed_twice_has_others_begin_as_before(spread, crowds):
+    killed = iter([DIED, DIED])
+    _, crowd, _ = spread(10, lambda unit: next(killed, None) if unit.name == "u003" else None, slots=1)
+    assert sorted(crowd.shares) == [*[1] * 11, 4]
 
 
 def test_less_is_asked_of_a_machine_and_more_again():
@@ -194,9 +230,13 @@ def test_less_is_asked_of_a_machine_and_more_again():
     state.succeed()
     state.fail("d", MEMORY, is_trial=False)
     assert state.slots == 4
-    for _ in range(trouble.STEADY):
-        state.succeed()
-    assert state.slots == 8
+    state.succeed(16)
+    assert state.share == 16
+    for share in (4, 1):
+        for _ in range(trouble.STEADY):
+            state.succeed()
+        assert state.slots == 8
+        assert state.share == share
     assert Trouble(1).fail("a", DIED, is_trial=False)
 
 

@@ -98,6 +98,31 @@ def test_frames_that_are_missing_are_named_or_left_out(made, tmp_path):
     assert len(open_sequence(encode(part, {}, Silence(), is_partial=True))) == 3
 
 
+class Meanwhile(Silence):
+    """Does something when a frame has been encoded."""
+
+    def __init__(self, act):
+        self.advance = lambda *_: act()
+
+
+def test_who_has_the_folder_to_himself_leaves_what_is_being_encoded(made):
+    _, run = made
+    identity, notes = Run.existing(run).identity, []
+    (run / ".lost.writing-1-a.mkv").write_text("of one that was killed")
+    (run / "frames" / ".0001.writing-1-a.exr").write_text("of one that was killed")
+
+    def open_it():
+        with Run.open(run, identity) as sole:
+            notes.extend(sole.notes)
+
+    encode(run, {}, Meanwhile(open_it), file=run / "meanwhile.mkv")
+    assert len(open_sequence(run / "meanwhile.mkv")) == FRAMES
+    (run / "meanwhile.mkv").unlink()
+    open_it()
+    assert notes == ["removed 1 unfinished files of a run that was interrupted"] * 2
+    assert not list(run.rglob(".*writing*"))
+
+
 def test_a_damaged_frame_is_not_encoded(made, tmp_path):
     job, _ = made
     _, run = rendered(tmp_path, job)

@@ -12,7 +12,7 @@ from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
 from enfilade.monitor import Silence
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.farm import submit, write_template
-from enfilade.pipeline.share import Share, do_share, go_on
+from enfilade.pipeline.share import Share, _Patience, do_share, go_on
 from enfilade.pipeline.walkthrough import prepare, render
 from enfilade.records import CameraPath
 from enfilade.store import Run
@@ -218,6 +218,33 @@ def test_what_is_never_seen_is_told_after_two_minutes(begun, patient, monkeypatc
     with pytest.raises(UnfinishedError, match=r"units of step 'frames' wait for .* \(after 120 s\)"):
         share(begun, "frames", 1, 2)
     assert len(pauses) == 4
+
+
+def test_work_between_two_looks_does_not_count_as_waiting(pauses, monkeypatch):
+    now = iter([0.0, 900.0, 1000.0, 1900.0, 1901.0])
+    monkeypatch.setattr("enfilade.pipeline.share.time.monotonic", lambda: next(now))
+    late = _Patience(Silence(), 120.0)
+    late.wait("two units", ("a", "b"))
+    late.wait("one unit", ("b",))  # a was finished since, which took a quarter of an hour
+    late.wait("one unit", ("b",))
+    assert pauses == [2.0, 2.0, 4.0]
+    late.wait("one unit", ("b",))  # something else took as long: it is looked once more
+    assert len(pauses) == 3
+    with pytest.raises(UnfinishedError, match=r"one unit \(after 120 s\)"):
+        late.wait("one unit", ("b",))
+
+
+@pytest.mark.parametrize("crew", [Crew(), Crew("processes", 1)], ids=["in-process", "processes"])
+def test_a_damaged_line_of_another_task_is_mended_by_the_command_that_is_named(whole, begun, crew):
+    share(begun, "plan")
+    share(begun, "keyframes")
+    file = begun / "parts" / "keyframes-1-of-1.jsonl"
+    first, rest = file.read_bytes().split(b"\n", 1)
+    file.write_bytes(first.replace(b"keyframe", b"keyfrome") + b"\n" + rest)
+    with pytest.raises(RunFolderError, match=rf"line 1 is damaged: `enfilade work {begun}`, with no other"):
+        share(begun, "segments", crew=crew)
+    go_on(begun, Silence(), crew)
+    assert Run.existing(begun).digest() == whole
 
 
 def test_a_scene_that_has_changed_is_refused(begun):

@@ -14,6 +14,7 @@ from enfilade.pipeline import crew, finish, worker
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
+from enfilade.store.guest import guest
 from scenes_analytic import room, room_walk
 from small_runs import Told, Watcher, children, job_of
 
@@ -127,6 +128,52 @@ def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, 
             with pytest.raises(type(error)):
                 trace(run, do)
     assert not (folder / PARTIAL).exists()
+
+
+def test_files_that_a_guest_is_writing_stay(folder, trace):
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            (folder / PARTIAL).write_text("x")
+            (folder / ".encoded.writing-1-a.mp4").write_text("x")
+            finished(run, number)
+
+        with guest(folder):
+            trace(run, do)
+    assert not (folder / PARTIAL).exists()
+    assert (folder / ".encoded.writing-1-a.mp4").exists()
+    Run.open(folder, {}).close()
+    assert not (folder / ".encoded.writing-1-a.mp4").exists()
+
+
+@pytest.mark.parametrize(("after", "tries"), [(3, 1), (None, 4)])
+def test_a_file_that_another_host_wrote_may_come_late(folder, trace, monkeypatch, after, tries):
+    file, away, pauses = folder / DAMAGED, folder.parent / "away", []
+
+    def sleep(seconds):
+        pauses.append(seconds)
+        if len(pauses) == after:
+            away.rename(file)
+
+    with Run.open(folder, {}) as run:
+
+        def do(number):
+            if number != 1:
+                finished(run, number)
+                return
+            file.write_text("x")
+            run.finish("frame 1", files=[file], facts={})
+            file.rename(away)
+
+        monkeypatch.setattr("enfilade.pipeline.crew.time.sleep", sleep)
+        if after is None:
+            with pytest.raises(UnfinishedError, match=r"frame 1 \(it ended without a line"):
+                trace(run, do)
+        else:
+            trace(run, do)
+            assert sum(pauses) < 5.0
+            assert trace.said == []
+    assert trace.begun.count(1) == tries
 
 
 def chain(run):

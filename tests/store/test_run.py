@@ -15,6 +15,7 @@ import pytest
 
 from enfilade.errors import DamagedFileError, NoSpaceError, RunFolderError
 from enfilade.store import KINDS, Run
+from enfilade.store.parts import part_files
 
 IDENTITY = {
     "scene": {"fingerprint": "abc"},
@@ -537,3 +538,64 @@ def test_ten_thousand_units_open_quickly(folder):
     with Run.open(folder, IDENTITY) as run:
         assert sum(run.done(f"u{i}") is not None for i in range(10_000)) == 0
         assert len(list(run.lines())) == 10_000
+
+
+def full(*_arguments, **_options):
+    raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+
+@pytest.mark.parametrize(
+    ("where", "what"),
+    [
+        ("enfilade.store.lock.os.open", r"run\.lock: no room"),
+        ("enfilade.store.ledger._appending", r"ledger\.jsonl: no room"),
+        ("pathlib.Path.mkdir", "run: no room"),
+    ],
+)
+def test_a_disk_that_is_full_when_a_command_begins_is_no_wrong_input(folder, monkeypatch, where, what):
+    with monkeypatch.context() as patch:
+        patch.setattr(where, full)
+        with pytest.raises(NoSpaceError, match=what):
+            Run.open(folder, IDENTITY)
+    Run.open(folder, IDENTITY).close()
+    with monkeypatch.context() as patch:
+        patch.setattr("pathlib.Path.mkdir", full)
+        with pytest.raises(NoSpaceError, match=r"one\.jsonl: no room"):
+            Run.sharing(folder, "one")
+
+
+def test_what_is_taken_over_while_a_run_is_read_is_seen(folder, monkeypatch):
+    Run.open(folder, IDENTITY).close()
+    with Run.sharing(folder, "one") as one:
+        one.finish("a", files=[], facts={})
+
+    def late(of):
+        found = part_files(of)
+        Run.open(folder, IDENTITY).close()
+        return found
+
+    monkeypatch.setattr("enfilade.store.run.part_files", late)
+    assert Run.existing(folder).done("a")
+
+
+@pytest.mark.parametrize("name", ["ledger.jsonl", "parts/one.jsonl"])
+def test_who_shares_a_run_is_told_at_once_of_a_line_that_another_damaged(folder, name):
+    with Run.open(folder, IDENTITY) as run:
+        for unit in "ab":
+            run.finish(unit, files=[], facts={})
+    with Run.sharing(folder, "one") as one:
+        for unit in "cd":
+            one.finish(unit, files=[], facts={})
+    with Run.sharing(folder, "two") as two:
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(data.replace(b'"unit": "a"', b'"unit": "x"').replace(b'"c"', b'"y"'))
+        worker = Run.joining(folder, print, part="two")  # who began before goes on, and so do its workers
+        assert (worker.done("a") is None) == (name == "ledger.jsonl")
+        assert (worker.done("c") is None) == (name != "ledger.jsonl")
+        two.finish("e", files=[], facts={})
+    with pytest.raises(RunFolderError, match=rf"{name}, line \d is damaged: `enfilade work {folder}`, "):
+        Run.sharing(folder, "two")
+    with Run.open(folder, IDENTITY) as run:
+        left = {line["unit"] for line in run.lines()}
+        assert left == set("bcde" if name == "ledger.jsonl" else "abde")
+    Run.sharing(folder, "two").close()

@@ -20,6 +20,7 @@ from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 __all__ = [
     "MARK",
     "flush",
+    "is_full",
     "is_passing",
     "json_bytes",
     "read_json",
@@ -36,6 +37,7 @@ LASTING = FULL | {
     errno.EPERM, errno.EROFS,
 }  # fmt: skip
 BLOCK = bytes(1 << 20)  # written to learn whether there is room
+NO_FLUSH = frozenset({errno.EINVAL, errno.ENOTSUP})  # folders: 9p, folders shared with virtual machines
 
 
 @contextmanager
@@ -152,14 +154,14 @@ def unwritable(
     -------
     NoSpaceError or RunFolderError
     """
-    is_full = isinstance(reason, OSError) and reason.errno in FULL
+    has_no_room = isinstance(reason, OSError) and is_full(reason)
     if isinstance(reason, OSError) and is_passing(reason):
         return RunFolderError(
             f"can't write {file}: {reason.strerror}; look at its disk, then run the same command again: what "
             "is finished stays"
         )
     text = reason.strerror or str(reason) if isinstance(reason, OSError) else reason
-    if is_full or (written is not None and _is_full(written, size)):
+    if has_no_room or (written is not None and _has_no_room(written, size)):
         return NoSpaceError(
             f"can't write {file}: no room on the disk ({text}); what is finished stays: make room, then run "
             "the same command again"
@@ -178,19 +180,26 @@ def is_passing(error: OSError) -> bool:
     return error.errno in errno.errorcode and error.errno not in LASTING
 
 
-def _is_full(file: Path, size: int) -> bool:
+def is_full(error: OSError) -> bool:
+    """Whether there is no room on the disk, or no more of it for this user."""
+    return error.errno in FULL
+
+
+def _has_no_room(file: Path, size: int) -> bool:
     try:
         with file.open("ab", buffering=0) as raw:
             while size > 0:
                 size -= raw.write(BLOCK[:size])
             os.fsync(raw.fileno())
     except OSError as error:
-        return error.errno in FULL
+        return is_full(error)
     return False
 
 
 def flush(path: Path) -> None:
     """Wait until the disk has a file's bytes, or a folder's names.
+
+    A file system that can't do it for folders need not.
 
     Raises
     ------
@@ -199,6 +208,9 @@ def flush(path: Path) -> None:
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
+    except OSError as error:
+        if error.errno not in NO_FLUSH or not path.is_dir():
+            raise
     finally:
         os.close(handle)
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import heapq
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Collection
+from itertools import count, pairwise
 
 from enfilade.executors.unit import Unit
 
+Order = tuple[int, ...]
+Head = tuple[Order, int, str]  # order of a group's first unit, when the group came, its name
+
 
 class Graph:
-    """Units with what they need. It grows while it is worked on."""
+    """Units with what they need. It grows while it is worked on.
+
+    Groups with units that are ready are kept in order, so that a unit of a long run is found as fast as one
+    of a short run.
+    """
 
     def __init__(self) -> None:
         self._units: dict[str, Unit] = {}
@@ -18,7 +26,10 @@ class Graph:
         self._aside: set[str] = set()
         self._open: dict[str, int] = {}  # unit -> how many of its needs are not finished
         self._waiting: dict[str, list[str]] = {}  # unit -> who needs it
-        self._ready: dict[str, list[tuple[tuple[int, ...], str]]] = {}  # group -> heap
+        self._ready: dict[str, list[tuple[Order, str]]] = {}  # group -> heap
+        self._heads: list[Head] = []  # of all these groups, in order
+        self._places: dict[str, Head] = {}  # group -> its head
+        self._numbers = count()
 
     def add(self, unit: Unit) -> None:
         """Take up a unit. What it needs may be taken up later.
@@ -72,15 +83,11 @@ class Graph:
             that nobody works on: so each does groups that follow one another, and what is in memory serves
             for longest.
         """
-        heads = {group: heap[0][0] for group, heap in self._ready.items()}
-        if not heads:
+        if not self._heads:
             return None
-        stage = min(heads.values())[:1]
-        groups = sorted((group for group in heads if heads[group][:1] == stage), key=heads.__getitem__)
-        chosen = _chosen({group: heads[group] for group in groups}, last, busy)
-        _, name = heapq.heappop(self._ready[chosen])
-        if not self._ready[chosen]:
-            del self._ready[chosen]
+        group = self._chosen(last, busy)
+        _, name = heapq.heappop(self._ready[group])
+        self._place(group)
         return self._units[name]
 
     def put_back(self, unit: Unit) -> None:
@@ -100,21 +107,57 @@ class Graph:
             self.finish(unit.name)
         else:
             heapq.heappush(self._ready.setdefault(unit.group, []), (unit.order, unit.name))
+            self._place(unit.group)
+
+    def _place(self, group: str) -> None:
+        """Put a group, whose units have changed, where its first one belongs among the others."""
+        heap, old = self._ready[group], self._places.pop(group, None)
+        if old is not None:
+            del self._heads[bisect_left(self._heads, old)]
+        if not heap:
+            del self._ready[group]
+            return
+        head = (heap[0][0], next(self._numbers) if old is None else old[1], group)
+        self._places[group] = head
+        insort(self._heads, head)
+
+    def _chosen(self, last: Unit | None, busy: Collection[Unit]) -> str:
+        """The group, of those in the first stage, with which a worker goes on."""
+        stage = self._heads[0][0][:1]
+        end = bisect_right(self._heads, stage, key=_stage_of)
+        groups = {unit.group for unit in (*busy, last) if unit is not None} & self._places.keys()
+        places = {group: self._places[group] for group in groups if _stage_of(self._places[group]) == stage}
+        if last is not None and last.group in places:
+            return last.group
+        if not busy:
+            return self._heads[0][2]
+        taken = sorted(bisect_left(self._heads, head, hi=end) for head in places.values())
+        if len(taken) == end:
+            taken = []  # rather the group of another than nothing
+        # Stretches between the units that workers have in hand, or had last.
+        marks = sorted(unit.order for unit in (*busy, last) if unit is not None)
+        borders = [bisect_left(self._heads, mark, hi=end, key=_order_of) for mark in marks]
+        stretches = list(pairwise([0, *borders, end]))
+        lengths = [stop - start - sum(start <= at < stop for at in taken) for start, stop in stretches]
+        own = 0 if last is None else bisect_right(marks, last.order)
+        if last is not None and lengths[own]:
+            return self._heads[_nth(stretches[own][0], 0, taken)][2]
+        longest = lengths.index(max(lengths))
+        middle = lengths[longest] // 2 if longest else 0  # its first half is for him who stands before it
+        return self._heads[_nth(stretches[longest][0], middle, taken)][2]
 
 
-def _chosen(ready: dict[str, tuple[int, ...]], last: Unit | None, busy: Collection[Unit]) -> str:
-    """Which of some groups, in order, each with that of its first unit, a worker goes on with."""
-    if last is not None and last.group in ready:
-        return last.group
-    taken = {unit.group for unit in busy}
-    free = [group for group in ready if group not in taken] or list(ready)
-    if not busy:
-        return free[0]
-    marks = sorted(unit.order for unit in (*busy, last) if unit is not None)
-    stretches: dict[int, list[str]] = {}  # by how many workers stand before them
-    for group in free:
-        stretches.setdefault(bisect_right(marks, ready[group]), []).append(group)
-    if last is not None and (following := stretches.get(bisect_right(marks, last.order))):
-        return following[0]
-    at, longest = max(stretches.items(), key=lambda item: len(item[1]))
-    return longest[len(longest) // 2 if at else 0]  # its first half is for him who stands before it
+def _order_of(head: Head) -> Order:
+    return head[0]
+
+
+def _stage_of(head: Head) -> Order:
+    return head[0][:1]
+
+
+def _nth(first: int, number: int, taken: list[int]) -> int:
+    """The place so many after the first, leaving out some, in order."""
+    at = first + number
+    for other in taken:
+        at += first <= other <= at
+    return at

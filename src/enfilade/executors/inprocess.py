@@ -42,6 +42,7 @@ class InProcess:
         unit = self._unit
         if unit is None:
             return []
+        self._tell("begin", None)
         try:
             if self._worker is None:
                 gc.collect()  # a worker that failed is in circles, and has a scene

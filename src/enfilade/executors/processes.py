@@ -115,9 +115,12 @@ class Processes:
             self._end(slot)
 
     def close(self) -> None:
-        """Kill the workers: what they have in hand is dropped."""
+        """Kill the workers, all at once: what they have in hand is dropped."""
+        for child in self._children.values():
+            child.process.kill()
+        until = time.monotonic() + GRACE_S
         for slot in list(self._children):
-            self._end(slot)
+            self._end(slot, max(until - time.monotonic(), 0.0))
         self._selector.close()
 
     def _spawn(self, slot: int) -> _Child:
@@ -202,17 +205,18 @@ class Processes:
         text = f"its worker {_died_of(code)}"
         return [Event(slot, Failure(FailureKind.DIED, text, _tail(child.log)))]
 
-    def _end(self, slot: int) -> int:
+    def _end(self, slot: int, grace_s: float | None = None) -> int:
+        """Let a worker go; `grace_s`: it was killed, and should be gone after so long."""
         child = self._children.pop(slot)
         self._selector.unregister(child.line)
         child.line.close()
-        if child.process.poll() is None:
+        if grace_s is None:
+            grace_s = GRACE_S
             with contextlib.suppress(subprocess.TimeoutExpired):  # it closes its end before it is gone
                 child.process.wait(0.2)
-        if child.process.poll() is None:
             child.process.kill()
         try:
-            return child.process.wait(GRACE_S)
+            return child.process.wait(grace_s)
         except subprocess.TimeoutExpired:  # the kernel holds it, for a disk that doesn't answer
             return -signal.SIGKILL
         finally:

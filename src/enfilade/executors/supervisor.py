@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enfilade.errors import EnfiladeError
 from enfilade.executors.executor import Event, Executor, Failure, FailureKind
 from enfilade.executors.graph import Graph
-from enfilade.executors.trouble import MACHINE, Trouble
+from enfilade.executors.trouble import MACHINE, SMALLER, Trouble
 from enfilade.executors.unit import Unit
 from enfilade.executors.watch import span
 
@@ -19,7 +19,7 @@ ATTEMPTS = 4  # of a unit
 FIRST_DELAY_S = 0.25  # before the second attempt
 LONGER = 2  # times longer before each next one
 LONGER_OF_MACHINE = 16  # ... where the machine may have failed: 0.25, 4 and 64 s
-SMALLER = 4  # times less memory for each attempt after one that had too little
+SMALLEST = int(SMALLER ** (ATTEMPTS - 1))  # one part in so many of the memory: with less none is begun
 IDLE_S = 0.05  # looked again for what may be begun
 PAUSE_S = 1.0  # ... at most, while all wait
 
@@ -90,6 +90,9 @@ class _Loop:
         self._failed = failed
         self._in_hand: dict[int, Unit] = {}
         self._last: dict[int, Unit] = {}  # what a worker did last
+        self._alive: set[int] = set()  # workers that have begun, and keep their scene
+        self._given: dict[int, int] = {}  # share of the memory that a worker was last given
+        self._shares: dict[str, int] = {}  # ... and of units that had too little, the next
         self._failures: dict[str, list[Failure]] = {}
         self._counts: dict[str, int] = {}  # of them, those that count
         self._delayed: list[tuple[float, str, Unit]] = []
@@ -119,11 +122,28 @@ class _Loop:
         else:
             while self._held:
                 self._graph.put_back(self._held.popleft())
-        for slot in range(self._executor.slots):
-            if slot in self._in_hand:
-                continue
+        for slot in self._free():
             if self.ending.stopped or len(self._in_hand) >= most or not self._begin(slot):
-                return
+                break
+        self._let_go()
+
+    def _free(self) -> list[int]:
+        """Workers with nothing in hand; where fewer are asked for, first those that have their scene."""
+        free = [slot for slot in range(self._executor.slots) if slot not in self._in_hand]
+        if self._trouble.slots < self._executor.slots:
+            free.sort(key=lambda slot: slot not in self._alive)
+        return free
+
+    def _let_go(self) -> None:
+        """Where fewer are asked for, those that are too many and wait keep no scene."""
+        idle = sorted(self._alive.difference(self._in_hand))
+        few = max(self._trouble.slots - len(self._in_hand), 0)
+        for slot in idle[few:]:
+            self._retire(slot)
+
+    def _retire(self, slot: int) -> None:
+        self._alive.discard(slot)
+        self._executor.retire(slot)
 
     def _begin(self, slot: int) -> bool:
         unit = self._graph.take(self._last.get(slot), self._in_hand.values())
@@ -134,8 +154,10 @@ class _Loop:
         self._in_hand[slot] = unit
         self._last[slot] = unit
         self._trial = slot if self._trouble.is_on else None
+        self._alive.add(slot)
+        self._given[slot] = max(self._trouble.share, self._shares.get(unit.name, 1))
         try:
-            self._executor.begin(slot, unit, share=self._share(unit))
+            self._executor.begin(slot, unit, share=self._given[slot])
         except (EnfiladeError, OSError) as error:  # no worker can be begun
             self._end(Event(slot, Failure.of(error)))
             return False
@@ -147,12 +169,6 @@ class _Loop:
             waits.append(self._trouble.left_s)
         return max(min(waits), IDLE_S) if waits else None
 
-    def _share(self, unit: Unit) -> int:
-        kinds = [failure.kind for failure in self._failures.get(unit.name, [])]
-        # The kernel kills who takes too much memory; but a worker that is killed once may have been unlucky.
-        scarce = kinds.count(FailureKind.MEMORY) + max(kinds.count(FailureKind.DIED) - 1, 0)
-        return int(SMALLER ** min(scarce, ATTEMPTS - 1))
-
     def _end(self, event: Event) -> None:
         unit = self._in_hand.pop(event.slot)
         is_trial, failure = event.slot == self._trial, event.failure
@@ -162,24 +178,29 @@ class _Loop:
             failure = Failure(FailureKind.ERROR, "it ended without a line in the ledger")
         if failure is None:
             self._has_success = True
-            self._trouble.succeed()
+            has_starved = FailureKind.MEMORY in self._kinds(unit)
+            self._trouble.succeed(self._given[event.slot] if has_starved else 1)
             self._graph.finish(unit.name)
             for following in self._follow(unit):
                 self._graph.add(following)
         else:
-            self._fail(unit, failure, is_trial=is_trial)
-        if failure is not None or len(self._in_hand) >= self._trouble.slots:
-            # What failed may have left a device or a library unfit; where memory is scarce, one that waits
-            # keeps its scene.
-            self._executor.retire(event.slot)
+            self._fail(unit, event.slot, failure, is_trial=is_trial)
+            self._retire(event.slot)  # it may have left a device or a library unfit
 
-    def _fail(self, unit: Unit, failure: Failure, *, is_trial: bool) -> None:
-        failures = self._failures.setdefault(unit.name, [])
-        failures.append(failure)
-        kinds = [past.kind for past in failures]
+    def _kinds(self, unit: Unit) -> list[FailureKind]:
+        return [past.kind for past in self._failures.get(unit.name, ())]
+
+    def _fail(self, unit: Unit, slot: int, failure: Failure, *, is_trial: bool) -> None:
+        self._failures.setdefault(unit.name, []).append(failure)
+        kinds = self._kinds(unit)
+        # The kernel kills who takes too much memory; but a worker that is killed once may have been unlucky.
+        is_scarce = failure.kind is FailureKind.MEMORY
+        if is_scarce or (failure.kind is FailureKind.DIED and kinds.count(failure.kind) > 1):
+            self._shares[unit.name] = min(SMALLER * self._given[slot], SMALLEST)
         if self._is_final(failure):
             self.ending.stopped = self.ending.stopped or failure
-        elif failure.kind is FailureKind.MEMORY and not self._trouble.is_on and kinds.count(failure.kind) < 3:
+        elif is_scarce and not self._trouble.is_on and kinds.count(failure.kind) < 3:
+            self._trouble.ask_less(unit.name, failure.kind)
             self._count(unit, failure)  # first it shall do with less
         elif self._trouble.fail(unit.name, failure.kind, is_trial=is_trial):
             self._count(unit, failure)

@@ -6,7 +6,7 @@ import time
 
 from enfilade.executors.executor import FailureKind
 
-__all__ = ["MACHINE", "Trouble"]
+__all__ = ["MACHINE", "SMALLER", "Trouble"]
 
 MACHINE = frozenset({FailureKind.DIED, FailureKind.MEMORY, FailureKind.IO, FailureKind.DEVICE})
 SCARCE = frozenset({FailureKind.DIED, FailureKind.MEMORY})  # what fewer workers may help against
@@ -16,7 +16,8 @@ LONGEST_PAUSE_S = 300.0
 PAUSES = 10  # in a row, 25 minutes in all: then it is given up
 BUG_PAUSES = 4  # 75 s; where all failures are errors that nobody foresaw, a pause rarely helps
 FEW = 3  # units of which a worker died or had too little memory: half as many are begun at once
-STEADY = 20  # successes in a row: twice as many again
+STEADY = 20  # successes in a row: twice as many again, and with more memory
+SMALLER = 4  # times less memory for a unit after each attempt that had too little
 
 
 class Trouble:
@@ -34,10 +35,14 @@ class Trouble:
     ----------
     slots : int
         How many should be now, when there is no trouble.
+    share : int
+        A unit may use one part in so many of the memory that it would use: what was enough for the last one
+        that had had too little. After :data:`STEADY` successes in a row it is :data:`SMALLER` times as much.
     """
 
     def __init__(self, slots: int) -> None:
         self.slots = slots
+        self.share = 1
         self._most = slots
         self._scarce: set[str] = set()
         self._steady = 0
@@ -58,14 +63,23 @@ class Trouble:
         """Seconds left of the pause."""
         return max(self._until - time.monotonic(), 0.0)
 
-    def succeed(self) -> None:
-        """Take note of a success."""
+    def succeed(self, share: int = 1) -> None:
+        """Take note of a success.
+
+        Parameters
+        ----------
+        share
+            What was enough for a unit that had had too little memory; 1: it never had.
+        """
         self._clear()
         self._steady += 1
+        if share > self.share:
+            self.share, self._steady = share, 0
         if self._steady >= STEADY:
             self._steady = 0
             self._scarce.clear()
             self.slots = min(2 * self.slots, self._most)
+            self.share = max(self.share // SMALLER, 1)
 
     def fail(self, name: str, kind: FailureKind, *, is_trial: bool) -> bool:
         """Take note of a failure; returns whether it counts against the unit.
@@ -77,7 +91,7 @@ class Trouble:
         is_trial
             The unit was begun to learn whether the trouble is over.
         """
-        self._ask_less(name, kind)
+        self.ask_less(name, kind)
         if not self._row:
             self._since = time.monotonic()
         self._row.append((name, kind))
@@ -92,10 +106,14 @@ class Trouble:
         minutes = (time.monotonic() - self._since) / 60
         return f"{len(self._row)} attempts at {len(self._names())} units failed in {minutes:.1f} minutes"
 
-    def _names(self) -> set[str]:
-        return {name for name, _ in self._row}
+    def ask_less(self, name: str, kind: FailureKind) -> None:
+        """Take note of a failure that has a remedy: where memory is scarce, fewer are begun at once.
 
-    def _ask_less(self, name: str, kind: FailureKind) -> None:
+        Parameters
+        ----------
+        name
+        kind
+        """
         self._steady = 0
         if kind not in SCARCE:
             return
@@ -103,6 +121,9 @@ class Trouble:
         if len(self._scarce) >= max(FEW, self.slots // 2):
             self._scarce.clear()
             self.slots = max(self.slots // 2, 1)
+
+    def _names(self) -> set[str]:
+        return {name for name, _ in self._row}
 
     def _clear(self) -> None:
         self._row: list[tuple[str, FailureKind]] = []

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shutil
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from enfilade.codec import sweep, whole_file
+from enfilade.codec import whole_file
 from enfilade.device import active
 from enfilade.errors import EnfiladeError, NoSpaceError, UnfinishedError
 from enfilade.executors import (
@@ -30,13 +31,15 @@ from enfilade.pipeline.hire import Distant
 from enfilade.pipeline.job import Job, check_identity
 from enfilade.pipeline.progress import Progress
 from enfilade.pipeline.units import Blueprint
-from enfilade.store import Run
+from enfilade.store import KINDS, Run
+from enfilade.store.guest import sweep_but_guests
 from enfilade.store.lock import sign_workers
 
 ASIDE = "failed"  # folder for the logs of units that were set aside
 LOGS = "logs"  # folder for what worker processes print
 REPAIRS = 1000  # damaged files that are mended in one go, before something else must be wrong
 SHOWN = 5  # units named in a message
+LOOKS, LOOK_S = 10, 0.5  # for files that a worker elsewhere has just written
 MB = 1_000_000
 
 
@@ -99,7 +102,7 @@ def carry_out(
     finally:
         if run.is_sole_writer:  # of workers that were killed while they wrote
             with suppress(OSError):
-                sweep(run.folder)
+                sweep_but_guests(run.folder, KINDS)
 
 
 def _carry_out(
@@ -130,10 +133,13 @@ def _everything(_unit: Unit) -> bool:
 
 def _open(job: Job, run: Run, crew: Crew, progress: Progress) -> Executor:
     def hear(unit: Unit, what: str, value: Any) -> None:
-        if what == "line":
-            run.record(value)
-        else:
-            progress.hear(unit, what, value)
+        match what:
+            case "line":
+                run.record(value)
+            case "begin":
+                progress.begin(unit)
+            case _:
+                progress.hear(unit, what, value)
 
     if crew.executor == "in-process":
         return InProcess(_Here(job, run), hear)
@@ -250,7 +256,19 @@ class _Shift:
         if self._blueprint.is_done(unit):
             return True
         self._run.refresh()  # another command that shares the run may have finished it meanwhile
-        return self._blueprint.is_done(unit)
+        return self._blueprint.is_done(unit) or (self._run.was_finished(unit.name) and self._comes(unit))
+
+    def _comes(self, unit: Unit) -> bool:
+        """Look again for the files of a unit that was just finished: a network disk may show them late."""
+        folders = [self._run.folder, *(self._run.folder / kind for kind in KINDS)]
+        for _ in range(LOOKS):
+            for folder in folders:  # which has NFS ask its server, also for names that were not there before
+                with suppress(OSError):
+                    list(folder.iterdir())
+            if self._blueprint.is_done(unit):
+                return True
+            time.sleep(LOOK_S)
+        return False
 
     def _finished(self, unit: Unit) -> tuple[Unit, ...]:
         self._progress.finish(unit)
@@ -261,9 +279,10 @@ class _Shift:
         self._progress.take_back(unit)
         failure, attempt = failures[-1], len(failures)
         after = "it is tried again" if attempt < ATTEMPTS else "it is set aside"
-        is_scarce = failure.kind is FailureKind.MEMORY or (failure.kind is FailureKind.DIED and attempt > 1)
-        if is_scarce and attempt < ATTEMPTS:
+        has_starved = failure.kind is FailureKind.MEMORY
+        if (has_starved or (failure.kind is FailureKind.DIED and attempt > 1)) and attempt < ATTEMPTS:
             after += " with fewer paths in flight"
+            after += "; if that is enough, so are those after it" if has_starved else ""
         self._progress.monitor.say(f"{unit.name}: {failure.text}; {after}")
         if attempt >= ATTEMPTS:
             self._aside.add(unit, failures)

@@ -17,6 +17,7 @@ from enfilade.pipeline.job import Job
 from enfilade.records import F32
 from enfilade.settings import VideoSettings, ViewingSettings
 from enfilade.store import Run
+from enfilade.store.guest import guest
 from enfilade.video import check_encodable, encode_video, video_suffix
 from enfilade.video.codecs import odd_size_note
 
@@ -83,15 +84,16 @@ def encode(
     if note := odd_size_note(video.codec, width, height):
         monitor.say(note)
     monitor.stage("video", len(numbers))
-    encode_video(
-        file,
-        _images(run, numbers, monitor),
-        fps=fps,
-        width=width,
-        height=height,
-        settings=video,
-        exposure_ev=exposure_ev,
-    )
+    with guest(folder):
+        encode_video(
+            file,
+            _images(run, numbers, monitor),
+            fps=fps,
+            width=width,
+            height=height,
+            settings=video,
+            exposure_ev=exposure_ev,
+        )
     return file
 
 

@@ -66,17 +66,19 @@ class Progress:
         if counts:
             self.monitor.say(f"done before: {', '.join(counts)}")
 
+    def begin(self, unit: Unit) -> None:
+        """Announce the stage of a unit while nothing else is in hand: what passes from now on is its."""
+        if unit.stage and unit.stage != self._now:
+            self._announce(unit.stage)
+
     def finish(self, unit: Unit) -> None:
         """Count a unit as done."""
         self._own.pop(unit.name, None)
         if not unit.stage:
             self._now = ""
             return
-        self._now = unit.stage
-        self._begun.add(unit.stage)
         self._open.discard(unit.name)
-        # Each time: what workers say of their clips comes in between.
-        self.monitor.stage(unit.stage, self._totals.pop(unit.stage, 0))
+        self._announce(unit.stage)  # each time: what workers say of their clips comes in between
         self.monitor.advance()
 
     def hear(self, unit: Unit, what: str, value: Sequence[Any]) -> None:
@@ -102,6 +104,11 @@ class Progress:
             case _:
                 return
         getattr(self.monitor, what)(*value)
+
+    def _announce(self, stage: str) -> None:
+        self._now = stage
+        self._begun.add(stage)
+        self.monitor.stage(stage, self._totals.pop(stage, 0))
 
     def take_back(self, unit: Unit | None = None) -> None:
         """Uncount what was heard of a unit that failed, or of all that were not done: it is said again.

@@ -140,7 +140,7 @@ class _Patience:
     monitor
         Is told once what is waited for.
     limit_s
-        From the first wait on; 0: not at all.
+        From the first wait on, or from when fewer units were left; 0: not at all.
     """
 
     def __init__(self, monitor: Monitor, limit_s: float) -> None:
@@ -148,15 +148,25 @@ class _Patience:
         self._limit_s = limit_s
         self._pause_s = FIRST_PAUSE_S
         self._begun_s: float | None = None
+        self._units: tuple[str, ...] = ()
+        self._is_last = False
 
     def wait(self, what: str, units: tuple[str, ...] = ()) -> None:
-        """Wait some seconds, or raise an error that says what for, where it took too long."""
+        """Wait some seconds, or raise an error that says what for, where it took too long.
+
+        Work may have been done since the last wait: there is another look before the error, and where some
+        of the units were finished, the time begins anew.
+        """
         now = time.monotonic()
-        if self._begun_s is None:
-            self._begun_s = now
-            if self._limit_s:
-                self._monitor.say(f"waiting up to {self._limit_s:.0f} s: {what}")
+        if self._begun_s is None and self._limit_s:
+            self._monitor.say(f"waiting up to {self._limit_s:.0f} s: {what}")
+        if self._begun_s is None or units != self._units:
+            self._begun_s, self._pause_s, self._is_last = now, FIRST_PAUSE_S, False
+        self._units = units
         left_s = self._begun_s + self._limit_s - now
+        if left_s <= 0 and not self._is_last:
+            self._is_last = True
+            return
         if left_s <= 0:
             waited = f" (after {self._limit_s:.0f} s)" if self._limit_s else ""
             raise UnfinishedError(f"{what}{waited}", units)

@@ -185,10 +185,8 @@ class Blueprint:
         return Unit(name, "raw", facts, (need,), order, group, "in-betweens")
 
     def _decoupled(self) -> Iterator[Unit]:
-        last = []
         for index, (shot, segments) in enumerate(zip(self._job.path.shots(), self.shots(), strict=True)):
             yield from self._lit_shot(index, shot, segments)
-            last.append(f"lit {index}")
         yield from self._video()
 
     def _lit_shot(self, index: int, shot: range, segments: list[Segment]) -> Iterator[Unit]:

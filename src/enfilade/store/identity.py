@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.codec import read_json, write_json
-from enfilade.codec.whole import MARK, json_bytes
+from enfilade.codec.whole import MARK, is_full, json_bytes, unwritable
 from enfilade.errors import RunFolderError
 from enfilade.store.checksum import checksum
 from enfilade.store.ledger import head_of
@@ -29,11 +29,14 @@ def prepare(folder: Path) -> None:
     Raises
     ------
     RunFolderError
+    NoSpaceError
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         names = sorted(entry.name for entry in folder.iterdir())
     except OSError as error:
+        if is_full(error):
+            raise unwritable(folder, error) from error
         raise RunFolderError(
             f"can't make a run in {folder}: {error.strerror}; choose another --out"
         ) from error

@@ -48,6 +48,7 @@ class Ledger:
     ------
     RunFolderError
         The file can't be read, or a line before the last one is damaged and may not be taken out.
+    NoSpaceError
     """
 
     def __init__(self, file: Path, *, writable: bool, is_lenient: bool = False) -> None:
@@ -63,6 +64,8 @@ class Ledger:
         try:
             self._open()
         except OSError as error:
+            if whole.is_full(error):
+                raise whole.unwritable(file, error) from error
             raise RunFolderError(f"can't open {file}: {error.strerror}") from error
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
@@ -212,7 +215,8 @@ class Ledger:
         text = f"{file}, line {number} is damaged"
         if not self._is_lenient:
             raise RunFolderError(f"{text}: run the command that made it again, which does its unit again")
-        what = "its unit is done again" if self._writable else "it was left out"
+        is_mended = self._writable and file == self._file
+        what = "its unit is done again" if is_mended else "it was left out"
         self.notes.append(f"{text}; {what}")
 
     def _write(self, lines: list[dict[str, Any]]) -> None:

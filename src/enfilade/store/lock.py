@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from enfilade.codec.whole import is_full, unwritable
 from enfilade.errors import RunFolderError
 
 __all__ = ["LOCK_NAME", "PART_LOCKS", "Lock", "Wait", "sign_workers", "writers_of"]
@@ -49,6 +50,7 @@ class Lock:
     ------
     RunFolderError
         Another process is writing there, or the folder can't be written.
+    NoSpaceError
     """
 
     def __init__(self, folder: Path, *, part: str | None = None, wait: Wait | None = None) -> None:
@@ -81,6 +83,8 @@ def _locked(file: Path, kind: int, wait: Wait | None) -> int:
     try:
         handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
     except OSError as error:
+        if is_full(error):
+            raise unwritable(file, error) from error
         raise RunFolderError(
             f"can't write in {file.parent}: {error.strerror}; choose another --out"
         ) from error

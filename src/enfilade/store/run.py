@@ -9,9 +9,11 @@ from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self
 
-from enfilade.codec import sweep, write_json
+from enfilade.codec import write_json
+from enfilade.codec.whole import unwritable
 from enfilade.errors import DamagedFileError, RunFolderError
 from enfilade.store.checksum import checksum, size_of
+from enfilade.store.guest import sweep_but_guests
 from enfilade.store.identity import LEDGER_FILE, RUN_FILE, claim, identity_of, prepare
 from enfilade.store.ledger import Ledger, covered
 from enfilade.store.lock import LOCK_NAME, Lock, Wait
@@ -86,7 +88,7 @@ class Run:
         lock = Lock(folder)
         try:
             notes = claim(folder, wanted, kept)
-            if left := sweep(folder):
+            if left := sweep_but_guests(folder, KINDS):
                 notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
             ledger = Ledger(folder / LEDGER_FILE, writable=True)
             ledger.begin(checksum(folder / RUN_FILE))
@@ -116,6 +118,8 @@ class Run:
         identity = identity_of(folder)
         ledger = Ledger(folder / LEDGER_FILE, writable=False, is_lenient=is_lenient)
         ledger.read_on(*part_files(folder))
+        if (folder / PARTS).is_dir():  # a command that takes them over puts them into the ledger first
+            ledger.read_on()
         return cls(folder, identity, ledger)
 
     @classmethod
@@ -128,7 +132,8 @@ class Run:
         report
             Takes the ledger line of a finished unit.
         part
-            The share that the other process has, if it shares the run.
+            The share that the other process has, if it shares the run. Then damaged lines are left out, as
+            that one does, which would not begin with them.
 
         Raises
         ------
@@ -136,7 +141,7 @@ class Run:
             It holds no run, or is damaged.
         """
         identity = identity_of(folder)
-        ledger = Ledger(folder / LEDGER_FILE, writable=False)
+        ledger = Ledger(folder / LEDGER_FILE, writable=False, is_lenient=part is not None)
         ledger.read_on(*part_files(folder))
         return cls(folder, identity, ledger, report=report, part=part)
 
@@ -158,15 +163,20 @@ class Run:
         Raises
         ------
         RunFolderError
-            It holds no run, or is damaged; one command has it to itself, or another the same share.
+            It holds no run, or is damaged, also the ledger of another command; one command has it to itself,
+            or another the same share.
+        NoSpaceError
         """
         identity = identity_of(folder)
         file = part_file(folder, part)
-        file.parent.mkdir(exist_ok=True)
+        try:
+            file.parent.mkdir(exist_ok=True)
+        except OSError as error:
+            raise unwritable(file, error) from error
         lock = Lock(folder, part=part, wait=wait)
         try:
             ledger = Ledger(file, writable=True)
-            ledger.read_on(folder / LEDGER_FILE, *part_files(folder))
+            _read_others(folder, ledger)
             return cls(folder, identity, ledger, lock=lock, part=part)
         except BaseException:
             lock.release()
@@ -372,3 +382,15 @@ class Run:
 
     def _relative(self, file: Path) -> str:
         return file.relative_to(self.folder).as_posix()
+
+
+def _read_others(folder: Path, ledger: Ledger) -> None:
+    """Read what other commands have recorded; damaged lines of theirs are not this one's to take out."""
+    known = len(ledger.notes)
+    ledger.read_on(folder / LEDGER_FILE, *part_files(folder))
+    if damaged := ledger.notes[known:]:
+        ledger.close()
+        raise RunFolderError(
+            f"{damaged[0].rpartition(';')[0]}: `enfilade work {folder}`, with no other command beside it, "
+            "takes it out and does its unit again; then run the same command again"
+        )
