@@ -11,7 +11,9 @@ disk       a disk that fills up at random points, then gets room; needs root, fo
 bits       a flipped bit in a stored file, found by use or by --verify, and what made it done again
 mitsuba    kills of a tiny Mitsuba scene by --method decoupled
 
-Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each.
+Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each. Trials go
+side by side, one for each core (--jobs), but for those of executors and the cluster; each has a folder and
+random numbers of its own.
 """
 
 import argparse
@@ -26,8 +28,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 FRAMES, SIZE = 48, "32x24"
@@ -39,6 +42,9 @@ POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn 
 STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
 TIMEOUT_S = 1800  # a busy machine is no failure
 STOPPED_MIN = 0.05  # after which a worker that does nothing is ended
+BESIDE = 1.5  # times longer a run takes beside others
+
+Trial = Callable[[int, Path, random.Random], str | None]  # number, folder: what went wrong
 
 
 @dataclass
@@ -79,6 +85,7 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, help="so many kills, disks and bits, in place of 200, 50 and 50")
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="trials at once")
     parser.add_argument("--json", type=Path, help="write the tally into this file")
     parser.add_argument("--die", help=argparse.SUPPRESS)
     arguments, rest = parser.parse_known_args()
@@ -99,27 +106,50 @@ def main() -> int:
 
 def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
     """Try every kind that was asked for."""
-    chance = random.Random(arguments.seed)  # noqa: S311  (which moment, not a secret)
     counts = dict(QUICK if arguments.quick else COUNTS)
     if arguments.count:
         counts = dict.fromkeys(counts, arguments.count)
     work = analytic_work(folder)
     print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
-    tries: dict[str, Callable[[], None]] = {
-        "kills": lambda: try_kills(work, folder, chance, counts["kills"], tally, "kills"),
-        "stops": lambda: try_stops(work, folder, chance, counts["stops"], tally),
-        "executors": lambda: try_executors(work, folder, arguments.quick, tally),
-        "cluster": lambda: try_cluster(folder, arguments.quick, tally),
-        "disk": lambda: try_disk(work, folder, chance, counts["disk"], tally),
-        "bits": lambda: try_bits(work, folder, chance, counts["bits"], tally),
-        "mitsuba": lambda: try_kills(
-            mitsuba_work(folder), folder, chance, counts["mitsuba"], tally, "mitsuba"
-        ),
+    if arguments.jobs > 1:
+        work = replace(work, seconds=work.seconds * BESIDE)
+    trials: dict[str, Callable[[], Trial]] = {
+        "kills": lambda: kill_trial(work),
+        "stops": lambda: stop_trial(work),
+        "disk": lambda: disk_trial(work, tally),
+        "bits": lambda: bit_trial(work),
+        "mitsuba": lambda: kill_trial(mitsuba_work(folder)),
     }
     for kind in arguments.only:
         begin = time.monotonic()
-        tries[kind]()
+        match kind:
+            case "executors":
+                try_executors(work, folder, arguments.quick, tally)
+            case "cluster":
+                try_cluster(folder, arguments.quick, tally)
+            case _:
+                tried = tried_of(kind, trials[kind](), folder, counts[kind], arguments)
+                for problem in tried:
+                    tally.note(kind, problem)
         tally.seconds[kind] = time.monotonic() - begin
+
+
+def tried_of(
+    kind: str, trial: Trial, folder: Path, count: int, arguments: argparse.Namespace
+) -> Iterator[str | None]:
+    """What went wrong in each trial of a kind, as they end, some of them side by side."""
+
+    def one(number: int) -> str | None:
+        place = folder / f"{kind}-{number}"
+        place.mkdir()
+        try:
+            chance = random.Random(f"{arguments.seed} {kind} {number}")  # noqa: S311  (which moment, not a secret)
+            return trial(number, place, chance)
+        finally:
+            shutil.rmtree(place, ignore_errors=True)
+
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        yield from pool.map(one, range(count))
 
 
 # What is rendered.
@@ -228,19 +258,20 @@ def scratch(folder: Path) -> Iterator[Path]:
 # Kills.
 
 
-def try_kills(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally, kind: str) -> None:
+def kill_trial(work: Work) -> Trial:
     """Kill a run somewhere, then let it go on to its end. What a kill misses does not count."""
     kills = (kill_at_point, kill_all, kill_worker)
-    for number in range(count):
-        with scratch(folder) as out:
-            what = None
-            while what is None:  # it came too late
-                shutil.rmtree(out, ignore_errors=True)
-                what = kills[number % len(kills)](work, out, chance)
-            problem = attempt(lambda o=out: finish(work.inputs, o), work, out, what)
-            if problem is None and "exit code" in what and not what.endswith("exit code 0"):
-                problem = what
-            tally.note(kind, problem)
+
+    def trial(number: int, folder: Path, chance: random.Random) -> str | None:
+        out, what = folder / "run", None
+        while what is None:  # it came too late
+            shutil.rmtree(out, ignore_errors=True)
+            what = kills[number % len(kills)](work, out, chance)
+        problem = attempt(lambda: finish(work.inputs, out), work, out, what)
+        has_failed = "exit code" in what and not what.endswith("exit code 0")
+        return what if problem is None and has_failed else problem
+
+    return trial
 
 
 def attempt(act: Callable[[], None], work: Work, out: Path, what: str) -> str | None:
@@ -300,17 +331,17 @@ def strike_worker(
     return f"{blow.name} for a worker after {moment:.2f} s, exit code {code}" if workers or code else None
 
 
-def try_stops(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+def stop_trial(work: Work) -> Trial:
     """Stop a worker, so that it hangs; the command must end it and go on by itself."""
-    for _ in range(count):
-        with scratch(folder) as out:
-            what = None
-            while what is None:  # it came too early or too late
-                shutil.rmtree(out, ignore_errors=True)
-                what = strike_worker(work, out, chance, signal.SIGSTOP, f"processes,idle={STOPPED_MIN}")
-            is_done = what.endswith("exit code 0")
-            problem = attempt(lambda: None, work, out, what) if is_done else what
-            tally.note("stops", problem)
+
+    def trial(_number: int, folder: Path, chance: random.Random) -> str | None:
+        out, what = folder / "run", None
+        while what is None:  # it came too early or too late
+            shutil.rmtree(out, ignore_errors=True)
+            what = strike_worker(work, out, chance, signal.SIGSTOP, f"processes,idle={STOPPED_MIN}")
+        return attempt(lambda: None, work, out, what) if what.endswith("exit code 0") else what
+
+    return trial
 
 
 def start(line: list[str]) -> subprocess.Popen[bytes]:
@@ -446,30 +477,25 @@ def cmdline(pid: int) -> bytes:
 # Disks.
 
 
-def try_disk(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+def disk_trial(work: Work, tally: Tally) -> Trial:
     """A disk that fills up, then gets room."""
-    if os.geteuid() != 0:
-        tally.skipped["disk"] = "skipped: only root can mount the small disk that is filled"
-        return
     need = sum(f.stat().st_size + 4096 for f in work.whole.rglob("*") if f.is_file()) // 1024
-    place = folder / "disk"
-    place.mkdir(exist_ok=True)
-    for _ in range(count):
+
+    def trial(_number: int, place: Path, chance: random.Random) -> str | None:
         size = chance.randrange(24, need)
-        mounted = subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        workers = chance.choice(((), ("--executor", "processes", "--workers", "2")))
+        line = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)]
+        mounted = subprocess.run(line, capture_output=True, text=True, check=False)
         if mounted.returncode:
-            tally.skipped["disk"] = f"skipped: no tmpfs can be mounted here ({mounted.stderr.strip()})"
-            return
+            why = mounted.stderr.strip()
+            tally.skipped["disk"] = f"skipped: only who can mount a small disk can fill it ({why})"
+            return None
         try:
-            workers = chance.choice(((), ("--executor", "processes", "--workers", "2")))
-            tally.note("disk", fill(work, place, size, workers))
+            return fill(work, place, size, workers)
         finally:
             subprocess.run(["umount", "-l", str(place)], check=True)
+
+    return trial
 
 
 def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | None:
@@ -492,21 +518,22 @@ def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | 
 # Bits.
 
 
-def try_bits(work: Work, folder: Path, chance: random.Random, count: int, tally: Tally) -> None:
+def bit_trial(work: Work) -> Trial:
     """A flipped bit, found when its file is used, or by --verify."""
-    for number in range(count):
-        with scratch(folder) as out:
-            shutil.copytree(work.whole, out)
-            is_used = number % 2 == 0
-            kinds = ("raw", "frames", "clips", "") if is_used else ("keyframes", *STORED[3:], "video", "")
-            file = chance.choice(candidates(out, chance.choice(kinds)))
-            if is_used:
-                forget_users(out, file)
-            flip(file, chance)
-            name = file.relative_to(out)
-            how = () if is_used else ("--verify",)
-            what = f"a bit of {name} flipped, {'used' if is_used else 'verified'}"
-            tally.note("bits", attempt(lambda o=out, h=how: finish(work.inputs, o, *h), work, out, what))
+
+    def trial(number: int, folder: Path, chance: random.Random) -> str | None:
+        out, is_used = folder / "run", number % 2 == 0
+        shutil.copytree(work.whole, out)
+        kinds = ("raw", "frames", "clips", "") if is_used else ("keyframes", *STORED[3:], "video", "")
+        file = chance.choice(candidates(out, chance.choice(kinds)))
+        if is_used:
+            forget_users(out, file)
+        flip(file, chance)
+        how = () if is_used else ("--verify",)
+        what = f"a bit of {file.relative_to(out)} flipped, {'used' if is_used else 'verified'}"
+        return attempt(lambda: finish(work.inputs, out, *how), work, out, what)
+
+    return trial
 
 
 def candidates(out: Path, kind: str) -> list[Path]:
