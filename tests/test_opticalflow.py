@@ -98,3 +98,12 @@ def test_tiny_images(size):
 def test_another_size_is_refused():
     with pytest.raises(InputError, match=r"shape \(4, 6\), not \(48, 64\)"):
         FlowEstimator(64, 48).luma(np.zeros((4, 6), np.float32))
+
+
+@pytest.mark.parametrize(
+    ("size", "searched"), [((4000, 1000), (1000, 250)), ((1000, 4000), (250, 1000)), ((2000, 10), (1000, 32))]
+)
+def test_large_images_are_searched_small_however_they_stand(size, searched):
+    width, height = size
+    luma = FlowEstimator(width, height).luma(np.zeros((height, width), np.float32))
+    assert luma.shape == searched[::-1]
