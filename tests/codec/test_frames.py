@@ -58,19 +58,23 @@ def test_light_comes_back_exactly(tmp_path):
         assert got.dropped == 3
 
 
-def test_parts_are_what_was_said_when_they_were_written(tmp_path):
+@pytest.mark.parametrize("layers", [1, 2])
+def test_parts_are_what_was_said_when_they_were_written(tmp_path, layers):
     rng = np.random.default_rng(2)
     seen, color = (rng.random((5, 7, 3)).astype(np.float32) for _ in "ab")
     seen[0, 0] = 1e9  # beyond half floats
-    scattered = Shading(color, rng.random((5, 7)).astype(np.float32), 4)
+    scattered = [Shading(color * k, k * rng.random((5, 7)).astype(np.float32)) for k in range(1, layers + 1)]
     source = rng.integers(0, 5, (5, 7)).astype(np.uint8)
-    said = write_parts(tmp_path / "a.exr", seen, scattered, source)
+    said = write_parts(tmp_path / "a.exr", seen, scattered, source, 4)
     back = read_parts(tmp_path / "a.exr")
     np.testing.assert_array_equal(back[0], said[0])
-    np.testing.assert_array_equal(back[1].color, said[1].color)
-    np.testing.assert_array_equal(back[1].variance, said[1].variance)
+    assert len(back[1]) == len(said[1]) == layers
+    for read, written, given_ in zip(back[1], said[1], scattered, strict=True):
+        np.testing.assert_array_equal(read.color, written.color)
+        np.testing.assert_array_equal(read.variance, written.variance)
+        np.testing.assert_allclose(read.color, given_.color, rtol=1e-3, atol=1e-6)
+        assert read.dropped == 4
     np.testing.assert_array_equal(back[2], source)
-    assert back[1].dropped == 4
     assert np.isfinite(back[0]).all()
     np.testing.assert_allclose(back[0][1:], seen[1:], rtol=1e-3)
 

@@ -20,7 +20,7 @@ from enfilade.irradiance import (
 )
 from enfilade.irradiance.cache import BEHIND
 from enfilade.pixels.estimate import Estimate, Samples
-from enfilade.records import LightPage, Shading
+from enfilade.records import LightPage, Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scenes import write_scene
 from enfilade.settings import TraceSettings
@@ -107,9 +107,38 @@ def _shade(renderer, cache: LightCache):
 
     def radiance(rays, rng, square):
         seen = shader.seen(cache, cache, rays, rng, pixel_angle=PIXEL_ANGLE).layers[0]
-        return seen + shader.scattered(cache, rays, rng, square, pixel_angle=PIXEL_ANGLE)
+        scattered = shader.scattered(cache, rays, rng, square, pixel_angle=PIXEL_ANGLE, layers=2)
+        return seen + sum(scattered.layers)
 
     return radiance
+
+
+def _scattered(renderer, camera: Camera, *, layers: int) -> list[Shading]:
+    shader = Shader(renderer)
+    whole = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng, square: shader.scattered(
+            LightCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE, layers=layers
+        ),
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random=RandomKey(2, 0, Purpose.SCATTER),
+        layers=layers,
+        is_stratified=True,
+    )
+    whole.add(8)
+    return whole.shadings
+
+
+def _pane(name: str, z: float, reflectance: float = 1.0, transmittance: float = 1.0) -> str:
+    """A ball's material, its end, and an upright pane, but for its end."""
+    return (
+        f'{MATERIALS["diffuse"]}</shape><shape type="rectangle" id="{name}"><transform name="to_world">'
+        f'<scale value="3"/><translate z="{z}"/></transform><bsdf type="thindielectric">'
+        f'<rgb name="specular_reflectance" value="{reflectance}"/>'
+        f'<rgb name="specular_transmittance" value="{transmittance}"/></bsdf>'
+    )
 
 
 def _traced(renderer, camera: Camera, spp: int) -> Shading:
@@ -339,7 +368,7 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     )
     renderer, camera = _opened(tmp_path, {"ball": mirror}), _camera()
     seen = find_geometry(renderer, camera)
-    shown = VirtualImages(renderer).of(seen)
+    shown = VirtualImages(renderer).reflected(seen)
     names = renderer.describe().items
     is_floor = shown.item == BEHIND + names.index("floor") + 1
     assert is_floor.sum() > 20
@@ -357,12 +386,61 @@ def test_rough_glass_shows_no_image(tmp_path):
     balls = {"rough": MATERIALS["roughdielectric"], "glass": MATERIALS["thindielectric"]}
     renderer, camera = _opened(tmp_path, balls), _camera()
     seen = find_geometry(renderer, camera)
-    shown = VirtualImages(renderer).of(seen)
+    shown = VirtualImages(renderer).reflected(seen)
     rough, glass = (seen.item == renderer.describe().items.index(name) + 1 for name in balls)
     assert rough.sum() > 20
     np.testing.assert_array_equal(shown.item[rough], seen.item[rough])
     np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
     assert (shown.item[glass] >= BEHIND).all()
+
+
+def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
+    bare, camera = _opened(tmp_path, {"ball": MATERIALS["diffuse"]}), _camera()
+    behind = find_geometry(bare, camera)
+    renderer = _opened(tmp_path, {"ball": _pane("front", 1.0)})
+    seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
+    where = seen.item == renderer.describe().items.index("front") + 1
+    assert where.sum() > 50
+    through, mirrored = images.transmitted(seen), images.reflected(seen)
+    np.testing.assert_allclose(positions(through)[where], positions(behind)[where], atol=2e-3)
+    names = renderer.describe().items
+    assert set(through.item[where]) == {BEHIND + names.index(name) + 1 for name in ("ball", "floor", "back")}
+    # The floor before the pane goes on behind it.
+    is_floor = where & (mirrored.item == BEHIND + names.index("floor") + 1)
+    assert is_floor.sum() > 20
+    np.testing.assert_allclose(positions(mirrored)[is_floor][:, 1], 0.0, atol=2e-3)
+    assert positions(mirrored)[is_floor][:, 2].max() < 1.0
+    assert (mirrored.item != through.item)[where].mean() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("panes", "has_reflected", "has_transmitted"),
+    [
+        ([("front", 0.0, 1.0)], False, True),
+        ([("front", 1.0, 0.0)], True, False),
+        ([("front", 0.0, 1.0), ("second", 1.0, 0.0)], True, False),
+        ([("front", 0.0, 1.0), ("second", 0.0, 1.0)], False, True),
+    ],
+)
+def test_what_panes_let_through_and_what_they_reflect_is_kept_apart(
+    tmp_path, panes, has_reflected, has_transmitted
+):
+    balls = {f"ball {k}": _pane(name, 1.0 - 0.01 * k, *shares) for k, (name, *shares) in enumerate(panes)}
+    renderer, camera = _opened(tmp_path, balls), _camera()
+    seen = find_geometry(renderer, camera)
+    is_between = positions(seen)[..., 1] < 0.3  # there the floor between the panes may be seen
+    where = ((seen.item == renderer.describe().items.index("front") + 1) & ~is_between).ravel()
+    reflected, transmitted = (layer.color[where] for layer in _scattered(renderer, camera, layers=2))
+    assert (reflected.any(), transmitted.any()) == (has_reflected, has_transmitted)
+
+
+def test_layers_of_what_lobes_scatter_are_parts_of_one_image(tmp_path):
+    renderer, camera = _opened(tmp_path, MATERIALS), _camera()
+    (whole,), parts = (_scattered(renderer, camera, layers=layers) for layers in (1, 2))
+    np.testing.assert_allclose(parts[0].color + parts[1].color, whole.color, rtol=1e-4, atol=1e-5)
+    is_clear = parts[1].color.any(axis=1)
+    seen = find_geometry(renderer, camera)
+    assert set(np.unique(seen.surface.ravel()[is_clear])) == {SurfaceClass.TRANSPARENT, SurfaceClass.EMISSIVE}
 
 
 def test_what_moves_along_is_averaged(diffuse):
@@ -375,14 +453,14 @@ def test_what_moves_along_is_averaged(diffuse):
         color = rng.normal(1.0, 0.1, (*size, 3)).astype(np.float32)
         frames.append((geometry, Shading(color, np.full(size, 0.01, np.float32)), geometry.is_hit))
     pages = [open_scattered(*frame) for frame in frames]
-    averaged = over_time(frames[0][0], pages[0], pages[1:], [1.0, 1.0])
+    averaged = over_time(pages[0], [(page, 1.0) for page in pages[1:]])
     where = frames[0][2]
     assert averaged[where].std() < 0.75 * frames[0][1].color[where].std()
     assert abs(averaged[where].mean() - 1.0) < 0.01
     assert not averaged[~where].any()
     # What is far from the frame's own value is no noise.
     brighter = [open_scattered(g, Shading(s.color + 5.0, s.variance), w) for g, s, w in frames[1:]]
-    kept = over_time(frames[0][0], pages[0], brighter, [1.0, 1.0])
+    kept = over_time(pages[0], [(page, 1.0) for page in brighter])
     np.testing.assert_allclose(kept[where], frames[0][1].color[where], atol=1e-2)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -26,6 +26,7 @@ __all__ = [
 ]
 
 F16 = npt.NDArray[np.float16]
+SCATTERED = (("scattered", "deviation"), ("transmitted", "transmitted deviation"))
 HALVES = frozenset({"N", "albedo"})  # layers for which eleven bits do
 
 
@@ -100,18 +101,22 @@ def read_light(file: Path) -> tuple[Shading, Shading, Mask]:
     return direct, indirect, layers["known"] > 0
 
 
-def write_parts(file: Path, seen: F32, scattered: Shading, source: U8) -> tuple[F32, Shading]:
-    """Write the two parts of a frame's light, as half floats; of the variance, its root.
+def write_parts(
+    file: Path, seen: F32, scattered: Sequence[Shading], source: U8, dropped: int
+) -> tuple[F32, list[Shading]]:
+    """Write the parts of a frame's light, as half floats; of the variance, its root.
 
     Parameters
     ----------
     file
     seen : (H, W, 3) float32
         What surfaces emit and scatter diffusely.
-    scattered : Shading
-        What they scatter by other lobes.
+    scattered : sequence of Shading
+        What they scatter by other lobes; where there are two, the second is what came through clear surfaces.
     source : (H, W) uint8
         ``records.Source``.
+    dropped
+        Samples left out of all parts.
 
     Returns
     -------
@@ -123,18 +128,14 @@ def write_parts(file: Path, seen: F32, scattered: Shading, source: U8) -> tuple[
     RunFolderError
         The file can't be written.
     """
-    halves = _half(seen), _half(scattered.color), _half(np.sqrt(scattered.variance))
-    layers: dict[str, Array] = {
-        "RGB": halves[0],
-        "scattered": halves[1],
-        "deviation": halves[2],
-        "source": source.astype(np.uint32),
-    }
-    write_exr(file, layers, attributes={"dropped": str(int(scattered.dropped))})
-    return _parts(*halves, dropped=scattered.dropped)
+    layers: dict[str, Array] = {"RGB": _half(seen), "source": source.astype(np.uint32)}
+    for (color, deviation), layer in zip(SCATTERED, scattered, strict=False):
+        layers |= {color: _half(layer.color), deviation: _half(np.sqrt(layer.variance))}
+    write_exr(file, layers, attributes={"dropped": str(int(dropped))})
+    return _parts(layers, dropped=dropped)
 
 
-def read_parts(file: Path) -> tuple[F32, Shading, U8]:
+def read_parts(file: Path) -> tuple[F32, list[Shading], U8]:
     """Read what :func:`write_parts` wrote.
 
     Raises
@@ -142,16 +143,21 @@ def read_parts(file: Path) -> tuple[F32, Shading, U8]:
     ImageError
         The file is missing, damaged, or holds no such parts.
     """
-    kinds = {"RGB": np.float16, "scattered": np.float16, "deviation": np.float16, "source": np.uint32}
+    (color, deviation), *_ = SCATTERED
+    kinds = {"RGB": np.float16, color: np.float16, deviation: np.float16, "source": np.uint32}
     layers = _required(file, kinds)
-    halves = layers["RGB"], layers["scattered"], layers["deviation"]
-    return *_parts(*halves, dropped=_dropped(file)), layers["source"].astype(np.uint8)
+    return *_parts(layers, dropped=_dropped(file)), layers["source"].astype(np.uint8)
 
 
-def _parts(seen: Array, color: Array, deviation: Array, *, dropped: int) -> tuple[F32, Shading]:
+def _parts(layers: Mapping[str, Array], *, dropped: int) -> tuple[F32, list[Shading]]:
     from enfilade.arrays import widened  # here, not above: who only reads pictures needs no Dr.Jit
 
-    return widened(seen), Shading(widened(color), np.square(widened(deviation)), dropped)
+    scattered = [
+        Shading(widened(layers[color]), np.square(widened(layers[deviation])), dropped)
+        for color, deviation in SCATTERED
+        if color in layers and deviation in layers
+    ]
+    return widened(layers["RGB"]), scattered
 
 
 def _dropped(file: Path) -> int:

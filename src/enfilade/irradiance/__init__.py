@@ -2,6 +2,7 @@
 
 from enfilade.irradiance.cache import (
     LightCache,
+    Sight,
     known,
     light_of,
     open_cache,
@@ -20,6 +21,7 @@ __all__ = [
     "Estimates",
     "LightCache",
     "Shader",
+    "Sight",
     "VirtualImages",
     "known",
     "light_of",

@@ -148,7 +148,23 @@ def smoothed(geometry: Geometry, shading: Shading, where: Mask) -> Shading:
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
 
 
-def open_scattered(geometry: Geometry, scattered: Shading, where: Mask) -> Page:
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What lobes scatter in a frame, with where it seems to be.
+
+    Attributes
+    ----------
+    geometry : Geometry
+        Of the frame, with virtual images (:class:`~enfilade.irradiance.virtual.VirtualImages`).
+    page : Page
+        The light, as :func:`open_scattered` made it.
+    """
+
+    geometry: Geometry
+    page: Page
+
+
+def open_scattered(geometry: Geometry, scattered: Shading, where: Mask) -> Sight:
     """Make what lobes scatter ready for :func:`over_time`.
 
     Parameters
@@ -161,10 +177,10 @@ def open_scattered(geometry: Geometry, scattered: Shading, where: Mask) -> Page:
         Pixels that have it.
     """
     layers = [(lanes(scattered.color), lanes(scattered.variance))]
-    return _page(geometry, lanes(where), layers, has_normals=False)
+    return Sight(geometry, _page(geometry, lanes(where), layers, has_normals=False))
 
 
-def over_time(geometry: Geometry, here: Page, others: Sequence[Page], shares: Sequence[float]) -> F32:
+def over_time(here: Sight, others: Sequence[tuple[Sight, float]]) -> F32:
     """Average what surfaces scatter with what frames around saw of it, each along its own motion.
 
     A virtual image is looked up where it seemed to be. What differs from the frame's own value by more than
@@ -172,24 +188,24 @@ def over_time(geometry: Geometry, here: Page, others: Sequence[Page], shares: Se
 
     Parameters
     ----------
-    geometry
-        Of the frame, with virtual images.
-    here, others
-        Pages of :func:`open_scattered`: the frame's own, and those of frames around it.
-    shares
-        How much each of the others counts; the frame itself counts one.
+    here
+        Of the frame itself.
+    others
+        Of frames around it, and how much each counts; the frame itself counts one.
 
     Returns
     -------
     (H, W, 3) float32
         0 where the frame has none.
     """
-    (color,), (variance,) = here.values, here.variances
-    position, normal = _points(geometry, here.depths), _fronts(geometry, here)
-    total, weight = Array3f(color), Float(1)
+    own = here.page
+    (color,), (variance,) = own.values, own.variances
+    position, normal = _points(here.geometry, own.depths), _fronts(here)
+    total, weight = Array3f(color), dr.ones(Float, dr.width(color))
     luminance = dr.dot(color, Array3f(*LUMINANCE))
-    for page, share in zip(others, shares, strict=True):
-        found = lookup(position, normal, here.items, page, plane_tolerance=PLANE_TOLERANCE)
+    dr.eval(position, normal, total, weight, luminance)
+    for other, share in others:
+        found = lookup(position, normal, own.items, other.page, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
         apart = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)
@@ -197,14 +213,15 @@ def over_time(geometry: Geometry, here: Page, others: Sequence[Page], shares: Se
         counts = dr.select(found.weight > KNOWN, opaque(share) * counts, 0.0)
         total += counts * value
         weight += counts
-    return image(total / weight, here.height, here.width)
+        dr.eval(total, weight)  # so that one kernel serves any number of frames
+    return image(total / weight, own.height, own.width)
 
 
-def _fronts(geometry: Geometry, page: Page) -> Any:
+def _fronts(sight: Sight) -> Any:
     """Normals; of virtual images, those of planes that face the eye."""
-    is_real = page.items < BEHIND
+    geometry, page = sight.geometry, sight.page
     toward = vector3(geometry.camera.eye) - _points(geometry, page.depths)
-    return dr.select(is_real, lanes(geometry.normal), toward)
+    return dr.select(page.items < BEHIND, lanes(geometry.normal), toward)
 
 
 def _without_speckles(shading: Shading) -> Any:

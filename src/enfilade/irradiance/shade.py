@@ -16,8 +16,8 @@ from enfilade.irradiance.paths import Path, begun, chosen, scatter_add
 from enfilade.pixels.estimate import Samples
 from enfilade.pixels.random import Leading
 from enfilade.pixels.replay import padded, recorded
-from enfilade.records import LEAST_ALBEDO
-from enfilade.renderer import MOST_EDGES, LightRenderer, Rays
+from enfilade.records import LEAST_ALBEDO, SurfaceClass
+from enfilade.renderer import MOST_EDGES, LightRenderer, Lit, Rays, Scattered
 
 BOUNCES = MOST_EDGES - 1  # off lobes, from cache to cache; what goes on then is path traced to its end
 BRIGHT = 4.0  # one over the throughput below which a path is faint
@@ -142,7 +142,8 @@ class Shader:
         heard: Callable[[Estimates], None] | None = None,
         *,
         pixel_angle: float,
-    ) -> Any:
+        layers: int = 1,
+    ) -> Samples:
         """Radiance that the surfaces seen send by all their other lobes.
 
         Parameters are those of :meth:`seen`.
@@ -153,14 +154,20 @@ class Shader:
             In [0, 1): which lobe, and where it sends the ray.
         heard
             Told of the light that was not known and had to be estimated.
+        layers
+            One, or two: then what clear surfaces let through is told apart from all else. Each has its own
+            virtual image.
 
         Returns
         -------
-        Array3f
+        Samples
         """
-        radiance = dr.zeros(Array3f, dr.width(rng.state))
-        self._follow(radiance, cache, begun(rays, rng, CELL_PX * pixel_angle), 0, heard, square)
-        return radiance
+        count = dr.width(rng.state)
+        radiance = dr.zeros(Array3f, layers * count)  # one layer after the other
+        path = begun(rays, rng, CELL_PX * pixel_angle)
+        self._follow(radiance, cache, path, 0, heard, square, apart=(layers - 1) * count)
+        lane = dr.arange(UInt, count)
+        return Samples(tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(layers)))
 
     def gathered(
         self,
@@ -202,10 +209,12 @@ class Shader:
         bounce: int,
         heard: Callable[[Estimates], None] | None,
         square: Any = None,
+        apart: int = 0,
     ) -> None:
         """Add what paths find on their way from lobe to lobe, of which some bounces lie behind them.
 
-        The numbers of the first of these bounces may be given, by lane.
+        The numbers of the first of these bounces may be given, by lane. What comes through clear surfaces is
+        added so many lanes apart.
         """
         # What is seen in a mirror is smoothed over cells; where light comes from needs no smoothing.
         jitter = 1.0 if bounce == 0 else 0.0
@@ -215,7 +224,7 @@ class Shader:
             first = None if square is None else dr.gather(Array4f, square, path.lane)
             dr.eval(first)
             square = None
-            direct, step = self._go_on(cache, path, opaque(least), first)
+            direct, step = self._go_on(cache, path, opaque(least), first, opaque(apart))
             scatter_add(radiance, direct, path.lane)
             scatter_add(radiance, step.sent, step.path.lane)
             self._add_missing(radiance, cache, step, jitter=jitter, heard=heard)
@@ -290,7 +299,9 @@ class Shader:
         # Where a lobe sends nothing, its direction is none, and so may be what the environment emits there.
         return Array3f(dr.select(path.carries, path.throughput * lit.emission, 0.0)), step
 
-    def _go_on_kernel(self, cache: LightCache, path: Path, least: Any, square: Any) -> tuple[Any, _Step]:
+    def _go_on_kernel(
+        self, cache: LightCache, path: Path, least: Any, square: Any, apart: Any
+    ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce, path.carries)
@@ -300,7 +311,7 @@ class Shader:
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
         blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
         ahead = Path(
-            lane=path.lane,
+            lane=_layered(path, lit, scattered, apart),
             rays=scattered.rays,
             bounce=scattered.bounce,
             throughput=Array3f(dr.select(is_alive, throughput / chance, 0.0)),
@@ -351,6 +362,19 @@ def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any,
     values = rows(light)[:count]
     for key in keys:
         heard(Estimates.of(np.array(key)[:count], values))
+
+
+def _layered(path: Path, lit: Lit, scattered: Scattered, apart: Any) -> Any:
+    """Where the light of paths goes that are scattered on: what comes through clear surfaces, apart; UInt.
+
+    What one pane lets through and another reflects, or the other face of the same, is a reflection.
+    """
+    normal = lit.surfaces.normal
+    is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, scattered.rays.direction) > 0.0
+    if path.bounce is None:
+        return path.lane + dr.select(scattered.bounce.is_delta & is_through, apart, 0)
+    is_clear = scattered.bounce.is_delta & (lit.surfaces.surface == int(SurfaceClass.TRANSPARENT))
+    return path.lane - dr.select(is_clear & ~is_through & (path.lane >= apart), apart, 0)
 
 
 def _known(cache: LightCache, spot: _Spot) -> tuple[Any, Any]:

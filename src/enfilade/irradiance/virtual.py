@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,9 +21,10 @@ from enfilade.renderer import LightRenderer, Rays
 
 __all__ = ["VirtualImages"]
 
-SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+CLEAR = (SurfaceClass.TRANSPARENT,)
+SHARP = (SurfaceClass.MIRROR, *CLEAR)
 ENDLESS = 1e4  # times as far as a mirror seems what it shows of the sky
-THROUGH = 0.999999  # chooses the lobe that lets light through
+REFLECTED, THROUGH = 0.000001, 0.999999  # choose the lobe that reflects light, and that which lets it through
 LAYERS = 8  # of mirrors and glass, one behind the other
 
 
@@ -33,15 +35,22 @@ class VirtualImages:
         self._renderer = renderer
         self._look_on = recorded(self._look_on_kernel, lambda: renderer.state)
 
-    def of(self, geometry: Geometry) -> Geometry:
-        """What a frame shows, where it seems to be.
+    def reflected(self, geometry: Geometry) -> Geometry:
+        """What mirrors, and panes as far as they are mirrors, show in a frame, where it seems to be.
 
         Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
         :data:`~enfilade.irradiance.cache.BEHIND` added to the item's number, and the depth that of the
         virtual image: as far away as the way to it is long, which is exact for plane mirrors. Everything else
         stays.
         """
-        pixels = np.flatnonzero(np.isin(geometry.surface, SHARP)).astype(np.uint32)
+        return self._image(geometry, SHARP, REFLECTED)
+
+    def transmitted(self, geometry: Geometry) -> Geometry:
+        """What clear surfaces let through: as :meth:`reflected`, but pixels on mirrors stay, too."""
+        return self._image(geometry, CLEAR, THROUGH)
+
+    def _image(self, geometry: Geometry, kinds: Sequence[SurfaceClass], choice: float) -> Geometry:
+        pixels = np.flatnonzero(np.isin(geometry.surface, kinds)).astype(np.uint32)
         if not len(pixels):
             return geometry
         item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
@@ -51,7 +60,8 @@ class VirtualImages:
         first = geometry.depth.ravel() * _lengths(geometry.camera)
         count = len(pixels)  # of paths; what is added to have enough of them comes after
         for _ in range(LAYERS):
-            path, found, turned, distance, is_image, is_sharp = self._look_on(path)
+            path, found, turned, distance, is_image, is_sharp = self._look_on(path, opaque(choice))
+            choice = THROUGH  # what a mirror shows of a pane is what lies behind that
             shown = np.array(is_image)[:count]  # rough glass shows none: what is seen is its own surface
             lane = pixels[np.array(path.lane)[:count][shown]]
             item[lane], normal[lane] = np.array(found)[:count][shown] + BEHIND, rows(turned)[:count][shown]
@@ -70,7 +80,7 @@ class VirtualImages:
             normal=np.ascontiguousarray(normal.reshape(*size, 3)),
         )
 
-    def _look_on_kernel(self, path: Path) -> tuple[Path, Any, Any, Any, Any, Any]:
+    def _look_on_kernel(self, path: Path, choice: Any) -> tuple[Path, Any, Any, Any, Any, Any]:
         """Go through the surface that the rays meet, or be mirrored; and say what is met next.
 
         Also whether the one direction in which the surface sends the ray makes an image, and whether the
@@ -78,7 +88,7 @@ class VirtualImages:
         """
         rng = PCG32(path.rng)
         lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
-        scattered = self._renderer.scatter(lit, rng, Float(THROUGH))
+        scattered = self._renderer.scatter(lit, rng, choice)
         ahead = replace(path, rays=scattered.rays, bounce=scattered.bounce, rng=rng)
         surfaces = self._renderer.lit(ahead.rays, ahead.bounce).surfaces
         is_sharp = Bool(False)

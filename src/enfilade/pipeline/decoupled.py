@@ -9,13 +9,14 @@ its own motion: that of the surface, or of the virtual image in a mirror.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from enfilade.codec import read_parts, write_parts
-from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
+from enfilade.irradiance import LightCache, Sight, open_scattered, over_time, smoothed
 from enfilade.masks import lamp_pixels
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept, around
@@ -24,8 +25,7 @@ from enfilade.pipeline.units import REACH
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
-from enfilade.pixels.lookup import Page
-from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source
+from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
@@ -77,12 +77,13 @@ class DecoupledFrames:
         parts = {f: self._kept.made(f, lambda f=f: self._read(f)) for f in span}  # type: ignore[misc]
         here = parts[frame]
         others = [f for f in span if f != frame]
-        shares = [1.0 - abs(path.place(f) - path.place(frame)) / (REACH + 1) for f in others]
+        shares = {f: 1.0 - abs(path.place(f) - path.place(frame)) / (REACH + 1) for f in others}
         color = here.seen
         if np.any(here.source == Source.SPECULAR):
             with workshop.costs.of("over time"):
-                pages = [parts[f].scattered for f in others]
-                color = color + over_time(here.shown, here.scattered, pages, shares)
+                for k, sight in enumerate(here.scattered):
+                    have = [f for f in others if k < len(parts[f].scattered)]
+                    color = color + over_time(sight, [(parts[f].scattered[k], shares[f]) for f in have])
         # What a lobe is sampled as may be negative; what arrives is not.
         return Frame(np.maximum(color, 0.0), here.source), here.view
 
@@ -93,14 +94,14 @@ class DecoupledFrames:
             near, cache = table.around(frame)
             estimate = _seen(workshop, frame, near, cache)
         with workshop.costs.of("scatter"):
-            shown = workshop.virtual_images.of(view.geometry)
+            shown = _shown(workshop, view)
             scattered, lobe_rays = _scattered(workshop, shown, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
-        dropped = scattered.dropped + estimate.shading.dropped
+        dropped = scattered[0].dropped + estimate.shading.dropped
         file = workshop.run.file("raw", workshop.number(frame))
         with workshop.costs.of("files"):
-            seen, scattered = write_parts(file, seen, replace(scattered, dropped=dropped), source)
+            seen, scattered = write_parts(file, seen, scattered, source, dropped)
         rays = {"camera": estimate.paths, "lobes": lobe_rays}
         number = workshop.number(frame)
         workshop.finish(raw_unit(workshop, frame), [file], frame=number, dropped=dropped, rays=rays)
@@ -110,7 +111,7 @@ class DecoupledFrames:
         workshop = self._workshop
         file, view = workshop.run.file("raw", workshop.number(frame)), workshop.views[frame]
         workshop.run.check(file)
-        shown = workshop.virtual_images.of(view.geometry)
+        shown = _shown(workshop, view)
         with workshop.costs.of("files"):
             seen, scattered, source = read_parts(file)
         return _parts(workshop, view, shown, seen, scattered, source)
@@ -118,21 +119,36 @@ class DecoupledFrames:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """A frame shaded by itself; ``shown`` is its geometry with virtual images."""
+    """A frame shaded by itself."""
 
     view: View
-    shown: Geometry
     seen: F32
-    scattered: Page
+    scattered: list[Sight]
     source: U8
 
 
 def _parts(
-    workshop: Workshop, view: View, shown: Geometry, seen: F32, scattered: Shading, source: U8
+    workshop: Workshop,
+    view: View,
+    shown: Sequence[Geometry],
+    seen: F32,
+    scattered: Sequence[Shading],
+    source: U8,
 ) -> _Parts:
+    where = _grown(source == Source.SPECULAR)
     with workshop.costs.of("over time"):
-        page = open_scattered(shown, scattered, _grown(source == Source.SPECULAR))
-    return _Parts(view, shown, seen, page, source)
+        pairs = zip(shown, scattered, strict=True)
+        sights = [open_scattered(geometry, shading, where) for geometry, shading in pairs]
+    return _Parts(view, seen, sights, source)
+
+
+def _shown(workshop: Workshop, view: View) -> list[Geometry]:
+    """What a frame's lobes show, where it seems to be: reflected; and seen through clear surfaces, if any."""
+    geometry, images = view.geometry, workshop.virtual_images
+    shown = [images.reflected(geometry)]
+    if np.any(geometry.surface == SurfaceClass.TRANSPARENT):
+        shown.append(images.transmitted(geometry))
+    return shown
 
 
 def _seen(workshop: Workshop, frame: int, view: LightCache, cache: LightCache) -> Estimate:
@@ -172,9 +188,11 @@ def _source(
 
 
 def _scattered(
-    workshop: Workshop, shown: Geometry, frame: int, cache: LightCache, seen: Estimate
-) -> tuple[Shading, int]:
+    workshop: Workshop, shown: Sequence[Geometry], frame: int, cache: LightCache, seen: Estimate
+) -> tuple[list[Shading], int]:
     """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and by how many rays.
+
+    As many images as there are of what the frame shows.
 
     All pixels take as many: a second pass over the scene for those where noise is left would cost what
     half as many more for all do.
@@ -183,22 +201,24 @@ def _scattered(
     where = _grown(seen.is_marked.reshape(path.height, path.width))
     if not where.any():
         size = path.height, path.width
-        return Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)), 0
+        return [Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)) for _ in shown], 0
     camera = path.cameras[frame]
     scattered = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
         lambda rays, rng, square: workshop.shader.scattered(
-            cache, rays, rng, square, pixel_angle=camera.pixel_angle
+            cache, rays, rng, square, pixel_angle=camera.pixel_angle, layers=len(shown)
         ),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.SCATTER),
+        layers=len(shown),
         is_stratified=True,
     )
     light = settings.light
     scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
-    return smoothed(shown, scattered.shading.spread(where), where), scattered.paths
+    pairs = zip(shown, scattered.shadings, strict=True)
+    return [smoothed(geometry, shading.spread(where), where) for geometry, shading in pairs], scattered.paths
 
 
 def _between(samples: tuple[float, int, int], quality: float) -> int:

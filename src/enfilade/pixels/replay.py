@@ -48,5 +48,7 @@ def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[.
 def padded(lanes: Any) -> tuple[Any, Any]:
     """Lanes of a list, the last repeated until they suit a recorded kernel, and which are no repetitions."""
     count = dr.width(lanes)
+    if count == 1:  # gathering from a single lane would be another kernel
+        lanes = UInt([lanes[0]] * 2)
     index = dr.arange(UInt, -(-count // STEP) * STEP)
     return dr.gather(UInt, lanes, dr.minimum(index, opaque(count - 1))), index < opaque(count)

@@ -181,8 +181,10 @@ class SeenRun:
         if color is None or color.shape != (*size, 3):
             raise ImageError(f"{file} holds no image of {size[1]}x{size[0]} pixels")
         color = color.astype(np.float32)
-        if is_raw and "scattered" in layers:  # what mirrors, glass and gloss show is kept apart until the end
-            color += layers["scattered"]
+        # What mirrors, glass and gloss show is kept apart until the end.
+        for apart in ("scattered", "transmitted"):
+            if is_raw and apart in layers:
+                color += layers[apart]
         if not np.isfinite(color).all():
             raise ImageError(f"{file} holds pixels that are NaN or infinite")
         source = layers.get("source")

@@ -17,7 +17,7 @@ from enfilade.store.lock import LOCK_NAME
 
 __all__ = ["LEDGER_FILE", "RUN_FILE", "claim", "identity_of", "prepare"]
 
-FORMAT = 2  # of the folder; another number is refused
+FORMAT = 3  # of the folder; another number is refused
 RUN_FILE, LEDGER_FILE = "run.json", "ledger.jsonl"
 SHOWN_DIFFERENCES = 12
 SHOWN_LETTERS = 80  # of one value: a list of frames has many
