@@ -11,9 +11,9 @@ disk       a disk that fills up at random points, then gets room; needs root, fo
 bits       a flipped bit in a stored file, found by use or by --verify, and what made it done again
 mitsuba    kills of a tiny Mitsuba scene by --method decoupled
 
-Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each. Trials go
-side by side, one for each core (--jobs), but for those of executors and the cluster; each has a folder and
-random numbers of its own.
+Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each. Trials of
+all kinds go side by side, one for each core (--jobs), the longest first; each has a folder and random numbers
+of its own.
 """
 
 import argparse
@@ -27,16 +27,34 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 FRAMES, SIZE = 48, "32x24"
-KINDS = ("kills", "stops", "executors", "cluster", "disk", "bits", "mitsuba")
-COUNTS = {"kills": 200, "stops": 10, "disk": 50, "bits": 50, "mitsuba": 10}
-QUICK = {"kills": 5, "stops": 2, "disk": 5, "bits": 5, "mitsuba": 1}
+EXECUTORS = [("ray", 2), ("processes", 7), ("processes", 2), ("processes", 1), ("in-process", 1)]
+MORE_EXECUTORS = [*EXECUTORS, ("ray", 1), ("ray", 7)]
+COUNTS = {
+    "cluster": 1,
+    "executors": len(MORE_EXECUTORS),
+    "stops": 10,
+    "mitsuba": 10,
+    "kills": 200,
+    "disk": 50,
+    "bits": 50,
+}
+QUICK = {
+    "cluster": 1,
+    "executors": len(EXECUTORS),
+    "stops": 2,
+    "mitsuba": 1,
+    "kills": 5,
+    "disk": 5,
+    "bits": 5,
+}
+KINDS = tuple(COUNTS)  # those first whose trials take longest
 CLUSTER_KILLS, QUICK_CLUSTER_KILLS = 10, 5
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
 STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
@@ -44,7 +62,7 @@ TIMEOUT_S = 1800  # a busy machine is no failure
 STOPPED_MIN = 0.05  # after which a worker that does nothing is ended
 BESIDE = 1.5  # times longer a run takes beside others
 
-Trial = Callable[[int, Path, random.Random], str | None]  # number, folder: what went wrong
+Trial = Callable[[int, Path, random.Random], str | None]  # number, empty folder, chance: what went wrong
 
 
 @dataclass
@@ -56,8 +74,9 @@ class Tally:
     skipped: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
-    def note(self, kind: str, problem: str | None) -> None:
+    def note(self, kind: str, problem: str | None, seconds: float) -> None:
         """Count a try; a problem is printed at once."""
+        self.seconds[kind] = self.seconds.get(kind, 0.0) + seconds
         self.tried[kind] = self.tried.get(kind, 0) + 1
         if problem:
             self.wrong.setdefault(kind, []).append(problem)
@@ -94,62 +113,55 @@ def main() -> int:
     tally = Tally()
     with tempfile.TemporaryDirectory(prefix="faults-") as name:
         try_all(Path(name), arguments, tally)
-    for kind in arguments.only:
+    for kind in (kind for kind in KINDS if kind in arguments.only):
         wrong = len(tally.wrong.get(kind, []))
         tried = tally.tried.get(kind, 0)
         text = tally.skipped.get(kind) or f"{tried - wrong} of {tried} as if nothing had happened"
-        print(f"{kind:10} {text}, {tally.seconds.get(kind, 0.0):.0f} s")
+        print(f"{kind:10} {text}, {tally.seconds.get(kind, 0.0):.0f} s of trials")
     if arguments.json:
         arguments.json.write_text(json.dumps(vars(tally), indent=2))
     return 1 if tally.wrong else 0
 
 
 def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
-    """Try every kind that was asked for."""
+    """Try every kind that was asked for, side by side."""
     counts = dict(QUICK if arguments.quick else COUNTS)
     if arguments.count:
-        counts = dict.fromkeys(counts, arguments.count)
+        counts |= {kind: arguments.count for kind in counts if kind not in ("cluster", "executors")}
     work = analytic_work(folder)
     print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
     if arguments.jobs > 1:
         work = replace(work, seconds=work.seconds * BESIDE)
     trials: dict[str, Callable[[], Trial]] = {
-        "kills": lambda: kill_trial(work),
+        "cluster": lambda: cluster_trial(folder, QUICK_CLUSTER_KILLS if arguments.quick else CLUSTER_KILLS),
+        "executors": lambda: executor_trial(work),
         "stops": lambda: stop_trial(work),
+        "mitsuba": lambda: kill_trial(mitsuba_work(folder)),
+        "kills": lambda: kill_trial(work),
         "disk": lambda: disk_trial(work, tally),
         "bits": lambda: bit_trial(work),
-        "mitsuba": lambda: kill_trial(mitsuba_work(folder)),
     }
-    for kind in arguments.only:
-        begin = time.monotonic()
-        match kind:
-            case "executors":
-                try_executors(work, folder, arguments.quick, tally)
-            case "cluster":
-                try_cluster(folder, arguments.quick, tally)
-            case _:
-                tried = tried_of(kind, trials[kind](), folder, counts[kind], arguments)
-                for problem in tried:
-                    tally.note(kind, problem)
-        tally.seconds[kind] = time.monotonic() - begin
-
-
-def tried_of(
-    kind: str, trial: Trial, folder: Path, count: int, arguments: argparse.Namespace
-) -> Iterator[str | None]:
-    """What went wrong in each trial of a kind, as they end, some of them side by side."""
-
-    def one(number: int) -> str | None:
-        place = folder / f"{kind}-{number}"
-        place.mkdir()
-        try:
-            chance = random.Random(f"{arguments.seed} {kind} {number}")  # noqa: S311  (which moment, not a secret)
-            return trial(number, place, chance)
-        finally:
-            shutil.rmtree(place, ignore_errors=True)
-
+    asked = {kind: trials[kind]() for kind in KINDS if kind in arguments.only}
     with ThreadPoolExecutor(arguments.jobs) as pool:
-        yield from pool.map(one, range(count))
+        begun = [
+            pool.submit(one_of, kind, trial, number, folder, arguments.seed)
+            for kind, trial in asked.items()
+            for number in range(counts[kind])
+        ]
+        for ended in as_completed(begun):
+            tally.note(*ended.result())
+
+
+def one_of(kind: str, trial: Trial, number: int, folder: Path, seed: int) -> tuple[str, str | None, float]:
+    """A trial of a kind, what went wrong in it, and the seconds it took."""
+    place, begin = folder / f"{kind}-{number}", time.monotonic()
+    place.mkdir()
+    try:
+        chance = random.Random(f"{seed} {kind} {number}")  # noqa: S311  (which moment, not a secret)
+        problem = trial(number, place, chance)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    return kind, problem, time.monotonic() - begin
 
 
 # What is rendered.
@@ -242,17 +254,6 @@ def stored(folder: Path) -> list[Path]:
 def sha(file: Path) -> str:
     """Checksum of a file."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
-@contextmanager
-def scratch(folder: Path) -> Iterator[Path]:
-    """A run folder that is removed afterwards."""
-    out = folder / "run"
-    shutil.rmtree(out, ignore_errors=True)
-    try:
-        yield out
-    finally:
-        shutil.rmtree(out, ignore_errors=True)
 
 
 # Kills.
@@ -410,21 +411,17 @@ def die_at(where: str, arguments: list[str]) -> int:
 # Executors.
 
 
-def try_executors(work: Work, folder: Path, is_quick: bool, tally: Tally) -> None:
+def executor_trial(work: Work) -> Trial:
     """The same run by one, two and seven workers of each executor."""
-    counts = {"in-process": (1,), "processes": (1, 2, 7), "ray": (2,) if is_quick else (1, 2, 7)}
-    for name, numbers in counts.items():
-        for workers in numbers:
-            with scratch(folder) as out:
-                flags = ("--executor", name, "--workers", str(workers))
-                prefix = alone() if name == "ray" else ()
-                problem = attempt(
-                    lambda o=out, f=flags, p=prefix: finish(work.inputs, o, *f, prefix=p),
-                    work,
-                    out,
-                    f"{name}, {workers} workers",
-                )
-                tally.note("executors", problem)
+
+    def trial(number: int, folder: Path, _chance: random.Random) -> str | None:
+        name, workers = MORE_EXECUTORS[number]
+        flags = ("--executor", name, "--workers", str(workers))
+        prefix, out = alone() if name == "ray" else (), folder / "run"
+        act = partial(finish, work.inputs, out, *flags, prefix=prefix)
+        return attempt(act, work, out, f"{name}, {workers} workers")
+
+    return trial
 
 
 def alone() -> tuple[str, ...]:
@@ -434,16 +431,16 @@ def alone() -> tuple[str, ...]:
     return line if works else ()
 
 
-def try_cluster(folder: Path, is_quick: bool, tally: Tally) -> None:
+def cluster_trial(folder: Path, kills: int) -> Trial:
     """Ray, whose workers are killed one after the other while 50 units are done."""
-    kills = QUICK_CLUSTER_KILLS if is_quick else CLUSTER_KILLS
-    scene, path = folder / "wall.analytic.json", walk(folder / "fifty.json", 50)
-    inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", "20000")
-    work = made(folder, "reference", inputs)
-    with scratch(folder) as out:
-        line = [*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")]
-        process, ledger = start(line), out / "ledger.jsonl"
-        killed, done = 0, 0
+    scene = folder / "wall.analytic.json"
+
+    def trial(_number: int, place: Path, _chance: random.Random) -> str | None:
+        path = walk(place / "fifty.json", 50)
+        inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", "20000")
+        work, out = made(place, "whole", inputs), place / "run"
+        process = start([*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")])
+        ledger, killed, done = out / "ledger.jsonl", 0, 0
         while process.poll() is None and killed < kills:
             workers = [pid for pid in descendants(process.pid) if b"do_unit" in cmdline(pid)]
             lines = ledger.read_bytes().count(b"\n") if ledger.exists() else 0
@@ -456,8 +453,9 @@ def try_cluster(folder: Path, is_quick: bool, tally: Tally) -> None:
         problem = f"exit code {code}" if code else difference(work, out)
         if killed < kills:
             problem = f"only {killed} workers could be killed ({problem})"
-        tally.note("cluster", f"{killed} workers killed: {problem}" if problem else None)
-    shutil.rmtree(work.whole)
+        return f"{killed} workers killed: {problem}" if problem else None
+
+    return trial
 
 
 def descendants(pid: int) -> list[int]:

@@ -13,6 +13,7 @@ from enfilade.codec import write_exr
 from enfilade.monitor import Silence
 from enfilade.pipeline.compare import FlowChoice, SequenceDifference, Terms, compare, metric_options
 from enfilade.settings import MetricSettings
+from enfilade.store.identity import FORMAT
 
 SIZE = (48, 64)
 
@@ -68,7 +69,7 @@ def write_run(
     path: dict[str, Any] = {"fps": 30.0, "frames": list(selected or numbers), "cuts": list(cuts)}
     if poses is not None:
         path["poses"] = poses
-    (folder / "run.json").write_text(json.dumps({"format": 2, "identity": {"path": path}}))
+    (folder / "run.json").write_text(json.dumps({"format": FORMAT, "identity": {"path": path}}))
     return folder
 
 

@@ -35,6 +35,7 @@ class SurfaceClass(IntEnum):
 
 
 SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+LOBE_LAYERS = ("reflected", "transmitted")  # of what lobes scatter: the latter straight through what is clear
 LEAST_ALBEDO = 1e-4  # of a surface whose light is worth knowing: below it the diffuse lobe counts as none
 
 

@@ -107,6 +107,20 @@ def test_a_run_that_lost_files_is_mended_to_the_same_bytes(decoupled):
     assert frame_bytes(folder) == before
 
 
+def test_frames_that_show_glass_are_mended_to_the_same_bytes(tmp_path):
+    files, folder = write_scene("atrium", tmp_path / "atrium", preset="small"), tmp_path / "run"
+    path = load_path(files.path, size=(64, 48), frames=(29, 30, 31, 32))
+    settings = Settings.from_tables({"light": {"spacing": 4, "paths": 4}})
+    job = Job(files.scene, path, settings, "decoupled")
+    render(job, folder, Silence())
+    assert read_exr(folder / "raw" / "0030.exr")["transmitted"].any()
+    before = frame_bytes(folder)
+    (folder / "frames" / "0030.exr").unlink()  # made of what its neighbours left
+    (folder / "raw" / "0032.exr").unlink()
+    render(job, folder, Silence())
+    assert frame_bytes(folder) == before
+
+
 def test_lost_fills_are_traced_by_workers_as_they_were(decoupled):
     job, folder, _ = decoupled
     run = Run.existing(folder)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from enfilade.codec.exr import Array, read_attributes, read_exr, write_exr
 from enfilade.errors import ImageError
-from enfilade.records import F32, U8, Frame, Mask, Shading
+from enfilade.records import F32, LOBE_LAYERS, U8, Frame, Mask, Shading
 
 __all__ = [
     "read_frame",
@@ -26,7 +26,6 @@ __all__ = [
 ]
 
 F16 = npt.NDArray[np.float16]
-SCATTERED = (("scattered", "deviation"), ("transmitted", "transmitted deviation"))
 HALVES = frozenset({"N", "albedo"})  # layers for which eleven bits do
 
 
@@ -112,7 +111,7 @@ def write_parts(
     seen : (H, W, 3) float32
         What surfaces emit and scatter diffusely.
     scattered : sequence of Shading
-        What they scatter by other lobes; where there are two, the second is what came through clear surfaces.
+        What they scatter by other lobes: the first of ``records.LOBE_LAYERS``, or all.
     source : (H, W) uint8
         ``records.Source``.
     dropped
@@ -129,8 +128,8 @@ def write_parts(
         The file can't be written.
     """
     layers: dict[str, Array] = {"RGB": _half(seen), "source": source.astype(np.uint32)}
-    for (color, deviation), layer in zip(SCATTERED, scattered, strict=False):
-        layers |= {color: _half(layer.color), deviation: _half(np.sqrt(layer.variance))}
+    for name, layer in zip(LOBE_LAYERS[: len(scattered)], scattered, strict=True):
+        layers |= {name: _half(layer.color), _deviation(name): _half(np.sqrt(layer.variance))}
     write_exr(file, layers, attributes={"dropped": str(int(dropped))})
     return _parts(layers, dropped=dropped)
 
@@ -143,9 +142,12 @@ def read_parts(file: Path) -> tuple[F32, list[Shading], U8]:
     ImageError
         The file is missing, damaged, or holds no such parts.
     """
-    (color, deviation), *_ = SCATTERED
-    kinds = {"RGB": np.float16, color: np.float16, deviation: np.float16, "source": np.uint32}
-    layers = _required(file, kinds)
+    there = read_exr(file)
+    names = [
+        name for name in LOBE_LAYERS if name == LOBE_LAYERS[0] or {name, _deviation(name)} & there.keys()
+    ]
+    kinds = {layer: np.float16 for name in names for layer in (name, _deviation(name))}
+    layers = _checked(file, there, {"RGB": np.float16, "source": np.uint32, **kinds})
     return *_parts(layers, dropped=_dropped(file)), layers["source"].astype(np.uint8)
 
 
@@ -153,11 +155,15 @@ def _parts(layers: Mapping[str, Array], *, dropped: int) -> tuple[F32, list[Shad
     from enfilade.arrays import widened  # here, not above: who only reads pictures needs no Dr.Jit
 
     scattered = [
-        Shading(widened(layers[color]), np.square(widened(layers[deviation])), dropped)
-        for color, deviation in SCATTERED
-        if color in layers and deviation in layers
+        Shading(widened(layers[name]), np.square(widened(layers[_deviation(name)])), dropped)
+        for name in LOBE_LAYERS
+        if name in layers
     ]
     return widened(layers["RGB"]), scattered
+
+
+def _deviation(name: str) -> str:
+    return f"{name} deviation"
 
 
 def _dropped(file: Path) -> int:
@@ -228,7 +234,10 @@ def _half(values: F32) -> F16:
 
 
 def _required(file: Path, kinds: Mapping[str, type]) -> dict[str, Array]:
-    layers = read_exr(file)
+    return _checked(file, read_exr(file), kinds)
+
+
+def _checked(file: Path, layers: dict[str, Array], kinds: Mapping[str, type]) -> dict[str, Array]:
     for name, kind in kinds.items():
         if name not in layers or layers[name].dtype != kind:
             raise ImageError(

@@ -142,7 +142,6 @@ class Shader:
         heard: Callable[[Estimates], None] | None = None,
         *,
         pixel_angle: float,
-        layers: int = 1,
     ) -> Samples:
         """Radiance that the surfaces seen send by all their other lobes.
 
@@ -154,20 +153,19 @@ class Shader:
             In [0, 1): which lobe, and where it sends the ray.
         heard
             Told of the light that was not known and had to be estimated.
-        layers
-            One, or two: then what clear surfaces let through is told apart from all else. Each has its own
-            virtual image.
 
         Returns
         -------
         Samples
+            In two layers, since each has a virtual image of its own: what is reflected, or comes through
+            rough surfaces; and what comes straight through clear ones.
         """
         count = dr.width(rng.state)
-        radiance = dr.zeros(Array3f, layers * count)  # one layer after the other
+        radiance = dr.zeros(Array3f, 2 * count)  # one layer after the other
         path = begun(rays, rng, CELL_PX * pixel_angle)
-        self._follow(radiance, cache, path, 0, heard, square, apart=(layers - 1) * count)
+        self._follow(radiance, cache, path, 0, heard, square, transmitted_at=count)
         lane = dr.arange(UInt, count)
-        return Samples(tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(layers)))
+        return Samples(tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(2)))
 
     def gathered(
         self,
@@ -209,12 +207,12 @@ class Shader:
         bounce: int,
         heard: Callable[[Estimates], None] | None,
         square: Any = None,
-        apart: int = 0,
+        transmitted_at: int = 0,
     ) -> None:
         """Add what paths find on their way from lobe to lobe, of which some bounces lie behind them.
 
         The numbers of the first of these bounces may be given, by lane. What comes through clear surfaces is
-        added so many lanes apart.
+        added so many lanes further on.
         """
         # What is seen in a mirror is smoothed over cells; where light comes from needs no smoothing.
         jitter = 1.0 if bounce == 0 else 0.0
@@ -224,7 +222,7 @@ class Shader:
             first = None if square is None else dr.gather(Array4f, square, path.lane)
             dr.eval(first)
             square = None
-            direct, step = self._go_on(cache, path, opaque(least), first, opaque(apart))
+            direct, step = self._go_on(cache, path, opaque(least), first, opaque(transmitted_at))
             scatter_add(radiance, direct, path.lane)
             scatter_add(radiance, step.sent, step.path.lane)
             self._add_missing(radiance, cache, step, jitter=jitter, heard=heard)
@@ -300,7 +298,7 @@ class Shader:
         return Array3f(dr.select(path.carries, path.throughput * lit.emission, 0.0)), step
 
     def _go_on_kernel(
-        self, cache: LightCache, path: Path, least: Any, square: Any, apart: Any
+        self, cache: LightCache, path: Path, least: Any, square: Any, transmitted_at: Any
     ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
@@ -311,7 +309,7 @@ class Shader:
         is_alive = scattered.is_alive & (rng.next_float32() < chance)
         blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
         ahead = Path(
-            lane=_layered(path, lit, scattered, apart),
+            lane=_layered(path, lit, scattered, transmitted_at),
             rays=scattered.rays,
             bounce=scattered.bounce,
             throughput=Array3f(dr.select(is_alive, throughput / chance, 0.0)),
@@ -364,17 +362,19 @@ def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any,
         heard(Estimates.of(np.array(key)[:count], values))
 
 
-def _layered(path: Path, lit: Lit, scattered: Scattered, apart: Any) -> Any:
+def _layered(path: Path, lit: Lit, scattered: Scattered, transmitted_at: Any) -> Any:
     """Where the light of paths goes that are scattered on: what comes through clear surfaces, apart; UInt.
 
-    What one pane lets through and another reflects, or the other face of the same, is a reflection.
+    What one pane lets through and another reflects, or the other face of the same, is a reflection; total
+    reflection inside of glass, where nothing else is possible, is not.
     """
-    normal = lit.surfaces.normal
+    normal, bounce = lit.surfaces.normal, scattered.bounce
     is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, scattered.rays.direction) > 0.0
     if path.bounce is None:
-        return path.lane + dr.select(scattered.bounce.is_delta & is_through, apart, 0)
-    is_clear = scattered.bounce.is_delta & (lit.surfaces.surface == int(SurfaceClass.TRANSPARENT))
-    return path.lane - dr.select(is_clear & ~is_through & (path.lane >= apart), apart, 0)
+        return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
+    is_clear = bounce.is_delta & (lit.surfaces.surface == int(SurfaceClass.TRANSPARENT))
+    is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
+    return path.lane - dr.select(is_back, transmitted_at, 0)
 
 
 def _known(cache: LightCache, spot: _Spot) -> tuple[Any, Any]:

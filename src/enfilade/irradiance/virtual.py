@@ -12,15 +12,15 @@ import numpy.typing as npt
 
 from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque, rows, vector3
 from enfilade.camera import Camera
-from enfilade.irradiance.cache import BEHIND
 from enfilade.irradiance.paths import Path, begun, chosen
 from enfilade.pixels.rays import pinhole_directions
 from enfilade.pixels.replay import recorded
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import LightRenderer, Rays
 
-__all__ = ["VirtualImages"]
+__all__ = ["BEHIND", "VirtualImages"]
 
+BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror or through glass
 CLEAR = (SurfaceClass.TRANSPARENT,)
 SHARP = (SurfaceClass.MIRROR, *CLEAR)
 ENDLESS = 1e4  # times as far as a mirror seems what it shows of the sky
@@ -39,7 +39,7 @@ class VirtualImages:
         """What mirrors, and panes as far as they are mirrors, show in a frame, where it seems to be.
 
         Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
-        :data:`~enfilade.irradiance.cache.BEHIND` added to the item's number, and the depth that of the
+        :data:`BEHIND` added to the item's number, and the depth that of the
         virtual image: as far away as the way to it is long, which is exact for plane mirrors. Everything else
         stays.
         """
@@ -95,7 +95,8 @@ class VirtualImages:
         for sharp in SHARP:
             is_sharp |= surfaces.surface == int(sharp)
         item = dr.select(surfaces.is_hit, surfaces.item, 0)
-        normal = dr.select(surfaces.is_hit, surfaces.normal, 0.0)
+        # All of the sky has one normal, so that it is smoothed.
+        normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
         is_image = scattered.is_alive & scattered.bounce.is_delta
         is_sharp &= surfaces.is_hit & is_image
         return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)

@@ -3,7 +3,7 @@
 Every frame is shaded by itself: camera rays, textures and lobes are exact, and the light on diffuse
 surfaces is looked up in the keyframes nearest on the path. What they don't know is path traced, for that
 lookup alone. What lobes scatter is sampled afresh in each frame, and then averaged over a few frames along
-its own motion: that of the surface, or of the virtual image in a mirror.
+its own motion: that of the surface, or of the virtual image in a mirror or behind glass.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.codec import read_parts, write_parts
-from enfilade.irradiance import LightCache, Sight, open_scattered, over_time, smoothed
+from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
 from enfilade.masks import lamp_pixels
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept, around
@@ -25,7 +25,8 @@ from enfilade.pipeline.units import REACH
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import LUMINANCE, Estimate
-from enfilade.records import F32, U8, Frame, Geometry, Mask, Shading, Source, SurfaceClass
+from enfilade.pixels.lookup import Page
+from enfilade.records import F32, LOBE_LAYERS, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 
 EDGE_CONTRAST = 0.003  # by JND of the quality: relative deviation above which a pixel takes more camera rays
@@ -81,9 +82,12 @@ class DecoupledFrames:
         color = here.seen
         if np.any(here.source == Source.SPECULAR):
             with workshop.costs.of("over time"):
-                for k, sight in enumerate(here.scattered):
-                    have = [f for f in others if k < len(parts[f].scattered)]
-                    color = color + over_time(sight, [(parts[f].scattered[k], shares[f]) for f in have])
+                for k, page in enumerate(here.scattered):
+                    have = [
+                        f for f in others if k < len(parts[f].scattered)
+                    ]  # what lacks a layer saw none of it
+                    pages = [(parts[f].scattered[k], shares[f]) for f in have]
+                    color = color + over_time(here.view.geometry, page, pages)
         # What a lobe is sampled as may be negative; what arrives is not.
         return Frame(np.maximum(color, 0.0), here.source), here.view
 
@@ -94,8 +98,7 @@ class DecoupledFrames:
             near, cache = table.around(frame)
             estimate = _seen(workshop, frame, near, cache)
         with workshop.costs.of("scatter"):
-            shown = _shown(workshop, view)
-            scattered, lobe_rays = _scattered(workshop, shown, frame, cache, estimate)
+            shown, scattered, lobe_rays = _scattered(workshop, view.geometry, frame, cache, estimate)
         source = _source(view.geometry, near, estimate.is_marked, is_keyframe=frame in table.keyframes)
         seen = estimate.shading.color.reshape(*source.shape, 3)
         dropped = scattered[0].dropped + estimate.shading.dropped
@@ -111,9 +114,9 @@ class DecoupledFrames:
         workshop = self._workshop
         file, view = workshop.run.file("raw", workshop.number(frame)), workshop.views[frame]
         workshop.run.check(file)
-        shown = _shown(workshop, view)
         with workshop.costs.of("files"):
             seen, scattered, source = read_parts(file)
+        shown = _shown(workshop, view.geometry, len(scattered))
         return _parts(workshop, view, shown, seen, scattered, source)
 
 
@@ -123,7 +126,7 @@ class _Parts:
 
     view: View
     seen: F32
-    scattered: list[Sight]
+    scattered: list[Page]
     source: U8
 
 
@@ -138,17 +141,14 @@ def _parts(
     where = _grown(source == Source.SPECULAR)
     with workshop.costs.of("over time"):
         pairs = zip(shown, scattered, strict=True)
-        sights = [open_scattered(geometry, shading, where) for geometry, shading in pairs]
-    return _Parts(view, seen, sights, source)
+        pages = [open_scattered(geometry, shading, where) for geometry, shading in pairs]
+    return _Parts(view, seen, pages, source)
 
 
-def _shown(workshop: Workshop, view: View) -> list[Geometry]:
-    """What a frame's lobes show, where it seems to be: reflected; and seen through clear surfaces, if any."""
-    geometry, images = view.geometry, workshop.virtual_images
-    shown = [images.reflected(geometry)]
-    if np.any(geometry.surface == SurfaceClass.TRANSPARENT):
-        shown.append(images.transmitted(geometry))
-    return shown
+def _shown(workshop: Workshop, geometry: Geometry, layers: int) -> list[Geometry]:
+    """What so many of a frame's lobe layers show, where it seems to be."""
+    images = workshop.virtual_images
+    return [image(geometry) for image in (images.reflected, images.transmitted)[:layers]]
 
 
 def _seen(workshop: Workshop, frame: int, view: LightCache, cache: LightCache) -> Estimate:
@@ -188,37 +188,41 @@ def _source(
 
 
 def _scattered(
-    workshop: Workshop, shown: Sequence[Geometry], frame: int, cache: LightCache, seen: Estimate
-) -> tuple[list[Shading], int]:
+    workshop: Workshop, geometry: Geometry, frame: int, cache: LightCache, seen: Estimate
+) -> tuple[list[Geometry], list[Shading], int]:
     """What surfaces scatter by all but their diffuse lobes, (H, W), smoothed; and by how many rays.
 
-    As many images as there are of what the frame shows.
-
-    All pixels take as many: a second pass over the scene for those where noise is left would cost what
+    In the layers of ``records.LOBE_LAYERS`` that are not empty, but for the first, each with what it shows.
+    All pixels take as many rays: a second pass over the scene for those where noise is left would cost what
     half as many more for all do.
     """
     path, settings = workshop.job.path, workshop.job.settings
     where = _grown(seen.is_marked.reshape(path.height, path.width))
     if not where.any():
-        size = path.height, path.width
-        return [Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)) for _ in shown], 0
+        return [geometry], [_black(where.shape)], 0
     camera = path.cameras[frame]
     scattered = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
         lambda rays, rng, square: workshop.shader.scattered(
-            cache, rays, rng, square, pixel_angle=camera.pixel_angle, layers=len(shown)
+            cache, rays, rng, square, pixel_angle=camera.pixel_angle
         ),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
         random=workshop.random(frame, Purpose.SCATTER),
-        layers=len(shown),
+        layers=len(LOBE_LAYERS),
         is_stratified=True,
     )
     light = settings.light
     scattered.add(light.lobe_samples or _between(LOBE_SAMPLES, math.sqrt(light.quality)))
-    pairs = zip(shown, scattered.shadings, strict=True)
-    return [smoothed(geometry, shading.spread(where), where) for geometry, shading in pairs], scattered.paths
+    reflected, *more = (shading.spread(where) for shading in scattered.shadings)
+    layers = [reflected, *(layer for layer in more if layer.color.any())]
+    shown = _shown(workshop, geometry, len(layers))
+    return shown, smoothed(shown, layers, where), scattered.paths
+
+
+def _black(size: tuple[int, ...]) -> Shading:
+    return Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32))
 
 
 def _between(samples: tuple[float, int, int], quality: float) -> int:

@@ -19,7 +19,7 @@ from enfilade.pipeline.kept import Kept, nearest
 from enfilade.pipeline.workshop import Workshop
 from enfilade.pixels.estimate import Estimate, Samples
 from enfilade.pixels.lookup import Page
-from enfilade.records import LightPage
+from enfilade.records import LOBE_LAYERS, LightPage
 from enfilade.renderer import PixelFilter, Purpose
 
 COARSER = 2  # times fewer pixels across than a frame has
@@ -152,6 +152,7 @@ class Drafts:
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.BOX,
             random=self._workshop.random(frame, Purpose.SCOUT),
+            layers=len(LOBE_LAYERS),
             is_stratified=True,
         )
         rays.add(LOBE_SPP)

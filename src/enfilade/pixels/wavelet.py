@@ -132,23 +132,6 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
     return total / weight, total_variance / whole, squares / whole
 
 
-def without_speckles(color: Any, *, width: int, height: int, times: float) -> Any:
-    """An image without pixels that outshine all their neighbours; Array3f.
-
-    A rare path that finds much light makes one pixel glare. No smoothing spreads so much over so few pixels:
-    it becomes a blot. A little light is lost.
-
-    Parameters
-    ----------
-    color : Array3f
-        Image, width * height lanes.
-    width, height
-    times
-        The brightest neighbour's luminance: where more is cut to that.
-    """
-    return color * _kept(color, width=width, height=height, times=times, rank=1)
-
-
 def with_spread_speckles(
     color: Any, variance: Any, guide: Guide, *, times: float, levels: int
 ) -> tuple[Any, Any]:
@@ -170,7 +153,7 @@ def with_spread_speckles(
     color : Array3f
     variance : Float
     """
-    kept = _kept(color, width=guide.width, height=guide.height, times=times, rank=2)
+    kept = share_without_speckles(color, width=guide.width, height=guide.height, times=times, rank=2)
     beyond = 1.0 - kept
     spread, spread_variance = smooth(
         beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
@@ -178,8 +161,22 @@ def with_spread_speckles(
     return kept * color + spread, kept * kept * variance + spread_variance
 
 
-def _kept(color: Any, *, width: int, height: int, times: float, rank: int) -> Any:
-    """Part of each pixel that is at most some times its brightest neighbour, or the one of a later rank."""
+def share_without_speckles(color: Any, *, width: int, height: int, times: float, rank: int = 1) -> Any:
+    """What part of each pixel of an image does not outshine all its neighbours; Float.
+
+    A rare path that finds much light makes one pixel glare. No smoothing spreads so much over so few pixels:
+    it becomes a blot. Where it is cut, a little light is lost.
+
+    Parameters
+    ----------
+    color : Array3f
+        Image, width * height lanes.
+    width, height
+    times
+        The brightest neighbour's luminance: what is beyond that is cut.
+    rank
+        1 for the brightest neighbour, 2 for the second brightest.
+    """
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
     luminance = dr.abs(dr.dot(color, Array3f(*LUMINANCE)))

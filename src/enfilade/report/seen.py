@@ -12,7 +12,7 @@ import numpy as np
 from enfilade import __version__
 from enfilade.codec import read_exr
 from enfilade.errors import ImageError, RunFolderError
-from enfilade.records import F32, U8, Flow
+from enfilade.records import F32, LOBE_LAYERS, U8, Flow
 from enfilade.report.alive import silent_since
 from enfilade.settings import MaskSettings, VideoSettings, ViewingSettings
 from enfilade.store import Run, tally
@@ -182,9 +182,9 @@ class SeenRun:
             raise ImageError(f"{file} holds no image of {size[1]}x{size[0]} pixels")
         color = color.astype(np.float32)
         # What mirrors, glass and gloss show is kept apart until the end.
-        for apart in ("scattered", "transmitted"):
-            if is_raw and apart in layers:
-                color += layers[apart]
+        for name in LOBE_LAYERS if is_raw else ():
+            if name in layers:
+                color += layers[name]
         if not np.isfinite(color).all():
             raise ImageError(f"{file} holds pixels that are NaN or infinite")
         source = layers.get("source")
