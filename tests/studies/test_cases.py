@@ -18,11 +18,11 @@ from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement, Settings
 from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
 from enfilade.studies.cases import times as table2
-from enfilade.studies.cases.case import stretch_of
 from enfilade.studies.cases.filtering import antialiased
 from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from enfilade.studies.cases.plain import PlainlyLit
 from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
+from enfilade.studies.cases.speed import mean_cost, spread_over
 from enfilade.studies.cases.windows import Windows, probes_of
 from scenes_analytic import room, room_walk
 from small_runs import job_of
@@ -197,29 +197,32 @@ def test_frames_that_are_left_out_are_stood_for_by_their_neighbours(plain):
 # --- 2: predictions
 
 
-def row(middle, depth, percent, still, *, is_split):
+def row(first, last, depth, percent, still, *, is_split, middle=1):
     return {
-        "middle": middle, "depth": depth, "percent_visible": percent,
+        "first": first, "last": last, "middle": middle, "depth": depth, "percent_visible": percent,
         "percent_visible_no_pursuit": still, "is_split": is_split,
     }  # fmt: skip
 
 
 def test_predictions_by_hand():
     segments = [
-        row(5, 0, 20.0, 8.0, is_split=True),
-        row(2, 1, 4.0, 2.0, is_split=False),
-        row(7, 1, 12.0, 11.0, is_split=False),  # splitting helped no more
-        row(15, 0, 2.0, 1.0, is_split=False),
-        row(None, 0, 0.0, 0.0, is_split=False),  # nothing between its keyframes
+        row(0, 10, 0, 20.0, 8.0, is_split=True),
+        row(0, 4, 1, 4.0, 2.0, is_split=False),
+        row(4, 10, 1, 12.0, 11.0, is_split=False),  # splitting helped no more
+        row(10, 14, 0, 2.0, 1.0, is_split=False),
+        row(14, 15, 0, 0.0, 0.0, is_split=False, middle=None),  # nothing between its keyframes
     ]
     found = statistics.predictions(segments, 10.0)
     assert (found["initial"], found["split"], found["remaining"]) == (2, 1, 3)
-    assert found["before"] == 11.0
-    assert found["after"] == 6.0
-    assert (found["before_still"], found["after_still"]) == (4.5, pytest.approx(14.0 / 3.0))
+    assert found["before"] == pytest.approx((9 * 20.0 + 3 * 2.0) / 12)
+    assert found["after"] == pytest.approx((3 * 4.0 + 5 * 12.0 + 3 * 2.0) / 11)
+    assert (found["split_before"], found["split_after"]) == (20.0, (3 * 4.0 + 5 * 12.0) / 8)
+    assert found["before_still"] == pytest.approx((9 * 8.0 + 3 * 1.0) / 12)
+    assert found["after_still"] == pytest.approx((3 * 2.0 + 5 * 11.0 + 3 * 1.0) / 11)
     assert found["split_not_seen_still"] == 1
     assert found["seen_still_not_split"] == 1
     assert found["given_up"] == 1
+    assert statistics.predictions(segments[3:], 10.0)["split_before"] is None
 
 
 # --- 4: times
@@ -251,10 +254,14 @@ def test_the_paper_s_ratios():
     )
 
 
-def test_the_stretch_lies_on_the_path():
-    path = room_walk(20)
-    assert stretch_of(path, 6) == range(6, 12)
-    assert stretch_of(path, 50) == range(20)
+def test_judged_frames_are_spread_over_the_walk():
+    assert spread_over(200, 4) == [25, 75, 124, 174]
+    assert spread_over(3, 1) == [1]
+
+
+def test_the_speed_of_other_hours_is_averaged():
+    slow, fast = ({name: {"wall": s, "cpu": 2.0 * s} for name in ("centre", "gaussian")} for s in (3.0, 1.0))
+    assert mean_cost([slow, fast])["gaussian"] == {"wall": 2.0, "cpu": 4.0}
 
 
 # --- 5: velocity threshold
@@ -328,10 +335,14 @@ def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them(tmp_path):
     near = separation.outlines(plain.geometry(most["frame"] - 1).item)
     viewer = Viewer(plain.job.viewing, plain.job.settings)
     changed = separation.changed_pixels(viewer, example["together"], example["apart"])
-    np.testing.assert_array_equal(example["ghost"] > 0.0, changed & ~near)
+    wanted = viewer.shown(example["reference"])
+    shown = [np.abs(viewer.shown(example[name]) - wanted) for name in ("together", "apart")]
+    ghosts = changed & ~near & (shown[0] > shown[1])
+    np.testing.assert_array_equal(example["ghost"] > 0.0, ghosts)
+    assert most["ghosts"]["count"] == ghosts.sum()
     assert most["outlines"]["pixels"] == pytest.approx(100.0 * (changed & near).mean())
     effect = {where: most[where]["effect"]["motion"]["score"] for where in ("ghosts", "outlines")}
-    assert effect["ghosts"] == pytest.approx(score_in(example["motion"], changed & ~near))
+    assert effect["ghosts"] == pytest.approx(score_in(example["motion"], ghosts))
     assert min(effect.values()) > score_in(example["motion"], ~changed)
 
 

@@ -1,5 +1,6 @@
 """The document of the case studies: tables and figures of made-up and of small results."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from enfilade.codec import write_arrays
 from enfilade.errors import InputError
 from enfilade.studies.cases.blocks import BLOCKS
-from enfilade.studies.cases.document import replaced, write_document
+from enfilade.studies.cases.case import Measured, code_digest
+from enfilade.studies.cases.document import check_blocks, replaced, write_document
 from enfilade.studies.cases.runner import ITEMS, forecast_s
 from enfilade.studies.cases.terms import TERMS
 from made_up_runs import made_up_summary
@@ -61,14 +63,14 @@ def supported():
 def timed():
     stages = {"trace": {"cpu_s": 1.5, "wall_s": 0.8}, "pilot": {"cpu_s": 0.5, "wall_s": 0.2}}
     frames = [said(2.0, 3.0), said(4.0, 5.0)]
-    own = {"cpu_s": 2.0, "wall_s": 1.0}
+    own = {"cpu_s": 2.0, "wall_s": 1.0, "worth_paths": 2.5}
     return {
         "numbers": [3, 9], "reference_spp": 64, "crop": [8, 6], "art_is_bound": True,
         "art_series": [{"spp": 4, "frames": [said(6.0, 9.0)]}, {"spp": 8, "frames": frames}],
         "path_us": {"centre": {"wall": 1.0, "cpu": 2.0}, "gaussian": {"wall": 1.0, "cpu": 2.0}},
         "ways": {
-            "art": {"spp": 8, "frames": frames, "cpu_s": 13.0, "wall_s": 7.0},
-            "rt": {"spp": 4, "frames": None, "cpu_s": 3.0, "wall_s": 2.0},
+            "art": {"spp": 8, "frames": frames, "cpu_s": 13.0, "wall_s": 7.0, "worth_paths": 8.0},
+            "rt": {"spp": 4, "frames": None, "cpu_s": 3.0, "wall_s": 2.0, "worth_paths": 3.5},
             "ibr_rt": {"spp": 4, "frames": frames, **own, "stages": stages},
             "decoupled": {"spp": None, "frames": frames, **own, "stages": stages},
         },
@@ -77,9 +79,10 @@ def timed():
 
 def separated():
     both = {how: said(2.0, 50.0) for how in ("motion", "still")}
-    kinds = ("effect", "reference together", "reference apart", "raw together", "raw apart")
-    place = {"pixels": 1.5, "deg_s": 3.0, **dict.fromkeys(kinds, both)}
-    return {"frames": [{"frame": 7, "ghosts": place, "outlines": place | {"deg_s": None}}], "example": 7}
+    kinds = ("effect", "reference together", "reference apart", "raw together")
+    place = {"count": 200, "pixels": 1.5, "deg_s": 3.0, **dict.fromkeys(kinds, both)}
+    few = place | {"count": 199}
+    return {"frames": [{"frame": 7, "ghosts": few, "outlines": place | {"deg_s": None}}], "example": 7}
 
 
 def reflected():
@@ -102,7 +105,8 @@ def results():
     summary = made_up_summary()
     segments = [s | {"depth": 0} for s in summary["segments"]]
     counts = dict.fromkeys(("initial", "split", "remaining", "given_up", "split_not_seen_still"), 3)
-    means = dict.fromkeys(("before", "after", "before_still", "after_still"), 4.25)
+    means = dict.fromkeys(("before", "after", "before_still", "after_still", "split_before"), 4.25)
+    means |= {"split_after": None}
     placements = [placed(0.0, 4.0, 2), placed(0.5, 2.0, 2), placed(None, 5.0, 2)]
     shares = {
         "table1": summary["table1"],
@@ -124,7 +128,11 @@ def results():
         "separation": separated(),
         "reflections": {"frames": []},
     }  # fmt: skip
-    return {"room": room, "atrium": {**room, "reflections": reflected()}}
+    found = {"room": room, "atrium": {**room, "reflections": reflected()}}
+    return {
+        scene: {name: Measured(of, "2026-11-22", code_digest()) for name, of in items.items()}
+        for scene, items in found.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -172,16 +180,20 @@ def test_tables_have_ours_beside_the_papers(written):
     assert "changes the holes of uniform spacing by -50 %, equal flow by +25 %" in block(text, "placement")
     assert "| atrium | paper | 2.4 | 40.8 | 0.3 | 6.0 | 49.5 |" in block(text, "shares")
     times = block(text, "times")
-    assert "| room | ART | at least 8 | 6.9 | at least 13.00 | at least 6.50 | 6.27 | 3.0 | 4.0 |" in times
-    assert "| room | RT | 4 | 1.5 | 3.00 | 1.50 | 1.36 |  |  |" in times
-    assert "| atrium | `decoupled` |  |  | 2.00 | 1.00 |  | 3.0 | 4.0 |" in times
-    assert "| room | IBR+RT (`paper`) | 8 | 13.0 | 6.5 | 6.3 |" in times
+    bound = "| room | ART | at least 8 | 6.9 | at least 13.00 | at least 8.00 | at least 3.20 | 6.27 |"
+    assert f"{bound} 3.0 | 4.0 |" in times
+    assert "| room | RT | 4 | 1.5 | 3.00 | 3.50 | 1.40 | 1.36 |  |  |" in times
+    assert "| atrium | `decoupled` |  |  | 2.00 | 2.50 | 1.00 |  | 3.0 | 4.0 |" in times
+    assert "| room | IBR+RT (`paper`) | 8 | 3.2 | 6.3 |" in times
     assert "| room, no noise | none | 8.00 | 7.50 |" in block(text, "threshold")
     assert "| room, 4 paths | 0.7 |" in block(text, "threshold")
     assert "| 16 on | 3.4 px, 11 frames | 2.5 | 3 px, 11 frames | 2.0 |" in block(text, "supports")
     assert "| room | 7 | outlines | 1.50 | – | 2.00 | 2.00 | 2.00 | 2.00 | 50.0 |" in block(
         text, "separation"
     )
+    assert "| room | 7 | ghosts |" not in block(text, "separation")  # fewer than 200 pixels
+    assert "*Measured: ROOM 2026-11-22; ATRIUM 2026-11-22.*" in block(text, "separation")
+    assert "| room | no noise | 4.25 | 4.25 | 4.25 | – |" in block(text, "statistics")
     assert "ROOM has no mirrors." in block(text, "reflections")
 
 
@@ -195,6 +207,23 @@ def test_text_by_hand_stays_and_what_was_not_measured_too(results, written, tmp_
     assert target.read_text().startswith(start)
 
 
+def test_what_older_code_measured_is_said_to_be_so(results, written, tmp_path):
+    target, other = written[0], tmp_path / "case-studies.md"
+    room, atrium = (results[scene]["shares"] for scene in ("room", "atrium"))
+    older = dataclasses.replace(room, date="2026-10-01", code="0123")
+    write_document({"room": {"shares": older}, "atrium": {"shares": atrium}}, SMALL, tmp_path, target, other)
+    said = "*Measured: ROOM 2026-10-01, by older code; ATRIUM 2026-11-22.*"
+    assert said in block(other.read_text(), "shares")
+
+
+def test_a_document_without_a_block_is_refused_before_anything_is_measured(tmp_path):
+    check_blocks(TEMPLATE)
+    file = tmp_path / "case-studies.md"
+    file.write_text(TEMPLATE.read_text().replace("<!-- shares -->", ""))
+    with pytest.raises(InputError, match="no block <!-- shares -->"):
+        check_blocks(file)
+
+
 def test_a_block_is_replaced_and_the_rest_stays():
     text = "before\n<!-- a -->\nold\n<!-- /a -->\nafter\n<!-- b -->\n<!-- /b -->\n"
     new = replaced(text, "a", r"new \1")
@@ -205,7 +234,7 @@ def test_a_block_is_replaced_and_the_rest_stays():
 
 
 def test_the_forecast_grows_with_paths_and_shrinks_with_cores():
-    small, full = (forecast_s(("room", "atrium"), TERMS[name], 2) for name in ("small", "full"))
+    small, full = (forecast_s(("room", "atrium"), ITEMS, TERMS[name], 2) for name in ("small", "full"))
     assert 60.0 < small < 900.0
     assert full > 3.0 * small
-    assert forecast_s(("room", "atrium"), TERMS["small"], 4) == pytest.approx(small / 2.0)
+    assert forecast_s(("room", "atrium"), ITEMS, TERMS["small"], 4) == pytest.approx(small / 2.0)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):
 
     def stored(**other):
         terms = dataclasses.replace(TERMS["small"], **other)
-        return Case("room", terms, tmp_path, Silence()).stored("item", make, ("spp", "size"))
+        return Case("room", terms, tmp_path, Silence()).stored("item", make, ("spp", "size")).result
 
     assert stored() == {"value": 1}
     assert stored() == {"value": 1}
@@ -92,6 +93,8 @@ def test_a_walkthrough_of_other_settings_is_not_taken_for_this_one(tmp_path):
     first = case_of().rendered()
     again = case_of().rendered()
     assert again["table2"] == first["table2"]  # nothing was rendered again
+    assert again["path_s"] == first["path_s"]  # of the hour in which it was
+    assert first["path_s"]["gaussian"]["cpu"] > 0.0
     with pytest.raises(RunFolderError, match=r"settings\.trace\.seed.*\n.*delete .*paper to begin anew"):
         case_of(seed=7).rendered()
 
@@ -125,7 +128,8 @@ def test_a_scene_is_measured_once(tmp_path):
     terms = dataclasses.replace(TERMS["small"], size=(32, 24), spp=2)
     items = ("statistics", "shares")
     told = Told()
-    found = measure(("room",), items, terms, tmp_path, told)["room"]
+    measured = measure(("room",), items, terms, tmp_path, told)["room"]
+    found = {name: one.result for name, one in measured.items()}
     assert told.stages
     summary = found["statistics"]["summary"]
     assert len(walkthrough_figure(summary).axes) == 3
@@ -138,5 +142,11 @@ def test_a_scene_is_measured_once(tmp_path):
     assert found["shares"]["specular_seen"] == 0.0
 
     again = Told()
-    assert measure(("room",), items, terms, tmp_path, again)["room"] == found
+    assert measure(("room",), items, terms, tmp_path, again)["room"] == measured
     assert again.stages == []
+    # Of scenes that are not asked for, what is there is told.
+    assert measure(("atrium",), (), terms, tmp_path, again) == {"room": {}, "atrium": {}}
+    (tmp_path / "atrium").mkdir(exist_ok=True)
+    for file in (tmp_path / "room").glob("*.json"):
+        shutil.copy(file, tmp_path / "atrium")
+    assert measure(("room",), items, terms, tmp_path, again)["atrium"].keys() == set(items)

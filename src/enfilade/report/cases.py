@@ -113,7 +113,7 @@ def _predictions(ax: Any, segments: Sequence[Mapping[str, Any]], limit: float) -
 
 
 def draw_times(found: Scenes, file: Path) -> Path:
-    """Table 2: CPU time of a frame and what it is spent on; error over CPU time, ART by its paths."""
+    """Table 2: CPU time of a frame and what it is spent on, each in its own hours; error over its worth."""
     figure, axes = _grid(len(found), 2, (5.6, 2.7), ratios=(1.3, 1.0))
     for (left, right), (scene, of) in zip(axes, found.items(), strict=True):
         shown = [way for way in WAYS if way != "art"]
@@ -127,7 +127,7 @@ def draw_times(found: Scenes, file: Path) -> Path:
         _titled(left, f"{scene}: a frame", "CPU time, s", "")
         left.grid(axis="x", color="#DDDDDD", linewidth=0.6)
         _error_over_time(right, of)
-        _titled(right, "error against the reference", "CPU time of a frame, s", "JND")
+        _titled(right, "error against the reference", "CPU time of a frame, in paths a pixel", "JND")
     handles, labels = _by_label(axes[:, 0])
     figure.legend(handles, labels, loc="outside lower left", fontsize=8, frameon=False, ncols=len(labels))
     axes[0][1].legend(fontsize=7.5, frameon=False)
@@ -135,18 +135,17 @@ def draw_times(found: Scenes, file: Path) -> Path:
 
 
 def _error_over_time(ax: Any, of: Mapping[str, Any]) -> None:
-    art = of["ways"]["art"]
-    cost = [art["cpu_s"] * row["spp"] / art["spp"] for row in of["art_series"]]
+    cost = [row["spp"] for row in of["art_series"]]
     error = [_mean_score(row) for row in of["art_series"]]
     ax.plot(cost, error, "o--", color="#7A7A7A", markersize=4, label="ART, 4 paths and more")
     for way, color, mark in (("ibr_rt", GREEN, "^"), ("decoupled", BLUE, "D")):
         one = of["ways"][way]
-        ax.plot([one["cpu_s"]], [_mean_score(one)], mark, color=color, markersize=8, label=WAYS[way])
+        ax.plot([one["worth_paths"]], [_mean_score(one)], mark, color=color, markersize=8, label=WAYS[way])
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
     ax.minorticks_off()
-    ax.set_xlim(left=0.5 * min(*cost, *(of["ways"][w]["cpu_s"] for w in ("ibr_rt", "decoupled"))))
+    ax.set_xlim(left=0.5 * min(*cost, *(of["ways"][w]["worth_paths"] for w in ("ibr_rt", "decoupled"))))
 
 
 def _mean_score(row: Mapping[str, Any]) -> float:

@@ -16,7 +16,7 @@ from enfilade.report import case_pictures as pictures_of
 from enfilade.report import cases as figures
 from enfilade.report.charts import save
 from enfilade.report.plots import walkthrough_figure
-from enfilade.studies.cases import placement, shares, times
+from enfilade.studies.cases import placement, separation, shares, times
 from enfilade.studies.cases.terms import Terms
 
 __all__ = ["BLOCKS", "FIGURES"]
@@ -68,11 +68,12 @@ def _statistics(found: Results, terms: Terms, _folder: Path, place: Path) -> tup
     rows = []
     for scene, of in found.items():
         for name, p in ((f"{of['summary']['spp']} paths", of["predictions"]), ("no noise", of["plain"])):
-            percents = (p["before"], p["after"], p["before_still"], p["after_still"])
+            keys = ("before", "after", "split_before", "split_after", "before_still", "after_still")
             counts = (p["initial"], p["split"], p["remaining"], p["given_up"], p["split_not_seen_still"])
-            rows.append((scene, name, *(f"{v:.2f}" for v in percents), *counts))
+            rows.append((scene, name, *(_or_dash(p[key]) for key in keys), *counts))
     heads = (
-        "scene", "light", "before, %", "after, %", "before, eye at rest", "after, eye at rest",
+        "scene", "light", "before, %", "after, %", "split ones before, %", "after, %",
+        "all before, eye at rest", "after, eye at rest",
         "initial segments", "splits", "remaining", "still above 10 %", "split, below it with the eye at rest",
     )  # fmt: skip
     drawn = [
@@ -101,29 +102,20 @@ def _shares(found: Results, terms: Terms, _folder: Path, _place: Path) -> tuple[
 
 def _times(found: Results, terms: Terms, _folder: Path, place: Path) -> tuple[str, list[Path]]:
     heads = (
-        "scene",
-        "way",
-        "paths",
-        "paper, min",
-        "CPU, s",
-        "over IBR+RT",
-        "paper",
-        "JND",
+        "scene", "way", "paths", "paper, min", "CPU, s", "worth, paths", "over IBR+RT", "paper", "JND",
         "above 1 JND, %",
-    )
+    )  # fmt: skip
     rows: list[tuple[Any, ...]] = []
     for scene, of in found.items():
         ours, papers = of["ways"], times.PAPER_MINUTES[scene]
         for way, name in WAYS.items():
-            one = ours[way]
-            minutes = papers.get(way)
+            one, minutes = ours[way], papers.get(way)
             bound = "at least " if way == "art" and of["art_is_bound"] else ""
-            seen = ("", "")
+            seen: tuple[str, ...] = ("", "")
             if one["frames"]:
                 seen = tuple(
-                    f"{_mean([f[key] for f in one['frames']]):{form}}"
-                    for key, form in (("score", ".1f"), ("visible_percent", ".1f"))
-                )  # type: ignore[assignment]
+                    f"{_mean([f[key] for f in one['frames']]):.1f}" for key in ("score", "visible_percent")
+                )
             rows.append(
                 (
                     scene,
@@ -131,19 +123,22 @@ def _times(found: Results, terms: Terms, _folder: Path, place: Path) -> tuple[st
                     f"{bound}{one['spp']}" if one["spp"] else "",
                     "" if minutes is None else f"{minutes:g}",
                     f"{bound}{one['cpu_s']:.2f}",
-                    f"{bound}{one['cpu_s'] / ours['ibr_rt']['cpu_s']:.2f}",
+                    f"{bound}{one['worth_paths']:.2f}",
+                    f"{bound}{one['worth_paths'] / ours['ibr_rt']['worth_paths']:.2f}",
                     "" if minutes is None else f"{minutes / papers['ibr_rt']:.2f}",
                     *seen,
                 )
             )
-    heads_equal = ("scene", "as good as", "ART takes, paths", "ART, CPU s", "times as long", "paper")
+    heads_equal = ("scene", "as good as", "ART takes, paths", "times as long", "paper")
     equal = _table(heads_equal, _equal_rows(found))
     stages = _table(("scene", "way", "stage", "CPU, s"), _stage_rows(found))
     series = _table(("scene", "ART, paths", "JND", "above 1 JND, %"), _series_rows(found))
     said = [
         f"**{scene.upper()}:** judged in frames {_listed(of['numbers'])}, {of['crop'][0]}x{of['crop'][1]} "
-        f"pixels in their middle, against {of['reference_spp']} paths a pixel; a path takes "
-        f"{of['path_us']['centre']['cpu']:.1f} µs of CPU."
+        f"pixels in their middle, against {of['reference_spp']} paths a pixel, whose noise is not counted. "
+        f"While IBR+RT was rendered a path of ART took {of['path_us']['gaussian']['cpu']:.1f} µs of CPU, one "
+        f"of RT {of['path_us']['centre']['cpu']:.1f} µs: a way is worth so many paths of ART a pixel as its "
+        "CPU time would have traced in its own hours."
         for scene, of in found.items()
     ]
     file = figures.draw_times(found, place / "times.png")
@@ -154,18 +149,15 @@ def _equal_rows(found: Results) -> list[tuple[Any, ...]]:
     """ART with as many paths as make it as good by the metric, beside what it is compared with."""
     rows: list[tuple[Any, ...]] = []
     for scene, of in found.items():
-        art, papers = of["ways"]["art"], times.PAPER_MINUTES[scene]
+        papers = times.PAPER_MINUTES[scene]
         for way in ("ibr_rt", "decoupled"):
             one = of["ways"][way]
             spp = times.equal_spp(of["art_series"], _mean([f["score"] for f in one["frames"]]))
             if spp is None:
-                rows.append((scene, WAYS[way], "beyond the series", "–", "–", ""))
+                rows.append((scene, WAYS[way], "beyond the series", "–", ""))
                 continue
-            cost = art["cpu_s"] * spp / art["spp"]
             papers_ratio = f"{papers['art'] / papers['ibr_rt']:.1f}" if way == "ibr_rt" else ""
-            rows.append(
-                (scene, WAYS[way], f"{spp:.0f}", f"{cost:.1f}", f"{cost / one['cpu_s']:.1f}", papers_ratio)
-            )
+            rows.append((scene, WAYS[way], f"{spp:.0f}", f"{spp / one['worth_paths']:.1f}", papers_ratio))
     return rows
 
 
@@ -266,18 +258,19 @@ def _separation(found: Results, terms: Terms, folder: Path, place: Path) -> tupl
         for scene, of in found.items()
         for row in of["frames"]
         for where in ("ghosts", "outlines")
+        if row[where]["count"] >= separation.FEWEST
     ]
     heads = (
         "scene", "frame", "what", "pixels, %", "deg/s", "made by separation, JND in motion", "as stills",
         "error without separation, JND", "with it", "against unfiltered, above 1 JND, %",
     )  # fmt: skip
-    names = list(_example("separation", folder, found))
     drawn = []
-    for scene in names:
+    for scene in found:
         example = _arrays(folder / scene / "separation.npz")
         drawn.append(pictures_of.draw_ghosts(example, place / f"ghosts-{scene}.png"))
     pictures = "\n\n".join(f"![{f.stem}]({FIGURES}/{f.name})" for f in drawn)
-    return _block(_plain_size(terms), _table(heads, rows), pictures), drawn
+    few = f"Where fewer than {separation.FEWEST} pixels are concerned, the row is left out."
+    return _block(_plain_size(terms), _table(heads, rows), few, pictures), drawn
 
 
 def _reflections(found: Results, terms: Terms, folder: Path, place: Path) -> tuple[str, list[Path]]:
@@ -319,10 +312,6 @@ BLOCKS: dict[str, Callable[[Any, Terms, Path, Path], tuple[str, list[Path]]]] = 
 }
 
 
-def _example(name: str, folder: Path, found: Results) -> list[str]:
-    return [scene for scene in found if (folder / scene / f"{name}.npz").is_file()]
-
-
 def _arrays(file: Path) -> dict[str, Any]:
     with np.load(file, allow_pickle=False) as held:
         return {name: held[name] for name in held.files}
@@ -354,7 +343,8 @@ def _windows(terms: Terms) -> str:
     return (
         f"*Frames of a walk with their neighbours, at even quantiles of its velocities: {terms.windows} "
         f"without noise at {w}x{h}, {terms.traced_windows} path traced at {ws}x{hs} with {terms.window_spp} "
-        f"paths, references with {terms.window_reference_spp}; 28 pixels to a degree.*"
+        f"paths, references with {terms.window_reference_spp}; 28 pixels to a degree in both, so that "
+        f"the same motion has {ws / w:.3g} times the angular velocity in the latter.*"
     )
 
 
@@ -381,4 +371,5 @@ def _mean(values: list[float]) -> float:
 
 
 def _listed(numbers: list[int]) -> str:
-    return " and ".join(str(n) for n in numbers)
+    *before, last = map(str, numbers)
+    return f"{', '.join(before)} and {last}" if before else last

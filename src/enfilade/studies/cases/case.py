@@ -6,11 +6,13 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+import enfilade
 from enfilade import __version__
 from enfilade.codec import read_json, write_json
 from enfilade.errors import RunFolderError
@@ -20,20 +22,53 @@ from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.views import Views
-from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.scenes import SceneFiles, write_scene
 from enfilade.settings import Settings
 from enfilade.studies.cases.plain import PlainlyLit
+from enfilade.studies.cases.speed import mean_cost, path_costs
 from enfilade.studies.cases.terms import PIXEL_M, Terms
 from enfilade.studies.cases.windows import Windows
 
-__all__ = ["Case", "stretch_of"]
+__all__ = ["Case", "Measured", "code_digest"]
 
 PLAIN_SPP = 64  # rays a pixel of a reference without noise
 MADE_BY = "made_by.json"  # in the scene's folder, written last
 DIGITS = 12  # of a job's checksum, by which its frames are kept
-STRETCH_AT = 0.3  # of the path: where the stretch lies that the dearer contestants render
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A result.
+
+    Attributes
+    ----------
+    result
+        As JSON has it.
+    date : str
+        On which it was measured, UTC.
+    code : str
+        Of :func:`code_digest`, then.
+    """
+
+    result: Any
+    date: str
+    code: str
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the code is still the same."""
+        return self.code == code_digest()
+
+
+@cache
+def code_digest() -> str:
+    """Checksum of the package's source, the first digits."""
+    source = Path(enfilade.__file__).parent
+    whole = hashlib.sha256()
+    for file in sorted(source.rglob("*.py")):
+        whole.update(f"{file.relative_to(source)}\n".encode() + file.read_bytes())
+    return whole.hexdigest()[:DIGITS]
 
 
 class Case:
@@ -77,14 +112,14 @@ class Case:
     @cached_property
     def survey(self) -> Survey:
         """Velocities of the whole walk."""
-        return Survey.from_dict(self.stored("survey", lambda: self._surveyed(self.whole), ("preset", "size")))
+        made = self.stored("survey", lambda: self._surveyed(self.whole), ("preset", "size"))
+        return Survey.from_dict(made.result)
 
     @cached_property
     def short_survey(self) -> Survey:
         """Velocities of the walk at the size of the windows."""
-        return Survey.from_dict(
-            self.stored("survey-short", lambda: self._surveyed(self.short), ("preset", "window_size"))
-        )
+        made = self.stored("survey-short", lambda: self._surveyed(self.short), ("preset", "window_size"))
+        return Survey.from_dict(made.result)
 
     @cached_property
     def windows(self) -> Windows:
@@ -111,11 +146,6 @@ class Case:
         """What the cameras of a job see."""
         return Views(self.renderer, job.path, job.viewing, Costs())
 
-    @property
-    def stretch(self) -> range:
-        """Frames that `decoupled` renders, of which some are judged."""
-        return stretch_of(self.whole.path, self.terms.decoupled_frames)
-
     def check(self) -> None:
         """Refuse a folder with the scene of another preset or version: nothing in it would be of use.
 
@@ -131,26 +161,46 @@ class Case:
                 f"delete {self.folder} to begin anew"
             )
 
-    def rendered(self) -> dict[str, Any]:
-        """Render the whole walk by the paper's method, or go on with it: its summary.
+    def rendered(self, method: str = "paper") -> dict[str, Any]:
+        """Render the whole walk by a method, or go on with it.
+
+        Returns
+        -------
+        dict
+            Its summary, with what a path cost (:func:`~enfilade.studies.cases.speed.path_costs`) before and
+            after each session of rendering, on the mean, as ``path_s``.
 
         Raises
         ------
         RunFolderError
             The folder holds a run of another scene, version or settings. It is not replaced: it took long.
         """
-        return self._rendered("paper", self.whole)
+        from enfilade.pipeline.walkthrough import render
 
-    def decoupled(self) -> dict[str, Any]:
-        """Render the stretch by `decoupled`, or go on with it: its summary. Raises as :meth:`rendered`."""
-        path, frames = self.whole.path, self.stretch
-        part = CameraPath(
-            path.cameras[frames.start : frames.stop], path.numbers[frames.start : frames.stop], path.fps
-        )
-        return self._rendered("decoupled", replace(self.whole, path=part, method="decoupled"))
+        file, job = self.folder / f"{method}-speed.json", replace(self.whole, method=method)
+        new = {"code": code_digest(), "is_finished": False, "path_s": []}
+        kept: dict[str, Any] = read_json(file) if file.is_file() else new
+        if kept["code"] != code_digest():
+            folder = self.folder / method
+            self.monitor.say(f"{folder} is of other code; delete it and {file} to begin anew")
 
-    def stored(self, name: str, make: Callable[[], Any], fields: Sequence[str]) -> Any:
-        """A result from its file, made now where the file is missing or was made on other terms.
+        def measure_speed(*, is_finished: bool) -> None:
+            if not kept["is_finished"]:
+                kept["path_s"].append(path_costs(self.renderer, self.whole))
+                kept["is_finished"] = is_finished
+                write_json(file, kept)
+
+        measure_speed(is_finished=False)
+        summary = render(job, self.folder / method, self.monitor)
+        measure_speed(is_finished=True)
+        return {**summary, "path_s": mean_cost(kept["path_s"])}
+
+    def stored(
+        self, name: str, make: Callable[[], Any], fields: Sequence[str], images: str | None = None
+    ) -> Measured:
+        """A result from its file, made now where a file is missing or was made on other terms.
+
+        One of other code is kept, and said to be so: it may have taken hours.
 
         Parameters
         ----------
@@ -158,20 +208,40 @@ class Case:
         make
         fields
             Of the terms, on which the result depends.
+        images
+            A file that is made with it.
         """
-        file = self.folder / f"{name}.json"
-        terms = self.terms.to_dict()
-        made_by = {"version": __version__, "terms": {field: terms[field] for field in fields}}
+        kept = self.kept(name, fields, images)
+        if kept is not None:
+            if not kept.is_current:
+                file = self._file(name)
+                self.monitor.say(f"{file} was measured on {kept.date} by other code; delete it to begin anew")
+            return kept
+        file = self._file(name)
         is_there = file.is_file()
-        if is_there:
-            held = read_json(file)
-            if held.get("made_by") == made_by:
-                return held["result"]
         result = make()
-        write_json(file, {"made_by": made_by, "result": result})
+        measured = {"date": datetime.now(UTC).date().isoformat(), "code": code_digest()}
+        write_json(file, {"made_by": self._made_by(fields), "measured": measured, "result": result})
         if is_there:
             self.monitor.say(f"{file} was made on other terms, and was made anew")
-        return read_json(file)["result"]  # as a later call will read it
+        return Measured(read_json(file)["result"], **measured)  # as a later call will read it
+
+    def kept(self, name: str, fields: Sequence[str], images: str | None = None) -> Measured | None:
+        """A result that was made before, on these terms; parameters are those of :meth:`stored`."""
+        file = self._file(name)
+        if not file.is_file() or (images and not (self.folder / images).is_file()):
+            return None
+        held = read_json(file)
+        if held.get("made_by") != self._made_by(fields):
+            return None
+        return Measured(held["result"], **held["measured"])
+
+    def _file(self, name: str) -> Path:
+        return self.folder / f"{name}.json"
+
+    def _made_by(self, fields: Sequence[str]) -> dict[str, Any]:
+        terms = self.terms.to_dict()
+        return {"version": __version__, "terms": {field: terms[field] for field in fields}}
 
     def _job(self, size: tuple[int, int], spp: int) -> Job:
         files = self._scene
@@ -195,15 +265,3 @@ class Case:
 
     def _surveyed(self, job: Job) -> dict[str, Any]:
         return survey_path(self.views(job), job.path, job.settings, self.monitor).to_dict()
-
-    def _rendered(self, name: str, job: Job) -> dict[str, Any]:
-        from enfilade.pipeline.walkthrough import render
-
-        return render(job, self.folder / name, self.monitor)
-
-
-def stretch_of(path: CameraPath, length: int) -> range:
-    """Frames of a path, `length` of them or all there are, from three tenths of its length on."""
-    length = min(length, len(path))
-    start = min(round(STRETCH_AT * len(path)), len(path) - length)
-    return range(start, start + length)

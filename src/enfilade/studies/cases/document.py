@@ -8,16 +8,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from enfilade.codec import whole_file
 from enfilade.errors import InputError
 from enfilade.studies.cases.blocks import BLOCKS, FIGURES
+from enfilade.studies.cases.case import Measured
 from enfilade.studies.cases.terms import Terms
 
-__all__ = ["replaced", "write_document"]
+__all__ = ["check_blocks", "replaced", "write_document"]
 
-Results = Mapping[str, Mapping[str, Any]]  # by scene and item
+Results = Mapping[str, Mapping[str, Measured]]  # by scene and item
 
 
 def write_document(found: Results, terms: Terms, folder: Path, template: Path, target: Path) -> list[Path]:
@@ -50,14 +50,36 @@ def write_document(found: Results, terms: Terms, folder: Path, template: Path, t
     place = target.parent / FIGURES
     files: list[Path] = []
     for name, write in BLOCKS.items():
-        results = {scene: items[name] for scene, items in found.items() if name in items}
-        if results:
+        measured = {scene: items[name] for scene, items in found.items() if name in items}
+        if measured:
+            results = {scene: one.result for scene, one in measured.items()}
             body, drawn = write(results, terms, folder, place)
             files += drawn
-            text = replaced(text, name, body)
+            text = replaced(text, name, f"{body}\n\n{_when(measured)}")
     with whole_file(target) as beside:
         beside.write_text(text, encoding="utf-8")
     return [target, *files]
+
+
+def check_blocks(template: Path) -> None:
+    """See that a document has all blocks, before hours are spent on what goes into them.
+
+    Raises
+    ------
+    InputError
+        The template lacks a block.
+    """
+    text = template.read_text(encoding="utf-8")
+    for name in BLOCKS:
+        replaced(text, name, "")
+
+
+def _when(measured: Mapping[str, Measured]) -> str:
+    said = (
+        f"{scene.upper()} {one.date}{'' if one.is_current else ', by older code'}"
+        for scene, one in measured.items()
+    )
+    return f"*Measured: {'; '.join(said)}.*"
 
 
 def replaced(text: str, name: str, body: str) -> str:

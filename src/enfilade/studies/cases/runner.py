@@ -20,18 +20,19 @@ from enfilade.studies.cases import (
     threshold,
     times,
 )
-from enfilade.studies.cases.case import Case
+from enfilade.studies.cases.case import Case, Measured
 from enfilade.studies.cases.terms import Terms
 from enfilade.studies.cases.windows import probes_of
 
-__all__ = ["ITEMS", "forecast_s", "measure"]
+__all__ = ["ITEMS", "SCENES", "forecast_s", "measure"]
 
 PATH_S = 4.5e-6  # CPU seconds of a path on one of two busy hyperthreads; for a rough forecast
 FRAME_S = 1.5  # ... and of all but tracing for a frame of 640x480
 VARIANT_S = 2.5  # ... and of filtering and judging one of 640x480 once
 VGA = 640 * 480
-VARIANTS = 160  # of filters and thresholds that are tried on a window
+VARIANTS = {"threshold": 50, "supports": 80, "separation": 15, "reflections": 15}  # tried on a window
 PATHS = {"room": 0.4, "atrium": 0.55}  # share of pixels that the paper's method traces
+SCENES = ("room", "atrium")
 LENGTHS = {"full": {"room": 448, "atrium": 200}, "small": {"room": 60, "atrium": 60}}
 
 
@@ -85,16 +86,19 @@ class Item:
         Takes a case, and returns what is kept as JSON.
     fields : tuple of str
         Of the terms, on which that depends.
+    images : str or None
+        A file that it leaves beside its JSON.
     """
 
     measure: Callable[[Case], Any]
     fields: tuple[str, ...]
+    images: str | None = None
 
 
 WHOLE = ("preset", "size", "spp")
 PLAIN = ("preset", "size", "windows")
 BOTH = (*PLAIN, "window_size", "window_spp", "window_reference_spp", "traced_windows")
-JUDGED = ("decoupled_frames", "reference_spp", "crop", "crops", "most_spp")
+JUDGED = ("reference_spp", "crop", "crops", "most_spp")
 ITEMS = {  # in the order of the paper's figures and tables
     "placement": Item(placement.measure, ("preset", "size", "sweep_step")),
     "statistics": Item(statistics.measure, WHOLE),
@@ -102,14 +106,14 @@ ITEMS = {  # in the order of the paper's figures and tables
     "times": Item(times.measure, (*WHOLE, *JUDGED)),
     "threshold": Item(_threshold, BOTH),
     "supports": Item(_supports, BOTH),
-    "separation": Item(_separation, PLAIN),
+    "separation": Item(_separation, PLAIN, "separation.npz"),
     "reflections": Item(_reflections, PLAIN),
 }
 
 
 def measure(
     scenes: Sequence[str], items: Sequence[str], terms: Terms, folder: Path, monitor: Monitor
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, dict[str, Measured]]:
     """Measure what is asked, or read it where it was measured before on the same terms.
 
     Parameters
@@ -127,36 +131,48 @@ def measure(
     Returns
     -------
     dict
-        By scene and item.
+        By scene and item, in the order of :data:`SCENES`: what was asked, and of other scenes what of it was
+        measured before.
 
     Raises
     ------
     RunFolderError
         The folder holds scenes or walkthroughs made on other terms.
     """
-    cases = {scene: Case(scene, terms, folder / scene, monitor) for scene in scenes}
-    for case in cases.values():
-        case.check()
-    found: dict[str, dict[str, Any]] = {}
-    for scene, case in cases.items():
-        asked = {name: ITEMS[name] for name in items}
+    cases = {scene: Case(scene, terms, folder / scene, monitor) for scene in SCENES}
+    for scene in scenes:
+        cases[scene].check()
+    asked = {name: ITEMS[name] for name in items}
+    found: dict[str, dict[str, Measured]] = {}
+    for scene in scenes:
+        case = cases[scene]
         found[scene] = {
-            name: case.stored(name, partial(item.measure, case), item.fields) for name, item in asked.items()
+            name: case.stored(name, partial(item.measure, case), item.fields, item.images)
+            for name, item in asked.items()
         }
-    return found
+    for scene in SCENES:
+        if scene not in scenes:
+            kept = {name: cases[scene].kept(name, item.fields, item.images) for name, item in asked.items()}
+            found[scene] = {name: one for name, one in kept.items() if one is not None}
+    return {scene: found[scene] for scene in SCENES}
 
 
-def forecast_s(scenes: Sequence[str], terms: Terms, cores: int) -> float:
-    """Roughly how long everything takes that begins anew, wall seconds: by paths and frames alone."""
+def forecast_s(scenes: Sequence[str], items: Sequence[str], terms: Terms, cores: int) -> float:
+    """Roughly how long items take that begin anew, wall seconds: by paths and frames alone."""
     whole, short = terms.size[0] * terms.size[1], terms.window_size[0] * terms.window_size[1]
     crop = min(terms.crop[0] * terms.crop[1], whole)
     total = 0.0
     for scene in scenes:
         frames = LENGTHS[terms.preset][scene]
-        spp = PATHS[scene] * frames * terms.spp
-        windows = terms.traced_windows * (25 * terms.window_spp + terms.window_reference_spp)
-        judged = terms.crops * (terms.reference_spp + 2 * terms.most_spp)
-        total += PATH_S * (whole * spp + short * windows + crop * judged)
-        total += FRAME_S * (frames + 3 * terms.decoupled_frames) * max(whole / VGA, 0.2)
-        total += VARIANT_S * VARIANTS * (terms.windows * whole + terms.traced_windows * short) / VGA
+        frame_s = FRAME_S * frames * max(whole / VGA, 0.2)
+        if not {"statistics", "shares", "times"}.isdisjoint(items):
+            total += PATH_S * whole * PATHS[scene] * frames * terms.spp + frame_s
+        if "times" in items:  # the default method, and what is judged
+            total += 1.5 * frame_s + PATH_S * crop * terms.crops * (terms.reference_spp + 2 * terms.most_spp)
+        if not {"threshold", "supports"}.isdisjoint(items):
+            windows = terms.traced_windows * (25 * terms.window_spp + terms.window_reference_spp)
+            total += PATH_S * short * windows
+        for item in VARIANTS.keys() & set(items):
+            traced = short * terms.traced_windows if item in ("threshold", "supports") else 0
+            total += VARIANT_S * VARIANTS[item] * (terms.windows * whole + traced) / VGA
     return total / max(cores, 1)

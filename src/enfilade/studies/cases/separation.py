@@ -21,6 +21,7 @@ from enfilade.studies.cases.windows import Example, Row, Windows
 __all__ = ["changed_pixels", "measure", "outlines"]
 
 GHOST_CD_M2 = 1.0  # difference on the screen, of 100, that separation makes: below it nothing is to be seen
+FEWEST = 200  # pixels of which something is said
 OUTLINE_PX = 2  # from an outline: what differs nearer to it is a matter of antialiasing
 
 
@@ -30,11 +31,12 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
     Returns
     -------
     rows : dict
-        ``frames``: of each probe its number, and for ``ghosts`` and ``outlines`` the share of ``pixels``,
-        percent, their median velocity (None where there are none), and, in motion and as stills, the score,
-        JND, and the share above 1 JND, percent: of ``together`` (without separation) and ``apart`` against
-        the frame as it should be (``reference``) and against the unfiltered one as the paper does (``raw``);
-        ``effect``: the one against the other.
+        ``frames``: of each probe its number, and for ``ghosts`` (without separation farther from the frame as
+        it should be) and ``outlines`` the ``count`` of pixels and their share, ``pixels``, percent, their
+        median velocity (None where there are none), and, in motion and as stills, the score, JND, and the
+        share above 1 JND, percent: of ``together`` (without separation) and ``apart`` against the frame as
+        it should be (``reference``), and of the former against the unfiltered one as the paper does
+        (``raw``); ``effect``: the one against the other.
     example : dict
         Images of the probe with most ghost pixels, as Fig. 10 has them: ``raw``, ``together``, ``apart``
         colours, ``ghost``, ``motion`` and ``still`` JND of together against apart, ``speed_deg_s``.
@@ -72,7 +74,8 @@ def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
 
     together, apart = filtered(separate=False), filtered(separate=True)
     changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.item)
-    places = {"ghosts": changed & ~near, "outlines": changed & near}
+    shown = [np.abs(viewer.shown(image) - viewer.shown(reference)) for image in (together, apart)]
+    places = {"ghosts": changed & ~near & (shown[0] > shown[1]), "outlines": changed & near}
     maps = {
         kind: {how: viewer.paper(test, wanted, velocity) for how, velocity in _hows(view).items()}
         for kind, (test, wanted) in {
@@ -80,19 +83,18 @@ def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
             "reference together": (together, reference),
             "reference apart": (apart, reference),
             "raw together": (together, raw),
-            "raw apart": (apart, raw),
         }.items()
     }
     row: Row = {"frame": windows.job.path.numbers[frame]}
     for place, where in places.items():
         row[place] = {
+            "count": int(where.sum()),
             "pixels": 100.0 * float(where.mean()),
             "deg_s": float(np.median(view.speed_deg_s[where])) if where.any() else None,
             **{kind: {how: _said(jnd, where) for how, jnd in by.items()} for kind, by in maps.items()},
         }
     images = {"together": together, "apart": apart, "raw": raw, "reference": reference, **maps["effect"]}
-    shown = {"ghost": places["ghosts"].astype(np.float32), "speed_deg_s": view.speed_deg_s}
-    return row, {**images, **shown}
+    return row, {**images, "ghost": places["ghosts"].astype(np.float32), "speed_deg_s": view.speed_deg_s}
 
 
 def _hows(view: View) -> dict[str, F32 | None]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from enfilade.pipeline.refine import Verdict, refine, segment_unit
 from enfilade.pipeline.survey import initial_segments
 from enfilade.pipeline.workshop import Workshop
@@ -49,21 +51,26 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
     -------
     dict
         ``initial``, ``split``, ``remaining``: numbers of segments. ``before``, ``after``: mean percentage
-        of visible differences under pursuit, of the initial ones and of those that remain;
-        ``before_still``, ``after_still``: with the eye at rest. ``split_not_seen_still``: segments
-        split although without pursuit they are below the limit. ``seen_still_not_split``: the contrary.
-        ``given_up``: above the limit, and not split since splitting helps no more.
+        of visible differences under pursuit, of the initial ones and of those that remain, weighted by
+        their in-betweens; ``split_before``, ``split_after``: the same of those alone that are split, and of
+        what they are split into, None where none is; ``before_still``, ``after_still``: of all, with the eye
+        at rest. ``split_not_seen_still``: segments split although without pursuit they are below the limit.
+        ``seen_still_not_split``: the contrary. ``given_up``: above the limit, and not split since splitting
+        helps no more.
     """
     judged = [s for s in segments if s["middle"] is not None]
     initial = [s for s in judged if s["depth"] == 0]
     remaining = [s for s in judged if not s["is_split"]]
     split = [s for s in judged if s["is_split"]]
+    wholes, parts = [s for s in split if s["depth"] == 0], [s for s in remaining if s["depth"] > 0]
     return {
         "initial": len(initial),
         "split": len(split),
         "remaining": len(remaining),
         "before": _mean(initial, "percent_visible"),
         "after": _mean(remaining, "percent_visible"),
+        "split_before": _mean(wholes, "percent_visible"),
+        "split_after": _mean(parts, "percent_visible"),
         "before_still": _mean(initial, "percent_visible_no_pursuit"),
         "after_still": _mean(remaining, "percent_visible_no_pursuit"),
         "split_not_seen_still": sum(s["percent_visible_no_pursuit"] <= limit for s in split),
@@ -72,8 +79,11 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
     }
 
 
-def _mean(segments: list[dict[str, Any]], key: str) -> float:
-    return sum(float(s[key]) for s in segments) / max(len(segments), 1)
+def _mean(segments: list[dict[str, Any]], key: str) -> float | None:
+    weights = [s["last"] - s["first"] - 1 for s in segments]
+    if not sum(weights):
+        return None
+    return float(np.average([s[key] for s in segments], weights=weights))
 
 
 def without_noise(case: Case) -> list[dict[str, Any]]:

@@ -40,8 +40,6 @@ class Terms:
         In how many frames.
     most_spp : int
         Paths a pixel up to which ART is sought; a quarter of those of the reference at most.
-    decoupled_frames : int
-        Length of the stretch that `decoupled` renders.
     """
 
     preset: str
@@ -57,7 +55,6 @@ class Terms:
     crop: tuple[int, int]
     crops: int
     most_spp: int
-    decoupled_frames: int
 
     def to_dict(self) -> dict[str, Any]:
         """As a plain table, fit for JSON."""
@@ -79,7 +76,6 @@ TERMS = {
         crop=(160, 120),
         crops=2,
         most_spp=128,
-        decoupled_frames=24,
     ),
     "full": Terms(
         preset="full",
@@ -90,11 +86,10 @@ TERMS = {
         window_spp=24,
         window_reference_spp=384,
         windows=4,
-        traced_windows=2,
+        traced_windows=4,
         reference_spp=1024,
         crop=(256, 192),
-        crops=2,
+        crops=4,
         most_spp=256,
-        decoupled_frames=24,
     ),
 }

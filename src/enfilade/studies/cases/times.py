@@ -3,12 +3,11 @@
 Under path tracing ART, "fully ray traced frames with antialiasing", is taken as: every frame traced with as
 many paths spread over the pixel as it takes until the metric sees neither aliasing nor noise against a
 reference. RT, "one sample per pixel", is: every frame traced with the keyframes' own number of paths through
-pixels' centres.
+pixels' centres. Times of different hours are compared by what a path cost in each.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,8 @@ from enfilade.pipeline.job import Job
 from enfilade.records import F32, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.studies.cases.case import Case
-from enfilade.studies.cases.seen import Viewer, visible_percent
+from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
+from enfilade.studies.cases.speed import spread_over
 
 __all__ = ["PAPER_MINUTES", "Crop", "art_spp", "equal_spp", "measure"]
 
@@ -30,7 +30,6 @@ PAPER_MINUTES = {  # Table 2, for a frame
     "room": {"art": 6.9, "rt": 1.5, "ibr_rt": 1.1},
 }
 UNSEEN_PERCENT = 1.0  # of the pixels may lie above 1 JND where the metric is said to see nothing
-TIMED_SPP, WARM_SPP = 8, 1  # paths of which one's cost is taken; before that, kernels are compiled
 REFERENCE_SALT = 1  # of the seed: the reference draws other random numbers
 
 
@@ -65,39 +64,44 @@ class Crop:
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """Time every way of rendering, and judge what it gives.
+    """Time every way of rendering the whole walk, and judge what it gives.
 
     Returns
     -------
     dict
         ``ways``: of ``art``, ``rt``, ``ibr_rt`` and ``decoupled`` wall and CPU seconds of a frame
-        (``wall_s``, ``cpu_s``), ``spp`` and by ``frames`` the ``score`` and ``visible_percent`` against the
-        reference in the crop, by the paper's metric in motion; ``stages`` where there are several.
-        ``art_series``: the same scores by number of paths. ``art_is_bound``: no number up to the most did.
-        ``path_us``: wall and CPU microseconds of a path.
+        (``wall_s``, ``cpu_s``), the latter as so many of ART's paths a pixel at the speed that the machine
+        had then (``worth_paths``), ``spp`` and by ``frames`` the ``score`` and ``visible_percent`` against
+        the reference in the crop, by the paper's metric in motion; ``stages`` where there are several.
+        Seconds of ``art`` and ``rt`` are of the hours of ``ibr_rt``. ``art_series``: the same scores by
+        number of paths. ``art_is_bound``: no number up to the most did. ``path_us``: wall and CPU
+        microseconds of a path in these hours, by pixel filter.
     """
-    summary, light = case.rendered(), case.decoupled()
-    frames = _judged_frames(case)
+    summary, light = case.rendered("paper"), case.rendered("decoupled")
+    frames = spread_over(len(case.whole.path), case.terms.crops)
     judge = _Judge(case)
     case.monitor.stage(f"{case.name}: ART and reference", len(frames) * (len(_series(case)) + 1))
     series = {spp: [judge.art(frame, spp) for frame in frames] for spp in _series(case)}
     spp, is_bound = art_spp(series)
-    cost = {f: _path_cost(case, f, frames) for f in (PixelFilter.CENTRE, PixelFilter.GAUSSIAN)}
     pixels = case.whole.path.width * case.whole.path.height
-    own = case.whole.settings.trace.spp
+    own, path_s = case.whole.settings.trace.spp, summary["path_s"]
+    ways: dict[str, dict[str, Any]] = {
+        "art": {"spp": spp, "frames": series[spp], **_scaled(path_s["gaussian"], spp * pixels)},
+        "rt": {"spp": own, "frames": None, **_scaled(path_s["centre"], own * pixels)},
+        "ibr_rt": {"spp": own, "frames": judge.run("paper", frames), **_per_frame(summary)},
+        "decoupled": {"spp": None, "frames": judge.run("decoupled", frames), **_per_frame(light)},
+    }
+    for name, way in ways.items():
+        hour = light if name == "decoupled" else summary
+        way["worth_paths"] = way["cpu_s"] / (hour["path_s"]["gaussian"]["cpu"] * pixels)
     return {
         "numbers": [case.whole.path.numbers[f] for f in frames],
         "reference_spp": case.terms.reference_spp,
         "crop": list(reversed(judge.crop.size)),
         "art_is_bound": is_bound,
         "art_series": [{"spp": n, "frames": said} for n, said in series.items()],
-        "path_us": {f.name.lower(): {k: 1e6 * v for k, v in of.items()} for f, of in cost.items()},
-        "ways": {
-            "art": {"spp": spp, "frames": series[spp], **_scaled(cost[PixelFilter.GAUSSIAN], spp * pixels)},
-            "rt": {"spp": own, "frames": None, **_scaled(cost[PixelFilter.CENTRE], own * pixels)},
-            "ibr_rt": {"spp": own, "frames": judge.run("paper", frames), **_per_frame(summary)},
-            "decoupled": {"spp": None, "frames": judge.run("decoupled", frames), **_per_frame(light)},
-        },
+        "path_us": {name: {kind: 1e6 * s for kind, s in of.items()} for name, of in path_s.items()},
+        "ways": ways,
     }
 
 
@@ -140,11 +144,6 @@ def equal_spp(series: list[dict[str, Any]], score: float) -> float | None:
     return float(np.exp(np.interp(np.log(score), known, np.log(np.array(spp)[by_score]))))
 
 
-def _judged_frames(case: Case) -> list[int]:
-    stretch, count = case.stretch, case.terms.crops
-    return [stretch.start + round((len(stretch) - 1) * (k + 0.5) / count) for k in range(count)]
-
-
 def _series(case: Case) -> list[int]:
     return [2**k for k in range(2, int(np.log2(case.terms.most_spp)) + 1)]
 
@@ -177,12 +176,15 @@ class _Judge:
         return found
 
     def _said(self, frame: int, color: F32) -> dict[str, float]:
-        reference = self._reference(frame).color
+        reference = self._reference(frame)
         velocity = self.crop.cut(self._views[frame].velocity_deg_s)
-        jnd = self._viewer.paper(color, reference, velocity)
+        # The reference's own noise is no one's error.
+        jnd = self._viewer.paper(color, reference.color, velocity, noise=reference.variance)
         everywhere = np.ones(jnd.shape, bool)
-        score = float(np.mean(jnd.astype(np.float64) ** 3.5) ** (1.0 / 3.5))
-        return {"score": score, "visible_percent": visible_percent(jnd, everywhere) or 0.0}
+        return {
+            "score": score_in(jnd, everywhere) or 0.0,
+            "visible_percent": visible_percent(jnd, everywhere) or 0.0,
+        }
 
     def _reference(self, frame: int) -> Shading:
         file = self._file(frame)
@@ -207,27 +209,6 @@ class _Judge:
         )
         size = self.crop.size
         return Shading(made.color.reshape(*size, 3), made.variance.reshape(size), made.dropped)
-
-
-def _path_cost(case: Case, pixel_filter: PixelFilter, frames: list[int]) -> dict[str, float]:
-    """Wall and CPU seconds of one path, the mean over whole frames."""
-    path, wall, cpu = case.whole.path, 0.0, 0.0
-    pixels = np.arange(path.width * path.height, dtype=np.uint32)
-    for frame in frames:
-        for spp in (WARM_SPP, TIMED_SPP):
-            begin, spent = time.perf_counter(), time.process_time()
-            case.renderer.trace(
-                path.cameras[frame],
-                pixels,
-                RandomKey(case.whole.settings.trace.seed, path.numbers[frame], Purpose.REFERENCE),
-                spp=spp,
-                pixel_filter=pixel_filter,
-            )
-            if spp == TIMED_SPP:
-                wall += time.perf_counter() - begin
-                cpu += time.process_time() - spent
-    paths = len(frames) * TIMED_SPP * len(pixels)
-    return {"wall": wall / paths, "cpu": cpu / paths}
 
 
 def _scaled(path_s: dict[str, float], paths: int) -> dict[str, float]:

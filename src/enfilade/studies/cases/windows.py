@@ -31,7 +31,7 @@ Row = dict[str, Any]  # what is measured of a frame
 Example = dict[str, F32]  # its images
 
 KEPT, VIEWS_KEPT = 64, 24  # images and views in memory: some 600 MiB at 640x480
-END_FRAMES = 8  # of a path, where a temporal filter lacks half its support
+END_FRAMES = 10  # of a path, where a temporal filter lacks half its support
 
 
 @dataclass(frozen=True, eq=False)
