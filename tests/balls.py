@@ -1,0 +1,114 @@
+"""Balls of every material in a lit corner, and panes, as Mitsuba scenes."""
+
+import numpy as np
+
+from enfilade.backends.mitsuba3 import MitsubaRenderer
+from enfilade.camera import Camera, look_at
+from enfilade.geometry import find_geometry
+from enfilade.irradiance import LightCache, Shader
+from enfilade.pixels.estimate import Estimate, Samples
+from enfilade.records import LightPage, Shading
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.settings import TraceSettings
+
+PIXEL_ANGLE = 0.02  # radians
+CONSTANT = '<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>'
+TINT = '<rgb name="{}" value="0.6, 0.4, 0.2"/>'
+ROUGH = '<float name="alpha" value="0.25"/>'
+MATERIALS = {
+    "diffuse": f'<bsdf type="diffuse">{TINT.format("reflectance")}</bsdf>',
+    "plastic": f'<bsdf type="plastic">{TINT.format("diffuse_reflectance")}</bsdf>',
+    "roughplastic": f'<bsdf type="roughplastic">{ROUGH}{TINT.format("diffuse_reflectance")}</bsdf>',
+    "conductor": '<bsdf type="conductor"/>',
+    "roughconductor": f'<bsdf type="roughconductor">{ROUGH}</bsdf>',
+    "dielectric": '<bsdf type="dielectric"/>',
+    "roughdielectric": f'<bsdf type="roughdielectric">{ROUGH}</bsdf>',
+    "thindielectric": '<bsdf type="thindielectric"/>',
+    "principled": f'<bsdf type="principled">{TINT.format("base_color")}<float name="roughness" value="0.3"/>'
+    '<float name="metallic" value="0.3"/><float name="specular" value="0.8"/></bsdf>',
+    "blend": f'<bsdf type="blendbsdf"><float name="weight" value="0.4"/><bsdf type="diffuse"/>'
+    f'<bsdf type="roughconductor">{ROUGH}</bsdf></bsdf>',
+    "mask": f'<bsdf type="mask"><float name="opacity" value="1"/>'
+    f'<bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
+    "twosided": f'<bsdf type="twosided"><bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
+    "glowing air": '<bsdf type="null"/><emitter type="area"><rgb name="radiance" value="0.4"/></emitter>',
+}
+
+
+def _plane(name: str, transform: str, color: str) -> str:
+    return (
+        f'<shape type="rectangle" id="{name}"><transform name="to_world">{transform}</transform>'
+        f'<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{color}"/></bsdf></bsdf>'
+        "</shape>"
+    )
+
+
+def _scene(balls: dict[str, str], sky: str = CONSTANT) -> str:
+    shapes = [
+        f'<shape type="sphere" id="{name}"><float name="radius" value="0.42"/>'
+        f'<point name="center" x="{i % 4 - 1.5}" y="{0.5 + i // 4}" z="0"/>{bsdf}</shape>'
+        for i, (name, bsdf) in enumerate(balls.items())
+    ]
+    shapes.append(_plane("floor", '<scale value="4"/><rotate x="1" angle="-90"/>', "0.6, 0.6, 0.5"))
+    shapes.append(_plane("back", '<scale value="4"/><translate z="-1.5"/>', "0.2, 0.5, 0.7"))
+    lamp = (
+        '<shape type="rectangle" id="lamp"><transform name="to_world"><scale value="0.8"/>'
+        '<rotate x="1" angle="90"/><translate y="4" z="1"/></transform>'
+        '<emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>'
+    )
+    # No limit of depth: where a path is cut off, the two estimators cut differently.
+    integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'
+    return f'<scene version="3.0.0">{integrator}{"".join(shapes)}{lamp}{sky}</scene>'
+
+
+def opened_scene(folder, balls: dict[str, str], sky: str = CONSTANT) -> MitsubaRenderer:
+    file = folder / "scene.xml"
+    file.write_text(_scene(balls, sky))
+    return MitsubaRenderer(file, TraceSettings())
+
+
+def pane(name: str, z: float, reflectance: float = 1.0, transmittance: float = 1.0) -> str:
+    """A ball's material, its end, and an upright pane, but for its end."""
+    return (
+        f'{MATERIALS["diffuse"]}</shape><shape type="rectangle" id="{name}"><transform name="to_world">'
+        f'<scale value="3"/><translate z="{z}"/></transform><bsdf type="thindielectric">'
+        f'<rgb name="specular_reflectance" value="{reflectance}"/>'
+        f'<rgb name="specular_transmittance" value="{transmittance}"/></bsdf>'
+    )
+
+
+def front_camera(width: int = 48, height: int = 36, x: float = 0.0) -> Camera:
+    return Camera(look_at((x, 1.8, 6), (0.6 * x, 1.5, 0)), 36, width, height)
+
+
+def scattered(renderer, camera: Camera, spp: int = 8) -> list[Shading]:
+    """In layers: reflected, transmitted."""
+    shader = Shader(renderer)
+    whole = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng, square: shader.scattered(LightCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE),
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random=RandomKey(2, 0, Purpose.SCATTER),
+        layers=2,
+        is_stratified=True,
+    )
+    whole.add(spp)
+    return whole.shadings
+
+
+def traced_page(renderer, camera: Camera) -> LightPage:
+    light = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
+        chunk=1 << 20,
+        pixel_filter=PixelFilter.CENTRE,
+        random=RandomKey(3, 0, Purpose.LIGHT),
+        layers=2,
+    )
+    light.add(256)
+    size = (camera.height, camera.width)
+    direct, indirect = (Shading(s.color.reshape(*size, 3), s.variance.reshape(size)) for s in light.shadings)
+    return LightPage(0, find_geometry(renderer, camera), direct, indirect, np.ones(size, bool))
