@@ -24,7 +24,6 @@ __all__ = ["BLOCKS", "FIGURES"]
 Results = Mapping[str, Any]  # of one item, by scene
 FIGURES = "figures/cases"  # beside the document
 WAYS = {"art": "ART", "rt": "RT", "ibr_rt": "IBR+RT (`paper`)", "decoupled": "`decoupled`"}
-HOWS = {"motion": "in motion", "still": "as stills"}
 FILTERS = {
     "none": "none",
     "full": "11 frames, the mirror's own flow",
@@ -251,7 +250,7 @@ def _separation(found: Results, terms: Terms, folder: Path, place: Path) -> tupl
             where,
             f"{row[where]['pixels']:.2f}",
             _or_dash(row[where]["deg_s"]),
-            *(_or_dash(row[where]["effect"][how]["score"]) for how in HOWS),
+            *(_or_dash(row[where]["effect"][how]["score"]) for how in ("motion", "still")),
             *(_or_dash(row[where][f"reference {kind}"]["motion"]["score"]) for kind in ("together", "apart")),
             _or_dash(row[where]["raw together"]["motion"]["visible_percent"]),
         )

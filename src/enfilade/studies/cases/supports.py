@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.antialias.support import spatial_support_px
+from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
 from enfilade.settings import AntialiasSettings
 from enfilade.studies.cases.filtering import antialiased
@@ -163,8 +164,8 @@ class _Sums:
 
 def _raised(jnd: F32, where: Mask) -> float:
     score = score_in(jnd, where)
-    return 0.0 if score is None else score**3.5 * float(where.sum())
+    return 0.0 if score is None else score**POOLING_EXPONENT * float(where.sum())
 
 
 def _rooted(mean: Any) -> Any:
-    return mean ** (1.0 / 3.5)
+    return mean ** (1.0 / POOLING_EXPONENT)
