@@ -32,6 +32,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 FRAMES, SIZE = 48, "32x24"
 EXECUTORS = [("ray", 2), ("processes", 7), ("processes", 2), ("processes", 1), ("in-process", 1)]
@@ -55,7 +56,7 @@ QUICK = {
     "bits": 5,
 }
 KINDS = tuple(COUNTS)  # those first whose trials take longest
-CLUSTER_KILLS, QUICK_CLUSTER_KILLS = 10, 5
+CLUSTER, QUICK_CLUSTER = (10, 20000), (5, 6000)  # kills, and paths a pixel of 50 frames
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
 STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
 TIMEOUT_S = 1800  # a busy machine is no failure
@@ -133,10 +134,10 @@ def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
     if arguments.jobs > 1:
         work = replace(work, seconds=work.seconds * BESIDE)
     trials: dict[str, Callable[[], Trial]] = {
-        "cluster": lambda: cluster_trial(folder, QUICK_CLUSTER_KILLS if arguments.quick else CLUSTER_KILLS),
+        "cluster": lambda: cluster_trial(folder, *(QUICK_CLUSTER if arguments.quick else CLUSTER)),
         "executors": lambda: executor_trial(work),
         "stops": lambda: stop_trial(work),
-        "mitsuba": lambda: kill_trial(mitsuba_work(folder)),
+        "mitsuba": lambda: mitsuba_trial(folder),
         "kills": lambda: kill_trial(work),
         "disk": lambda: disk_trial(work, tally),
         "bits": lambda: bit_trial(work),
@@ -285,6 +286,19 @@ def attempt(act: Callable[[], None], work: Work, out: Path, what: str) -> str | 
     return f"{what}: {problem}" if problem else None
 
 
+def mitsuba_trial(folder: Path) -> Trial:
+    """The same with a Mitsuba scene, whose run that is left alone is made by whoever comes first."""
+    first, works = Lock(), []  # of one
+
+    def trial(number: int, place: Path, chance: random.Random) -> str | None:
+        with first:
+            if not works:
+                works.append(mitsuba_work(folder))
+        return kill_trial(works[0])(number, place, chance)
+
+    return trial
+
+
 def kill_at_point(work: Work, out: Path, chance: random.Random) -> str | None:
     """The process kills itself in the middle of writing a file or a line."""
     point, number = chance.choice(POINTS), chance.randrange(1, 150)
@@ -431,13 +445,13 @@ def alone() -> tuple[str, ...]:
     return line if works else ()
 
 
-def cluster_trial(folder: Path, kills: int) -> Trial:
+def cluster_trial(folder: Path, kills: int, spp: int) -> Trial:
     """Ray, whose workers are killed one after the other while 50 units are done."""
     scene = folder / "wall.analytic.json"
 
     def trial(_number: int, place: Path, _chance: random.Random) -> str | None:
         path = walk(place / "fifty.json", 50)
-        inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", "20000")
+        inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", str(spp))
         work, out = made(place, "whole", inputs), place / "run"
         process = start([*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")])
         ledger, killed, done = out / "ledger.jsonl", 0, 0
