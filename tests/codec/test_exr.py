@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +16,7 @@ from hypothesis.extra import numpy as arrays
 
 from enfilade.codec import read_attributes, read_exr, sweep, write_exr
 from enfilade.codec.exr import color_layers
-from enfilade.errors import ImageError, RunFolderError
+from enfilade.errors import ImageError, NoSpaceError, RunFolderError
 
 KINDS = {"float16": np.float16, "float32": np.float32, "uint32": np.uint32}
 
@@ -197,12 +198,13 @@ def test_nothing_partial_is_left_where_writing_fails(tmp_path, monkeypatch):
     with pytest.raises(RunFolderError, match=r"flat/a\.exr.*run the same command"):
         write_exr(tmp_path / "flat" / "a.exr", layers)
 
-    def torn(_, name):
-        Path(name).write_bytes(before[:40])
-        raise RuntimeError("No space left on device")
+    def torn(self, data):
+        really(self, data[:40])
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(OpenEXR.File, "write", torn)
-    with pytest.raises(RunFolderError, match="No space left"):
+    really = Path.write_bytes
+    monkeypatch.setattr(Path, "write_bytes", torn)
+    with pytest.raises(NoSpaceError, match="No space left"):
         write_exr(file, layers)
     assert file.read_bytes() == before
     assert sorted(f.name for f in tmp_path.iterdir()) == ["a.exr", "flat"]

@@ -17,13 +17,6 @@ def broken(*arguments, **options):
     raise RuntimeError("OpenEXR gives no reason")
 
 
-def test_pixels_that_can_not_be_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(exr.OpenEXR, "File", broken)
-    with pytest.raises(RunFolderError, match="no reason") as seen:
-        write_exr(tmp_path / "file.exr", {"RGB": PIXELS})
-    assert whole.is_passing(seen.value.__cause__)
-
-
 def test_pixels_that_can_not_be_read(tmp_path, monkeypatch):
     file = tmp_path / "file.exr"
     write_exr(file, {"RGB": PIXELS})

@@ -7,8 +7,8 @@ positions and normals (``P``, ``N``) and ``.R .G .B`` for the rest; the layer ``
 from __future__ import annotations
 
 import contextlib
-import errno
 import functools
+import io
 import os
 import sys
 from collections import Counter
@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import OpenEXR
 
-from enfilade.codec.whole import unwritable, whole_file
+from enfilade.codec.whole import whole_file
 from enfilade.errors import ImageError
 
 __all__ = ["Array", "color_layers", "exr_pixels", "is_exr", "read_attributes", "read_exr", "write_exr"]
@@ -77,17 +77,11 @@ def write_exr(
     compression = OpenEXR.PXR24_COMPRESSION if is_portable else OpenEXR.HTJ2K256_COMPRESSION
     header = {"compression": compression, "type": OpenEXR.scanlineimage, **extra}
     _start_threads()
+    packed = io.BytesIO()  # a file of its own OpenEXR cuts short without a word where the disk is full
+    with OpenEXR.File(header, channels) as image:
+        image.write(packed)
     with whole_file(file) as beside:
-        beside.touch()  # where it can't be, the operating system says why, which OpenEXR does not
-        try:
-            with OpenEXR.File(header, channels) as image:
-                image.write(str(beside))
-            _part_headers(beside)
-        except (RuntimeError, ImageError) as error:
-            size = sum(array.nbytes for array in layers.values())
-            # OpenEXR doesn't say what the operating system said. It could be opened: it isn't forbidden.
-            cause = OSError(errno.EIO, str(error))
-            raise unwritable(file, str(error), written=beside, size=size) from cause
+        beside.write_bytes(packed.getbuffer())
 
 
 def read_exr(file: Path, *, max_pixels: int = MAX_PIXELS) -> dict[str, Array]:

@@ -36,7 +36,6 @@ LASTING = FULL | {
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.EPERM, errno.EROFS,
 }  # fmt: skip
-BLOCK = bytes(1 << 20)  # written to learn whether there is room
 NO_FLUSH = frozenset({errno.EINVAL, errno.ENOTSUP})  # folders: 9p, folders shared with virtual machines
 
 
@@ -135,9 +134,7 @@ def read_json(file: Path) -> Any:
         raise RunFolderError(f"{file} is damaged ({error}); delete it or its folder") from error
 
 
-def unwritable(
-    file: Path, reason: OSError | str, *, written: Path | None = None, size: int = 0
-) -> EnfiladeError:
+def unwritable(file: Path, reason: OSError | str) -> EnfiladeError:
     """Describe a file that can't be written, and what to do.
 
     Parameters
@@ -145,23 +142,18 @@ def unwritable(
     file
     reason
         What the operating system or a library said.
-    written
-        What a library that gives no reason has written so far: it is tried whether more can be.
-    size
-        Bytes that it would have written at most.
 
     Returns
     -------
     NoSpaceError or RunFolderError
     """
-    has_no_room = isinstance(reason, OSError) and is_full(reason)
     if isinstance(reason, OSError) and is_passing(reason):
         return RunFolderError(
             f"can't write {file}: {reason.strerror}; look at its disk, then run the same command again: what "
             "is finished stays"
         )
     text = reason.strerror or str(reason) if isinstance(reason, OSError) else reason
-    if has_no_room or (written is not None and _has_no_room(written, size)):
+    if isinstance(reason, OSError) and is_full(reason):
         return NoSpaceError(
             f"can't write {file}: no room on the disk ({text}); what is finished stays: make room, then run "
             "the same command again"
@@ -183,17 +175,6 @@ def is_passing(error: OSError) -> bool:
 def is_full(error: OSError) -> bool:
     """Whether there is no room on the disk, or no more of it for this user."""
     return error.errno in FULL
-
-
-def _has_no_room(file: Path, size: int) -> bool:
-    try:
-        with file.open("ab", buffering=0) as raw:
-            while size > 0:
-                size -= raw.write(BLOCK[:size])
-            os.fsync(raw.fileno())
-    except OSError as error:
-        return is_full(error)
-    return False
 
 
 def flush(path: Path) -> None:
