@@ -98,3 +98,14 @@ def test_each_worker_sees_a_gpu_of_its_own(machine, work):
     work("processes", [unit(name, seconds=0.3) for name in "abcd"], device="cuda")
     seen = {(work.folder / f"{name}.gpu").read_text() for name in "abcd"}
     assert seen == {"0", "1"}
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [("pgfault 12\noom_kill 7\n", 7), ("pgfault 12\n", 0), ("", 0), ("oom_kill\n", 0), (None, 0)],
+)
+def test_what_the_kernel_killed_for_its_memory(tmp_path, monkeypatch, text, count):
+    monkeypatch.setattr(resources, "COUNTS", tmp_path / "vmstat")
+    if text is not None:
+        (tmp_path / "vmstat").write_text(text)
+    assert resources.oom_kills() == count

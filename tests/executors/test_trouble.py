@@ -213,10 +213,10 @@ def test_where_memory_is_always_too_little_units_begin_with_less(spread, crowds)
     assert len(crowd.attempts) < 100 + 16  # after each 20 that succeeded, it is tried with more
 
 
-def test_a_unit_that_is_killed_twice_has_others_begin_as_before(spread, crowds):
-    killed = iter([DIED, DIED])
+def test_a_unit_that_is_killed_three_times_has_others_begin_as_before(spread, crowds):
+    killed = iter([DIED, DIED, DIED])
     _, crowd, _ = spread(10, lambda unit: next(killed, None) if unit.name == "u003" else None, slots=1)
-    assert sorted(crowd.shares) == [*[1] * 11, 4]
+    assert sorted(crowd.shares) == [*[1] * 12, 64]
 
 
 def test_less_is_asked_of_a_machine_and_more_again():

@@ -8,8 +8,9 @@ import pytest
 
 from enfilade.codec import write_arrays
 from enfilade.errors import InputError
+from enfilade.pipeline.versions import code_digest
 from enfilade.studies.cases.blocks import BLOCKS
-from enfilade.studies.cases.case import Measured, code_digest
+from enfilade.studies.cases.case import Measured
 from enfilade.studies.cases.document import check_blocks, replaced, write_document
 from enfilade.studies.cases.runner import ITEMS, forecast_s
 from enfilade.studies.cases.terms import TERMS

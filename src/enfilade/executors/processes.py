@@ -19,6 +19,7 @@ from typing import Any
 
 from enfilade.codec.whole import unwritable
 from enfilade.executors.executor import Event, Failure, FailureKind, Hear, Recipe
+from enfilade.executors.resources import oom_kills
 from enfilade.executors.unit import Unit
 from enfilade.executors.watch import Limits, Watch
 
@@ -37,6 +38,7 @@ class _Child:
     received: bytes = b""
     unit: Unit | None = None
     watch: Watch | None = None  # of the unit
+    oom_kills: int = 0  # when it was begun
 
 
 class Processes:
@@ -95,6 +97,7 @@ class Processes:
         """
         child = self._children.get(slot) or self._spawn(slot)
         child.unit, child.watch = unit, Watch(self._limits, child.process.pid)
+        child.oom_kills = oom_kills()
         order = {"kind": unit.kind, "facts": dict(unit.facts), "share": share}
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # it died: `wait` finds it
             child.line.sendall(json.dumps(order).encode() + b"\n")
@@ -202,8 +205,10 @@ class Processes:
         code = self._end(slot)
         if unit is None:  # it had nothing in hand: the next unit gets a new worker
             return []
-        text = f"its worker {_died_of(code)}"
-        return [Event(slot, Failure(FailureKind.DIED, text, _tail(child.log)))]
+        kind, text = FailureKind.DIED, f"its worker {_died_of(code)}"
+        if code == -signal.SIGKILL and oom_kills() > child.oom_kills:
+            kind, text = FailureKind.MEMORY, f"{text}, by the kernel, which lacks memory"
+        return [Event(slot, Failure(kind, text, _tail(child.log)))]
 
     def _end(self, slot: int, grace_s: float | None = None) -> int:
         """Let a worker go; `grace_s`: it was killed, and should be gone after so long."""

@@ -1,4 +1,4 @@
-"""What this machine has for workers: the cores that this process may use, and GPUs."""
+"""What this machine has for workers: cores that this process may use, GPUs, memory that ran out."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from itertools import takewhile
 from pathlib import Path
 
-__all__ = ["cores", "gpus"]
+__all__ = ["cores", "gpus", "oom_kills"]
 
 OWN = Path("/proc/self/cgroup")
 TREE = Path("/sys/fs/cgroup")
 DEVICES = Path("/dev")
+COUNTS = Path("/proc/vmstat")
 
 
 def cores() -> int:
@@ -26,6 +27,15 @@ def gpus() -> list[str]:
     if named is not None:
         return list(takewhile(lambda name: name not in ("", "-1"), map(str.strip, named.split(","))))
     return [str(number) for number, _ in enumerate(DEVICES.glob("nvidia[0-9]*"))]
+
+
+def oom_kills() -> int:
+    """How many processes the kernel has killed for lack of memory since it began; 0 where it doesn't say."""
+    try:
+        counts = dict(line.split(" ", 1) for line in COUNTS.read_text().splitlines())
+        return int(counts.get("oom_kill", 0))
+    except (OSError, ValueError):
+        return 0
 
 
 def _quotas() -> Iterator[float]:

@@ -193,10 +193,11 @@ class _Loop:
     def _fail(self, unit: Unit, slot: int, failure: Failure, *, is_trial: bool) -> None:
         self._failures.setdefault(unit.name, []).append(failure)
         kinds = self._kinds(unit)
-        # The kernel kills who takes too much memory; but a worker that is killed once may have been unlucky.
         is_scarce = failure.kind is FailureKind.MEMORY
-        if is_scarce or (failure.kind is FailureKind.DIED and kinds.count(failure.kind) > 1):
+        if is_scarce:
             self._shares[unit.name] = min(SMALLER * self._given[slot], SMALLEST)
+        elif kinds.count(FailureKind.DIED) >= ATTEMPTS - 1:  # the last one: nothing has said why they die
+            self._shares[unit.name] = SMALLEST
         if self._is_final(failure):
             self.ending.stopped = self.ending.stopped or failure
         elif is_scarce and not self._trouble.is_on and kinds.count(failure.kind) < 3:

@@ -125,7 +125,7 @@ def encode_instead(job: Job, folder: Path, keys: Sequence[str]) -> str:
 
 def is_of_video(key: str) -> bool:
     """Whether a key of a run's identity is about its video alone."""
-    return key.startswith(("settings.video.", "view.")) or key == "versions.opencolorio"
+    return key.startswith(("settings.video.", "view.")) or key in ("versions.opencolorio", "versions.av")
 
 
 def _known(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from enfilade import __version__
 from enfilade.camera import Camera
 from enfilade.codec import read_json
 from enfilade.denoise import denoiser_name, why_no_denoiser
 from enfilade.device import active
 from enfilade.errors import CameraPathError, RunFolderError, SettingsError
+from enfilade.pipeline.versions import makers
 from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings, TraceSettings
@@ -94,7 +94,7 @@ class Job:
             "settings": settings,
             **({"view": {"processor": view["processor"]}} if view else {}),
             "versions": {
-                "enfilade": __version__,
+                **makers(),
                 "renderer": name,
                 "variant": _variant(self.scene),
                 **({"denoiser": denoiser_name()} if self._denoises else {}),
@@ -244,8 +244,8 @@ def check_identity(job: Job, run: Run) -> None:
     if job.identity() != run.identity:
         raise RunFolderError(
             f"{run.folder}: on {socket.gethostname()}, the scene, the device, the view, or the version of "
-            "enfilade, Mitsuba, the denoiser or OpenColorIO is not the one with which the run began; "
-            "`enfilade render` says what differs"
+            "enfilade or of a library is not the one with which the run began; `enfilade render` says what "
+            "differs"
         )
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import platform
 import re
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from enfilade import __version__
+from enfilade.pipeline.versions import installed
 
 __all__ = ["machine", "versions"]
 
@@ -31,13 +31,7 @@ def machine() -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Versions of what renders, encodes and judges; without what is not installed."""
-    found = {"enfilade": __version__}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
+    return {"enfilade": __version__, **installed(PACKAGES)}
 
 
 def _line(file: str, pattern: str) -> str:

@@ -14,7 +14,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from enfilade import __version__
 from enfilade.codec import write_exr, write_result
 from enfilade.denoise import denoise, denoiser_name
 from enfilade.monitor import Monitor, Silence
@@ -240,11 +239,12 @@ def _identity(job: Job, renderer: Renderer, facts: Mapping[str, Any]) -> dict[st
     whole = job.identity(renderer)
     trace = whole["settings"]["trace"]
     kept = {key: trace[key] for key in ("spp", "seed", "max_depth")}
+    versions = {name: value for name, value in whole["versions"].items() if name != "code"}  # it takes hours
     return {
         "method": job.method,
         **facts,
         "scene": whole["scene"],
         "path": whole["path"],
         "trace": kept,
-        "versions": {**whole["versions"], "enfilade": __version__},
+        "versions": versions,
     }

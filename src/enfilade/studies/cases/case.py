@@ -8,11 +8,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import enfilade
 from enfilade import __version__
 from enfilade.codec import read_json, write_json
 from enfilade.errors import RunFolderError
@@ -21,6 +20,7 @@ from enfilade.path import load_path
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import Survey, survey_path
+from enfilade.pipeline.versions import code_digest, makers
 from enfilade.pipeline.views import Views
 from enfilade.renderer import Renderer
 from enfilade.scenes import SceneFiles, write_scene
@@ -30,7 +30,7 @@ from enfilade.studies.cases.speed import mean_cost, path_costs
 from enfilade.studies.cases.terms import PIXEL_M, Terms
 from enfilade.studies.cases.windows import Windows
 
-__all__ = ["Case", "Measured", "code_digest"]
+__all__ = ["Case", "Measured"]
 
 PLAIN_SPP = 64  # rays a pixel of a reference without noise
 MADE_BY = "made_by.json"  # in the scene's folder, written last
@@ -48,7 +48,7 @@ class Measured:
     date : str
         On which it was measured, UTC.
     code : str
-        Of :func:`code_digest`, then.
+        Of :func:`~enfilade.pipeline.versions.code_digest`, then.
     """
 
     result: Any
@@ -59,16 +59,6 @@ class Measured:
     def is_current(self) -> bool:
         """Whether the code is still the same."""
         return self.code == code_digest()
-
-
-@cache
-def code_digest() -> str:
-    """Checksum of the package's source, the first digits."""
-    source = Path(enfilade.__file__).parent
-    whole = hashlib.sha256()
-    for file in sorted(source.rglob("*.py")):
-        whole.update(f"{file.relative_to(source)}\n".encode() + file.read_bytes())
-    return whole.hexdigest()[:DIGITS]
 
 
 class Case:
@@ -178,11 +168,10 @@ class Case:
         from enfilade.pipeline.walkthrough import render
 
         file, job = self.folder / f"{method}-speed.json", replace(self.whole, method=method)
-        new = {"code": code_digest(), "is_finished": False, "path_s": []}
+        new = {"code": makers()["code"], "is_finished": False, "path_s": []}
         kept: dict[str, Any] = read_json(file) if file.is_file() else new
-        if kept["code"] != code_digest():
-            folder = self.folder / method
-            self.monitor.say(f"{folder} is of other code; delete it and {file} to begin anew")
+        if kept["code"] != new["code"]:
+            kept = new
 
         def measure_speed(*, is_finished: bool) -> None:
             if not kept["is_finished"]:
