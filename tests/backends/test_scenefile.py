@@ -1,14 +1,18 @@
 """A scene is read as Mitsuba reads it: the same parameters, the same files, in the same order."""
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
 
+from enfilade.backends.mitsuba3 import MitsubaRenderer
 from enfilade.backends.mitsuba3.parsed import parsed_demands
 from enfilade.backends.scenecheck import check_scene
-from enfilade.backends.scenefile import SceneFile, fingerprint
+from enfilade.backends.scenefile import SceneFile, fingerprint, why_unreadable
 from enfilade.errors import SceneError
-from enfilade.settings import LimitSettings
+from enfilade.executors.executor import Failure, FailureKind
+from enfilade.settings import LimitSettings, TraceSettings
 
 HEAD = '<scene version="3.0.0">'
 BALL = HEAD + '<shape type="sphere"/></scene>'
@@ -185,6 +189,27 @@ def test_a_file_that_a_longer_name_includes_is_in_the_fingerprint(scene):
     before = fingerprint(file)
     (file.parent / "part.xml").write_text(f"{BALL} ")
     assert fingerprint(file) != before
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
+def test_what_the_operating_system_says_of_a_file_is_kept(scene, monkeypatch, number):
+    file = scene('<shape type="ply"><string name="filename" value="ball.ply"/></shape>')
+    (file.parent / "ball.ply").write_text("no mesh")
+    assert why_unreadable(file) is None
+    really = Path.open
+
+    def fails(self, *how, **more):
+        if self.name == "ball.ply":
+            raise OSError(number, os.strerror(number))
+        return really(self, *how, **more)
+
+    monkeypatch.setattr(Path, "open", fails)
+    with pytest.raises(SceneError, match=rf"can't read .*ball\.ply, which .* names: {os.strerror(number)}"):
+        fingerprint(file)
+    with pytest.raises(SceneError, match="can't load") as said:
+        MitsubaRenderer(file, TraceSettings())
+    kind = FailureKind.IO if number == errno.EIO else FailureKind.REFUSED
+    assert Failure.of(said.value).kind is kind
 
 
 @pytest.mark.parametrize(

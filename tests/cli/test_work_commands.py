@@ -68,9 +68,12 @@ def test_prepared_and_worked_on(run, begun, tmp_path, monkeypatch):
     video, plot = out / "video.mp4", out / "plots" / "walkthrough.png"
     assert rest.stdout == f"video   {video}\nplot    {plot}\nrun     {out}\n"
     assert plot.exists()
+    drawn = plot.read_bytes()
+    plot.write_bytes(drawn[:1000])
     again = run(*begun, "--quiet", "--verify", "--json")
     assert again.exit_code == 0, again.output
     assert json.loads(again.stdout)["frames"] == 3
+    assert plot.read_bytes() == drawn
 
 
 def test_a_scene_that_can_not_be_loaded_begins_no_run(run, camera_path, tmp_path):

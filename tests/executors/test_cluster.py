@@ -203,6 +203,23 @@ def test_a_node_that_says_nothing_is_given_up(joined, monkeypatch):
     assert said[0][2][0].startswith("a: in Ray's hands for ")
 
 
+@pytest.mark.parametrize(
+    "error", [RayError("the head node is gone"), ConnectionError("the head node is gone")]
+)
+@pytest.mark.parametrize("when", ["begin", "wait"])
+def test_a_cluster_that_is_lost_is_said(joined, when, error):
+    def lost(*_given, **_how):
+        raise error
+
+    ray, executor = joined(BIG, workers=1)
+    if when == "begin":
+        executor._do = SimpleNamespace(remote=lost)
+    ray.wait = lost
+    with pytest.raises(EnfiladeError, match="answers no more: the head node is gone; what is finished stays"):
+        executor.begin(0, Unit("a", "fine"), share=1)
+        executor.wait(None)
+
+
 def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tmp_path, monkeypatch, toys):
     ray = Ray(OutOfMemoryError("killed"), RayError("its node died"))
     monkeypatch.setitem(sys.modules, "ray", ray)

@@ -199,8 +199,9 @@ def test_a_job_goes_through_json_unchanged(whole, tmp_path):
 
 
 def test_an_unknown_executor_is_refused_before_anything_is_made(tmp_path):
-    with pytest.raises(SettingsError, match="there is no executor 'threads'"):
-        render(make_job(tmp_path), tmp_path / "run", Silence(), Crew("threads"))
+    for name, words in (("threads", "there is no executor 'threads'"), ("ray:", "lacks the address")):
+        with pytest.raises(SettingsError, match=words):
+            render(make_job(tmp_path), tmp_path / "run", Silence(), Crew(name))
     assert not (tmp_path / "run").exists()
 
 

@@ -234,12 +234,24 @@ def fingerprint(scene: Path) -> str:
     """
     digest = hashlib.sha256()
     for file in named_files(scene):
-        if file.is_file():
-            with file.open("rb") as stream:
-                digest.update(hashlib.file_digest(stream, "sha256").digest())
-        elif not file.is_dir():
-            digest.update(f"there is no {file.name}".encode())
+        try:
+            if file.is_file():
+                with file.open("rb") as stream:
+                    digest.update(hashlib.file_digest(stream, "sha256").digest())
+            elif not file.is_dir():
+                digest.update(f"there is no {file.name}".encode())
+        except OSError as error:
+            raise SceneError(f"can't read {file}, which {scene} names: {error.strerror}") from error
     return digest.hexdigest()
+
+
+def why_unreadable(scene: Path) -> OSError | None:
+    """Say what the operating system says of a scene's files, where one can't be read: libraries keep it."""
+    try:
+        fingerprint(scene)
+    except SceneError as error:
+        return error.__cause__ if isinstance(error.__cause__, OSError) else None
+    return None
 
 
 def _parsed(file: Path) -> Element:

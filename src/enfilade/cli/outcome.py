@@ -29,10 +29,10 @@ def ledger_bytes(folder: Path) -> int:
     return file.stat().st_size if file.exists() else -1
 
 
-def draw_plots(folder: Path, *, has_changed: bool) -> list[Path]:
-    """Draw what the run did; where nothing was done, what was drawn stays."""
+def draw_plots(folder: Path, *, is_new: bool) -> list[Path]:
+    """Draw what the run did, anew or where it is not drawn yet."""
     there = sorted((folder / "plots").glob("*.png"))
-    if there and not has_changed:
+    if there and not is_new:
         return there
     from enfilade.report.plots import plot_run
 

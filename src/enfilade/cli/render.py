@@ -69,7 +69,7 @@ def command(
     before = ledger_bytes(folder)
     with watch(quiet=quiet) as monitor:
         summary = render(job, folder, monitor, crew, is_verified=is_verified, is_tried=True)
-    plots = draw_plots(folder, has_changed=ledger_bytes(folder) != before)
+    plots = draw_plots(folder, is_new=is_verified or ledger_bytes(folder) != before)
     if as_json:
         extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
         click.echo(json.dumps({**summary, **extra}, indent=2))

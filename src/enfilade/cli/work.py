@@ -61,7 +61,7 @@ def command(
         if step is None:
             before = ledger_bytes(run)
             summary = go_on(run, monitor, crew)
-            plots = draw_plots(run, has_changed=ledger_bytes(run) != before)
+            plots = draw_plots(run, is_new=ledger_bytes(run) != before)
             name_files(run, summary, plots)
         else:
             do_share(run, Share(step, chunk, count), monitor, crew)

@@ -9,7 +9,7 @@ import contextlib
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,8 @@ class Cluster:
     def begin(self, slot: int, unit: Unit, *, share: int) -> None:
         """Hand a unit to Ray."""
         order = {"name": unit.name, "kind": unit.kind, "facts": dict(unit.facts), "share": share}
-        reference = self._do.remote(self._terms, json.dumps(order))
+        with self._answering():
+            reference = self._do.remote(self._terms, json.dumps(order))
         self._in_hand[reference] = _Task(slot, unit, Watch(self._limits), TOLD_S)
 
     def wait(self, timeout_s: float | None) -> list[Event]:
@@ -112,7 +113,8 @@ class Cluster:
             return []
         look_s = self._limits.look_s
         wait_s = look_s if timeout_s is None else min(timeout_s, look_s)
-        ready, _ = self._ray.wait(list(self._in_hand), num_returns=1, timeout=wait_s)
+        with self._answering():
+            ready, _ = self._ray.wait(list(self._in_hand), num_returns=1, timeout=wait_s)
         return [*(self._ended(reference) for reference in ready), *self._look()]
 
     def retire(self, slot: int) -> None:
@@ -123,6 +125,16 @@ class Cluster:
         for reference in list(self._in_hand):
             self._cancel(reference)
         self._ray.shutdown()
+
+    @contextlib.contextmanager
+    def _answering(self) -> Iterator[None]:
+        try:
+            yield
+        except (self._ray.exceptions.RayError, ConnectionError) as error:
+            raise EnfiladeError(
+                f"the Ray cluster answers no more: {_first_line(error)}; what is finished stays: start one, "
+                "and run the same command again"
+            ) from error
 
     def _connect(self, address: str, *, cpus: int) -> None:
         quiet = {"log_to_driver": False, "logging_level": "error", "include_dashboard": False}

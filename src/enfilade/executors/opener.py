@@ -75,6 +75,8 @@ def _parsed(name: str) -> tuple[str, Limits]:
     who, *terms = name.split(",")
     if who not in EXECUTORS[:3] and not who.startswith("ray:"):
         raise SettingsError(f"there is no executor {who!r}; choose one of {', '.join(EXECUTORS)}")
+    if who == "ray:":
+        raise SettingsError(f"{who} lacks the address of a cluster; ray:HOST:PORT joins one, ray starts one")
     if terms and who == EXECUTORS[0]:
         raise SettingsError(f"{name!r}: in-process has no worker to end; choose another executor for limits")
     limits: dict[str, float] = {}

@@ -24,7 +24,7 @@ from enfilade.backends.mitsuba3.integrators import scene_integrator, shortened, 
 from enfilade.backends.mitsuba3.lamps import find_lamps
 from enfilade.backends.mitsuba3.light import Light
 from enfilade.backends.mitsuba3.lobes import has_lobe
-from enfilade.backends.scenefile import fingerprint, named_files
+from enfilade.backends.scenefile import fingerprint, named_files, why_unreadable
 from enfilade.camera import Camera
 from enfilade.codec.exr import is_exr
 from enfilade.device import active
@@ -84,7 +84,8 @@ class MitsubaRenderer:
         except Exception as error:
             if any(words in str(error).lower() for words in SCARCE):
                 raise MemoryError(f"too little memory to load {file}") from error
-            raise SceneError(f"Mitsuba can't load {file}: {_reason(error)}") from error
+            cause = why_unreadable(file) or error
+            raise SceneError(f"Mitsuba can't load {file}: {_reason(error)}") from cause
         if not isinstance(scene, mi.Scene):
             raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
         if not scene.shapes():
