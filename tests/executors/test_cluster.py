@@ -203,21 +203,19 @@ def test_a_node_that_says_nothing_is_given_up(joined, monkeypatch):
     assert said[0][2][0].startswith("a: in Ray's hands for ")
 
 
-@pytest.mark.parametrize(
-    "error", [RayError("the head node is gone"), ConnectionError("the head node is gone")]
-)
-@pytest.mark.parametrize("when", ["begin", "wait"])
-def test_a_cluster_that_is_lost_is_said(joined, when, error):
+@pytest.mark.parametrize("kind", [RayError, ConnectionError])
+def test_a_cluster_that_is_lost_is_said(joined, kind):
     def lost(*_given, **_how):
-        raise error
+        raise kind("the head node is gone")
 
     ray, executor = joined(BIG, workers=1)
-    if when == "begin":
-        executor._do = SimpleNamespace(remote=lost)
+    executor.begin(0, Unit("a", "fine"), share=1)
     ray.wait = lost
     with pytest.raises(EnfiladeError, match="answers no more: the head node is gone; what is finished stays"):
-        executor.begin(0, Unit("a", "fine"), share=1)
         executor.wait(None)
+    executor._do = SimpleNamespace(remote=lost)
+    with pytest.raises(EnfiladeError, match="answers no more: the head node is gone"):
+        executor.begin(1, Unit("b", "fine"), share=1)
 
 
 def test_what_ray_loses_is_done_again_with_fewer_paths_where_memory_was_short(tmp_path, monkeypatch, toys):
