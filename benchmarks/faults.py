@@ -2,18 +2,19 @@
 
     python benchmarks/faults.py [--quick] [--only kills disk ...] [--count 20] [--seed 1]
 
-kills      SIGKILL for a whole command or one of its workers, at random moments, or in the middle of write,
-           fsync and rename; then resumed to the end
+kills      SIGKILL for a whole command, one of its workers, or the next two that do the same unit, at random
+           moments, or for itself in the middle of write, fsync and rename; then resumed to the end
 stops      SIGSTOP for a worker at random moments: it hangs, is ended, and another does its unit
-executors  1, 2 and 7 workers, in process, worker processes and Ray
+executors  1, 2 and 7 workers, in process, worker processes and Ray; the last two of a Mitsuba scene
 cluster    Ray, with workers killed while it works
 disk       a disk that fills up at random points, then gets room; needs root, for a small tmpfs
 bits       a flipped bit in a stored file, found by use or by --verify, and what made it done again
-mitsuba    kills of a tiny Mitsuba scene by --method decoupled
+mitsuba    kills and flipped bits of a tiny Mitsuba scene by --method decoupled
 
-Fails when one byte of frames, video or ledger (times left out) differs. --quick tries 5 of each. Trials of
-all kinds go side by side, one for each core (--jobs), the longest first; each has a folder and random numbers
-of its own.
+All others are of a scene in closed form by --method paper. Fails when one byte of frames, video or ledger
+(times left out) differs. --quick tries 5 kills, disks, bits and executors, and fewer of what takes longer.
+Trials of all kinds go side by side, one for each core (--jobs), the longest first; each has a folder and
+random numbers of its own.
 """
 
 import argparse
@@ -33,13 +34,15 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
+from typing import IO
 
 FRAMES, SIZE = 48, "32x24"
 EXECUTORS = [("ray", 2), ("processes", 7), ("processes", 2), ("processes", 1), ("in-process", 1)]
 MORE_EXECUTORS = [*EXECUTORS, ("ray", 1), ("ray", 7)]
+OF_MITSUBA = [("ray", 2), ("processes", 7)]
 COUNTS = {
     "cluster": 1,
-    "executors": len(MORE_EXECUTORS),
+    "executors": len(MORE_EXECUTORS) + len(OF_MITSUBA),
     "stops": 10,
     "mitsuba": 10,
     "kills": 200,
@@ -98,6 +101,20 @@ class Work:
         return digest(self.whole)
 
 
+class Made:
+    """Work whose run that is left alone is made by the first trial that asks for it."""
+
+    def __init__(self, make: Callable[[], Work]) -> None:
+        self._make, self._first, self._made = make, Lock(), []
+
+    def __call__(self) -> Work:
+        """The work."""
+        with self._first:
+            if not self._made:
+                self._made.append(self._make())
+        return self._made[0]
+
+
 def main() -> int:
     """Try all; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
@@ -133,11 +150,12 @@ def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
     print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
     if arguments.jobs > 1:
         work = replace(work, seconds=work.seconds * BESIDE)
+    shiny = Made(partial(mitsuba_work, folder))
     trials: dict[str, Callable[[], Trial]] = {
         "cluster": lambda: cluster_trial(folder, *(QUICK_CLUSTER if arguments.quick else CLUSTER)),
-        "executors": lambda: executor_trial(work),
+        "executors": lambda: executor_trial(work, shiny),
         "stops": lambda: stop_trial(work),
-        "mitsuba": lambda: mitsuba_trial(folder),
+        "mitsuba": lambda: mitsuba_trial(shiny),
         "kills": lambda: kill_trial(work),
         "disk": lambda: disk_trial(work, tally),
         "bits": lambda: bit_trial(work),
@@ -262,7 +280,7 @@ def sha(file: Path) -> str:
 
 def kill_trial(work: Work) -> Trial:
     """Kill a run somewhere, then let it go on to its end. What a kill misses does not count."""
-    kills = (kill_at_point, kill_all, kill_worker)
+    kills = (kill_at_point, kill_all, kill_worker, kill_two)
 
     def trial(number: int, folder: Path, chance: random.Random) -> str | None:
         out, what = folder / "run", None
@@ -286,15 +304,12 @@ def attempt(act: Callable[[], None], work: Work, out: Path, what: str) -> str | 
     return f"{what}: {problem}" if problem else None
 
 
-def mitsuba_trial(folder: Path) -> Trial:
-    """The same with a Mitsuba scene, whose run that is left alone is made by whoever comes first."""
-    first, works = Lock(), []  # of one
+def mitsuba_trial(shiny: Made) -> Trial:
+    """Kills and flipped bits of a Mitsuba scene: the first four kill, then come two bits."""
 
     def trial(number: int, place: Path, chance: random.Random) -> str | None:
-        with first:
-            if not works:
-                works.append(mitsuba_work(folder))
-        return kill_trial(works[0])(number, place, chance)
+        kinds = [kill_trial(shiny())] * 4 + [bit_trial(shiny())] * 2
+        return kinds[number % len(kinds)](number, place, chance)
 
     return trial
 
@@ -332,18 +347,45 @@ def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
     return strike_worker(work, out, chance, signal.SIGKILL)
 
 
+def kill_two(work: Work, out: Path, chance: random.Random) -> str | None:
+    """One worker is killed, and the next that is begun: most often in its place, with the same unit."""
+    return strike_worker(work, out, chance, signal.SIGKILL, times=2)
+
+
 def strike_worker(
-    work: Work, out: Path, chance: random.Random, blow: signal.Signals, who: str = "processes"
+    work: Work,
+    out: Path,
+    chance: random.Random,
+    blow: signal.Signals,
+    who: str = "processes",
+    *,
+    times: int = 1,
 ) -> str | None:
-    """One worker gets a signal at a random moment; None where there was no worker and nothing went wrong."""
-    moment = chance.uniform(0.3, 1.0) * work.seconds
-    process = start(command(work.inputs, out, "--executor", who, "--workers", "2"))
-    time.sleep(moment)
-    workers = [pid for pid in children(process.pid) if b"enfilade.executors.child" in cmdline(pid)]
-    if workers:
-        kill(chance.choice(workers), blow)
-    code = process.wait(TIMEOUT_S)
-    return f"{blow.name} for a worker after {moment:.2f} s, exit code {code}" if workers or code else None
+    """Workers get a signal, the first at a random moment; None where not all had a unit, and all is well."""
+    moment, said = chance.uniform(0.3, 1.0) * work.seconds, out.with_name("said.txt")
+    line = command(work.inputs, out, "--executor", who, "--workers", "2")
+    with said.open("wb") as stream:
+        process = start([word for word in line if word != "--quiet"], stream)
+        time.sleep(moment)
+        known: set[int] = set()
+        for _ in range(times):
+            if (worker := new_worker(process, known, chance)) is not None:
+                kill(worker, blow)
+        code = process.wait(TIMEOUT_S)
+    had_units = said.read_bytes().count(b"it is tried again") >= times
+    what = f"{blow.name} for {times} workers after {moment:.2f} s, exit code {code}"
+    return what if had_units or code else None
+
+
+def new_worker(process: subprocess.Popen[bytes], known: set[int], chance: random.Random) -> int | None:
+    """Wait for workers that are not known yet, and choose one; None where the command ends first."""
+    while process.poll() is None:
+        found = {pid for pid in children(process.pid) if b"enfilade.executors.child" in cmdline(pid)}
+        if fresh := sorted(found - known):
+            known |= found
+            return chance.choice(fresh)
+        time.sleep(0.02)
+    return None
 
 
 def stop_trial(work: Work) -> Trial:
@@ -359,11 +401,9 @@ def stop_trial(work: Work) -> Trial:
     return trial
 
 
-def start(line: list[str]) -> subprocess.Popen[bytes]:
+def start(line: list[str], said: IO[bytes] | int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     """A command in a process group of its own."""
-    return subprocess.Popen(
-        line, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    return subprocess.Popen(line, start_new_session=True, stdout=said, stderr=said)
 
 
 def children(pid: int) -> list[int]:
@@ -425,15 +465,16 @@ def die_at(where: str, arguments: list[str]) -> int:
 # Executors.
 
 
-def executor_trial(work: Work) -> Trial:
-    """The same run by one, two and seven workers of each executor."""
+def executor_trial(work: Work, shiny: Made) -> Trial:
+    """The same run by one, two and seven workers of each executor, and another by two of them."""
 
     def trial(number: int, folder: Path, _chance: random.Random) -> str | None:
-        name, workers = MORE_EXECUTORS[number]
+        name, workers = [*MORE_EXECUTORS, *OF_MITSUBA][number]
+        of = work if number < len(MORE_EXECUTORS) else shiny()
         flags = ("--executor", name, "--workers", str(workers))
         prefix, out = alone() if name == "ray" else (), folder / "run"
-        act = partial(finish, work.inputs, out, *flags, prefix=prefix)
-        return attempt(act, work, out, f"{name}, {workers} workers")
+        act = partial(finish, of.inputs, out, *flags, prefix=prefix)
+        return attempt(act, of, out, f"{of.whole.name}, {name}, {workers} workers")
 
     return trial
 
@@ -515,8 +556,11 @@ def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | 
     out, what = place / "run", f"disk of {size} KiB, {workers[1:2] or 'in-process'}"
     line = command(work.inputs, out, *workers)
     done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
-    if done.returncode != 0 and ("no room" not in done.stderr or done.returncode != 1):
-        return f"{what}: exit code {done.returncode}, {done.stderr.strip()[-300:]}"
+    told = done.stderr.strip()[-300:]
+    if done.returncode != 0 and ("no room" not in told or done.returncode != 1):
+        return f"{what}: exit code {done.returncode}, {told}"
+    if done.returncode != 0 and (out / "frames").exists() and "what is left will need about" not in told:
+        return f"{what}: not said how much is needed: {told}"
     whole = {f.relative_to(work.whole): sha(f) for f in stored(work.whole)}
     for file in stored(out):
         if sha(file) != whole[file.relative_to(out)]:
@@ -536,7 +580,8 @@ def bit_trial(work: Work) -> Trial:
     def trial(number: int, folder: Path, chance: random.Random) -> str | None:
         out, is_used = folder / "run", number % 2 == 0
         shutil.copytree(work.whole, out)
-        kinds = ("raw", "frames", "clips", "") if is_used else ("keyframes", *STORED[3:], "video", "")
+        there = tuple(kind for kind in STORED if (out / kind).is_dir())
+        kinds = ("raw", "frames", "clips", "") if is_used else (*there, "video", "")
         file = chance.choice(candidates(out, chance.choice(kinds)))
         if is_used:
             forget_users(out, file)

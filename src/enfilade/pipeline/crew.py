@@ -279,9 +279,9 @@ class _Shift:
         self._progress.take_back(unit)
         failure, attempt = failures[-1], len(failures)
         after = "it is tried again" if attempt < ATTEMPTS else "it is set aside"
-        has_starved = failure.kind is FailureKind.MEMORY
-        if (has_starved or (failure.kind is FailureKind.DIED and attempt > 1)) and attempt < ATTEMPTS:
-            after += " with fewer paths in flight"
+        has_starved = failure.kind is FailureKind.MEMORY and attempt < ATTEMPTS
+        if has_starved or (failure.kind is FailureKind.DIED and attempt == ATTEMPTS - 1):
+            after += " with fewer paths in flight, and may have other noise"
             after += "; if that is enough, so are those after it" if has_starved else ""
         self._progress.monitor.say(f"{unit.name}: {failure.text}; {after}")
         if attempt >= ATTEMPTS:
