@@ -11,6 +11,7 @@ import argparse
 import json
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,9 +19,15 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enfilade.store import Run
 
 MEMORY_BYTES, SECONDS = 2 << 30, 10
 BATCH = 500  # files read by one process
+LATE = "late.jsonl"  # the ledger of a command beside another
+IDENTITY = "identity.json"  # of the run that a folder holds
 SPLICES = (
     b"\0" * 8,
     b"\xff" * 8,
@@ -141,6 +148,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
         "scene": (make_scene, lambda file: check_scene(file, LimitSettings())),
         "run": (lambda folder: make_run(folder) / "run.json", read_run),
         "ledger": (lambda folder: make_run(folder) / "ledger.jsonl", read_run),
+        "ledger of a part": (lambda folder: make_run(folder) / "parts" / LATE, read_run),
         "job": (lambda folder: make_run(folder) / "job.json", lambda file: read_job(file.parent)),
     }
 
@@ -189,7 +197,7 @@ def make_scene(folder: Path) -> Path:
 
 
 def make_run(folder: Path) -> Path:
-    """A run folder with a few units."""
+    """A run folder with a few units, some of which a command beside wrote into a ledger of its own."""
     from enfilade.path import load_path
     from enfilade.pipeline.job import Job
     from enfilade.settings import Settings
@@ -198,30 +206,42 @@ def make_run(folder: Path) -> Path:
     out = folder / "run"
     if not out.exists():
         job = Job(make_analytic(folder), load_path(make_path(folder)), Settings(), "paper")
+        (folder / IDENTITY).write_text(json.dumps(job.identity()))
         with Run.open(out, job.identity()) as run:
             run.write_json("job.json", job.to_json())
-            for number in range(5):
-                file = run.file("frames", number)
-                file.parent.mkdir(exist_ok=True)
-                file.write_bytes(b"x" * number)
-                run.finish(f"frame {number}", files=[file], facts={"frame": number, "cost": {}})
+            finish_units(run, range(5))
+        with Run.sharing(out, Path(LATE).stem) as run:
+            finish_units(run, range(5, 10))
     return out
 
 
+def finish_units(run: "Run", numbers: range) -> None:
+    """Record frames of a few bytes."""
+    for number in numbers:
+        file = run.file("frames", number)
+        file.parent.mkdir(exist_ok=True)
+        file.write_bytes(b"x" * number)
+        run.finish(f"frame {number}", files=[file], facts={"frame": number, "cost": {}})
+
+
 def read_run(file: Path) -> None:
-    """Read a run as the report does, and as a command that goes on with it."""
+    """Read a run as the report does, and a copy of it as the command does that goes on with it."""
     from enfilade.report.seen import SeenRun
     from enfilade.store import Run
 
-    for opening in (
-        lambda: SeenRun(file.parent),
-        lambda: Run.open(file.parent, {"another": "run"}).close(),
-    ):
-        try:
-            opening()
-        except ValueError as error:  # ours are among them
-            if type(error).__module__ != "enfilade.errors":
-                raise
+    folder = file.parent if file.name != LATE else file.parents[1]
+    copy = folder.with_name("copy")
+    shutil.copytree(folder, copy)
+    identity = json.loads((folder.parent / IDENTITY).read_text())
+    try:
+        for opening in (lambda: SeenRun(folder), lambda: Run.open(copy, identity).close()):
+            try:
+                opening()
+            except ValueError as error:  # ours are among them
+                if type(error).__module__ != "enfilade.errors":
+                    raise
+    finally:
+        shutil.rmtree(copy)
 
 
 if __name__ == "__main__":
