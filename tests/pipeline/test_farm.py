@@ -41,7 +41,7 @@ def test_the_template_is_one_of_open_job_description(begun):
     assert done.returncode == 0, done.stdout
 
 
-def test_a_unit_that_crashes_its_worker_does_not_crash_its_task(begun):
+def test_each_task_has_a_worker_process_of_its_own(begun):
     for step in template(begun, 2)["steps"]:
         line = step["script"]["actions"]["onRun"]["args"]
         assert line[line.index("--executor") :][:4] == WORKER

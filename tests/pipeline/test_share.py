@@ -1,6 +1,8 @@
 """Several commands share a run: each step after the one before, in any order within; the run is the same."""
 
 import dataclasses
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -18,10 +20,11 @@ from enfilade.records import CameraPath
 from enfilade.store import Run
 from enfilade.store.lock import Lock
 from scenes_analytic import room, room_walk
-from small_runs import Told, job_of
+from small_runs import Told, Watcher, children, job_of
 
 NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 OPENJD = Path(sys.executable).with_name("openjd")
+WORKER = Crew("processes", 1)
 
 
 def make_job(folder):
@@ -63,6 +66,19 @@ def flip(file):
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 4
     file.write_bytes(data)
+
+
+def test_a_unit_that_kills_its_worker_does_not_kill_its_task(whole, begun):
+    def kill():
+        os.kill(children()[0], signal.SIGKILL)
+
+    monitor = Watcher(1, kill)
+    share(begun, "plan", crew=WORKER)
+    share(begun, "keyframes", crew=WORKER, monitor=monitor)
+    assert monitor.left < 0
+    assert any("killed by SIGKILL; it is tried again" in text for text in monitor.said)
+    go_on(begun, Silence(), Crew())
+    assert Run.existing(begun).digest() == whole
 
 
 @pytest.mark.parametrize("count", [1, 3])
