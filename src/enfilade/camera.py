@@ -16,6 +16,7 @@ import numpy.typing as npt
 from enfilade.errors import CameraPathError
 
 Matrix = npt.NDArray[np.float64]
+LAST_ROW, ROW_TOLERANCE = (0.0, 0.0, 0.0, 1.0), 1e-5  # of a pose
 RIGID_TOLERANCE = 1e-3  # largest entry of |R^T R - 1|; exporters write 5 to 8 digits
 
 
@@ -108,7 +109,7 @@ def check_rigid(matrix: Matrix) -> None:
         raise CameraPathError(f"a pose is a 4x4 matrix, not one of shape {matrix.shape}")
     if not np.isfinite(matrix).all():
         raise CameraPathError("the pose holds a NaN or an infinity")
-    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
+    if np.abs(matrix[3] - LAST_ROW).max() > ROW_TOLERANCE:
         raise CameraPathError(f"the last row of a pose is 0 0 0 1, not {matrix[3]}")
     rotation = matrix[:3, :3]
     defect = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
@@ -122,23 +123,35 @@ def check_rigid(matrix: Matrix) -> None:
 
 
 def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
-    """Pose of a camera at `eye` that looks at `target`, (4, 4).
+    """Poses of cameras at `eye` that look at `target`.
+
+    Parameters
+    ----------
+    eye, target, up : (..., 3)
+
+    Returns
+    -------
+    (..., 4, 4) float64
 
     Raises
     ------
     CameraPathError
         Eye and target coincide, or `up` points along the view.
     """
-    position, aim, upward = (np.asarray(v, np.float64) for v in (eye, target, up))
+    position, aim, upward = np.broadcast_arrays(*(np.asarray(v, np.float64) for v in (eye, target, up)))
     back = position - aim
     right = np.cross(upward, back)
-    if np.linalg.norm(back) == 0.0 or np.linalg.norm(right) == 0.0:
-        raise CameraPathError(f"a camera at {position} can't look at {aim} with {upward} up")
-    back /= np.linalg.norm(back)
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3] = np.stack([right, np.cross(back, right), back, position], axis=1)
-    return pose
+    lengths = [np.linalg.norm(axis, axis=-1, keepdims=True) for axis in (back, right)]
+    if (is_lost := (np.minimum(*lengths) == 0.0)[..., 0]).any():
+        where = tuple(np.argwhere(is_lost)[0])
+        raise CameraPathError(
+            f"a camera at {position[where]} can't look at {aim[where]} with {upward[where]} up"
+        )
+    back, right = back / lengths[0], right / lengths[1]
+    poses = np.zeros((*position.shape[:-1], 4, 4))
+    poses[..., :3, :] = np.stack([right, np.cross(back, right), back, position], axis=-1)
+    poses[..., 3, 3] = 1.0
+    return poses
 
 
 @dataclass(frozen=True, eq=False)

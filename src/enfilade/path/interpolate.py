@@ -107,7 +107,7 @@ def interpolate_aims(knots: Matrix, targets: Matrix, ups: Matrix, times: Matrix,
     """
     aims = interpolate_values(knots, targets, times)
     upward = interpolate_values(knots, ups, times)
-    return np.stack([look_at(e, a, u)[:3, :3] for e, a, u in zip(eyes, aims, upward, strict=True)])
+    return look_at(eyes, aims, upward)[:, :3, :3]
 
 
 def interpolate_rotations(knots: Matrix, rotations: Matrix, times: Matrix) -> Matrix:
