@@ -63,6 +63,7 @@ CLUSTER, QUICK_CLUSTER = (10, 20000), (5, 6000)  # kills, and paths a pixel of 5
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
 STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
 TIMEOUT_S = 1800  # a busy machine is no failure
+NEED = "what is left will need about"
 STOPPED_MIN = 0.05  # after which a worker that does nothing is ended
 BESIDE = 1.5  # times longer a run takes beside others
 
@@ -559,7 +560,8 @@ def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | 
     told = done.stderr.strip()[-300:]
     if done.returncode != 0 and ("no room" not in told or done.returncode != 1):
         return f"{what}: exit code {done.returncode}, {told}"
-    if done.returncode != 0 and (out / "frames").exists() and "what is left will need about" not in told:
+    is_rendered = (out / "plots").exists()
+    if done.returncode and (out / "frames").exists() and not is_rendered and NEED not in told:
         return f"{what}: not said how much is needed: {told}"
     whole = {f.relative_to(work.whole): sha(f) for f in stored(work.whole)}
     for file in stored(out):
