@@ -49,7 +49,7 @@ def jobs(monkeypatch):
     def prepare(job, folder, *, is_tried):
         take(job)
 
-    def plan(job, monitor):
+    def plan(job, monitor, *, is_tried):
         answer = take(job)
         return SimpleNamespace(to_dict=lambda: answer)
 

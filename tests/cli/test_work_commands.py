@@ -229,3 +229,17 @@ def test_flags_that_would_say_nothing_are_refused(run, begun, tmp_path, monkeypa
     assert refused.exit_code == 2, refused.output
     assert words in refused.stderr
     assert refused.stdout == ""
+
+
+@pytest.mark.parametrize("command", [("render",), ("plan",), ("calibrate", "threshold")])
+def test_a_scene_is_tried_by_a_process_of_its_own_first(run, camera_path, tmp_path, command):
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        '<scene version="3.0.0"><shape type="sphere"/><emitter type="constant"/></scene>', encoding="utf-8"
+    )
+    more = ("--out", tmp_path / "run") if command == ("render",) else ()
+    line = [*command, scene, "--path", camera_path, "--device", "cpu", "--limits-trial-s", "0.1", *more]
+    result = run(*line)
+    assert result.exit_code == 2, result.output
+    assert "was not loaded in 0.1 s" in result.stderr  # in which no Mitsuba starts
+    assert not (tmp_path / "run").exists()

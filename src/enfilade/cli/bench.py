@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from enfilade.studies.bench.contestants import Contestant
 
 JOB_INPUTS = ("scene", "path_file", "size", "frames", "fps")
-SECTIONS = (
-    "viewing", "metric", "keyframes", "warp", "masks", "antialias", "light",
-    "limits.allow", "limits.file_mb", "limits.megapixels", "limits.elements_m",
-)  # fmt: skip
+SECTIONS = ("viewing", "metric", "keyframes", "warp", "masks", "antialias", "light", "limits")
 JUDGES = ("aqm", "flip", "psnr", "temporal", "cvvdp")  # `judges.JUDGES`; to ask it would load NumPy
 
 

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
     from enfilade.studies.cases.threshold import Calibration
 
-SECTIONS = (
-    "trace", "viewing", "keyframes", "warp", "metric.mask_slope", "antialias",
-    "limits.allow", "limits.file_mb", "limits.megapixels", "limits.elements_m",
-)  # fmt: skip
+SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric.mask_slope", "antialias", "limits")
 
 
 @click.group("calibrate", short_help="Settings that depend on the scene, found by the metric.")
@@ -91,6 +88,7 @@ def threshold(
     from enfilade.studies.cases.threshold import Calibration, calibrate_job
 
     terms = Calibration() if visible_percent is None else Calibration(visible_percent=visible_percent)
+    job.check_scene(is_tried=True)
     with watch(quiet=quiet) as monitor:
         found = calibrate_job(
             job, terms, probes=probes, is_plain=light == "plain", folder=folder, monitor=monitor

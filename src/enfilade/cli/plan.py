@@ -33,7 +33,7 @@ def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: b
     from enfilade.pipeline.plan import plan
 
     with watch(quiet=quiet) as monitor:
-        made = plan(job, monitor).to_dict()
+        made = plan(job, monitor, is_tried=True).to_dict()
     if as_json:
         click.echo(json.dumps(made, indent=2))
     else:

@@ -63,11 +63,17 @@ class Plan:
         return asdict(self)
 
 
-def plan(job: Job, monitor: Monitor) -> Plan:
+def plan(job: Job, monitor: Monitor, *, is_tried: bool = False) -> Plan:
     """Look at every frame of a path, place the initial keyframes, and estimate the cost.
 
     Nothing is shaded but a handful of paths, which tell how long one takes; or, by the decoupled method, a
     segment of the path in a small size.
+
+    Parameters
+    ----------
+    job, monitor
+    is_tried
+        Let a process of its own load the scene before.
 
     Raises
     ------
@@ -76,6 +82,8 @@ def plan(job: Job, monitor: Monitor) -> Plan:
     DeviceError
     """
     check_job(job)
+    if is_tried:
+        job.check_scene(is_tried=True)
     renderer = open_renderer(job.scene, job.settings.trace)
     if isinstance(renderer, LightRenderer):
         job.check_light(renderer.why_no_light)
