@@ -227,3 +227,12 @@ def test_a_rate_is_a_rational(tmp_path):
     rate = Fraction(24000, 1001)
     write_exr(tmp_path / "a.exr", {"Z": np.zeros((2, 3), np.float32)}, attributes={"framesPerSecond": rate})
     assert read_attributes(tmp_path / "a.exr") == {"framesPerSecond": rate}
+
+
+def test_channels_whose_names_are_no_text_are_refused(tmp_path):
+    file = tmp_path / "a.exr"
+    write_exr(file, {"Zeta": np.ones((4, 4), np.float32)})
+    file.write_bytes(file.read_bytes().replace(b"Zeta\0", b"Z\xd2ta\0", 1))
+    for read in (read_exr, color_layers, read_attributes):
+        with pytest.raises(ImageError, match="damaged"):
+            read(file)

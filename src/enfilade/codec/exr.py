@@ -225,7 +225,7 @@ def _are_alike(planes: list[Array]) -> bool:
 
 def _full_names(headers: list[dict[str, Any]]) -> dict[tuple[int, str], str]:
     """Names of channels by part and own name, with that of the part in front where it is needed."""
-    own = [(part, str(channel.name)) for part, header in enumerate(headers) for channel in header["channels"]]
+    own = [(part, name) for part, header in enumerate(headers) for name in header["channels"]]
     if len(headers) == 1:
         return {(part, name): name for part, name in own}
     counts = Counter(name for _, name in own)
@@ -242,6 +242,8 @@ def _part_headers(file: Path) -> list[dict[str, Any]]:
         raise ImageError(f"can't read {file}: {error.strerror}") from error
     with _failures(file), OpenEXR.File(str(file), separate_channels=True, header_only=True) as image:
         headers = [dict(part.header) for part in image.parts]
+        for header in headers:
+            header["channels"] = [str(channel.name) for channel in header["channels"]]
     if not headers:
         raise _damaged(file, "no part in it")
     return headers
