@@ -239,12 +239,11 @@ def _identity(job: Job, renderer: Renderer, facts: Mapping[str, Any]) -> dict[st
     whole = job.identity(renderer)
     trace = whole["settings"]["trace"]
     kept = {key: trace[key] for key in ("spp", "seed", "max_depth")}
-    versions = {name: value for name, value in whole["versions"].items() if name != "code"}  # it takes hours
     return {
         "method": job.method,
         **facts,
         "scene": whole["scene"],
         "path": whole["path"],
         "trace": kept,
-        "versions": versions,
+        "versions": whole["versions"],
     }
