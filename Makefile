@@ -2,7 +2,7 @@
 # make test    set up, run the tests, two files at a time (JOBS=4: four); Chromium, which tests the page, by apt where it is missing
 # make validate-metric   set up, judge the metric by what people saw
 # make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
-# make case-studies   set up, run the paper's experiments again, write docs/case-studies.md; PRESET=small is quick
+# make case-studies   set up, run the paper's experiments again, write studies/cases/README.md; PRESET=small is quick
 # make check   set up, run format, lint, type and import-floor checks
 # make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
 # make lock    write requirements.lock anew from pyproject.toml
@@ -39,13 +39,13 @@ test: setup browser
 	$(BIN)/python -m pytest -n $(or $(JOBS),2) --dist loadfile --max-worker-restart 0 $(TESTS)
 
 validate-metric: setup
-	$(BIN)/enfilade validate $(VALIDATE)
+	$(BIN)/python -m studies validate $(VALIDATE)
 
 bench: setup
-	$(BIN)/python benchmarks/bench.py $(BENCH)
+	$(BIN)/python -m studies.bench $(BENCH)
 
 case-studies: setup
-	$(BIN)/python benchmarks/case_studies.py --preset $(or $(PRESET),full) $(CASES)
+	$(BIN)/python -m studies.cases --preset $(or $(PRESET),full) $(CASES)
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -62,4 +62,4 @@ lock: setup
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
-	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests studies -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -189,8 +189,8 @@ def one_of(kind: str, trial: Trial, number: int, folder: Path, seed: int) -> tup
 
 def analytic_work(folder: Path) -> Work:
     """A noisy walk through a room with a mirror, in closed form, by the paper's method."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
     from enfilade.records import SurfaceClass
+    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
 
     wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
     ball = Sphere((0.5, 0.0, 1.0), 0.5, Material((0.7, 0.2, 0.15)), "ball")
@@ -204,7 +204,7 @@ def analytic_work(folder: Path) -> Work:
 
 def mitsuba_work(folder: Path) -> Work:
     """A few small frames of ROOM, by keyframes of light."""
-    from enfilade.scenes import write_scene
+    from studies.scenes import write_scene
 
     files = write_scene("room", folder / "room", preset="small")
     flags = ("--size", "64x48", "--frames", "22-30", "--method", "decoupled", "--light-spacing", "4")

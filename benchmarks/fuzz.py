@@ -131,12 +131,12 @@ def mutated(data: bytes, chance: random.Random) -> bytes:
 
 def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], object]]]:
     """By kind: what makes a sound file in a folder, and what reads it."""
-    from enfilade.backends.analytic_scene import read_scene
-    from enfilade.backends.scenecheck import check_scene
-    from enfilade.codec import read_exr
-    from enfilade.codec.pictures import picture_pixels
-    from enfilade.path import load_path
+    from enfilade.camera import load_path
+    from enfilade.images import read_exr
+    from enfilade.images.pictures import picture_pixels
     from enfilade.pipeline.job import read_job
+    from enfilade.scene.analytic_scene import read_scene
+    from enfilade.scene.scenecheck import check_scene
     from enfilade.settings import LimitSettings
 
     return {
@@ -157,7 +157,7 @@ def make_exr(folder: Path, *, is_portable: bool = True) -> Path:
     """An image of a few layers."""
     import numpy as np
 
-    from enfilade.codec import write_exr
+    from enfilade.images import write_exr
 
     layers = {
         "RGB": np.ones((24, 32, 3), np.float16),
@@ -177,7 +177,7 @@ def make_path(folder: Path) -> Path:
 
 def make_analytic(folder: Path) -> Path:
     """A wall."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Plane, Sphere, scene_text
+    from enfilade.scene.analytic_scene import AnalyticScene, Plane, Sphere, scene_text
 
     scene = AnalyticScene((Plane((0, 0, 0), (0, 0, 1)), Sphere((0, 0, 1), 0.5)), noise=0.1)
     (folder / "wall.analytic.json").write_text(scene_text(scene))
@@ -198,7 +198,7 @@ def make_scene(folder: Path) -> Path:
 
 def make_run(folder: Path) -> Path:
     """A run folder with a few units, some of which a command beside wrote into a ledger of its own."""
-    from enfilade.path import load_path
+    from enfilade.camera import load_path
     from enfilade.pipeline.job import Job
     from enfilade.settings import Settings
     from enfilade.store import Run

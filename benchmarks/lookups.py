@@ -48,14 +48,14 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     import drjit as dr
     import numpy as np
 
+    from enfilade.camera import load_path
+    from enfilade.kernels.estimate import Estimate
     from enfilade.monitor import Silence
-    from enfilade.path import load_path
     from enfilade.pipeline.job import Job, open_renderer
     from enfilade.pipeline.light import LightTable
     from enfilade.pipeline.survey import survey_path
     from enfilade.pipeline.units import segments_of
     from enfilade.pipeline.workshop import Workshop
-    from enfilade.pixels.estimate import Estimate
     from enfilade.renderer import PixelFilter, Purpose
     from enfilade.settings import Settings
     from enfilade.store import Run

@@ -53,8 +53,8 @@ def render(folder: Path, size: str, count: int) -> dict:
 
 def scene_text() -> str:
     """A wall and a ball, as a file of the analytic backend."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
-    from enfilade.backends.analytic_scene import scene_text as text_of
+    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
+    from enfilade.scene.analytic_scene import scene_text as text_of
 
     wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
     ball = Sphere((0.5, 0.0, 1.0), 0.5, Material((0.7, 0.2, 0.15)), "ball")

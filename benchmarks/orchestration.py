@@ -100,7 +100,7 @@ def look(pid: int, ledger: Path) -> tuple[int, float, int] | None:
 
 def analytic(folder: Path, frames: int) -> list[str]:
     """Command of a run of small frames in closed form."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
+    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
 
     wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
     scene, path = folder / "wall.analytic.json", folder / "path.json"
@@ -169,7 +169,7 @@ def measure_overhead(folder: Path) -> Iterator[str]:
 
 def mitsuba(folder: Path, spp: int, frames: str) -> list[str]:
     """Inputs of a run that traces every frame of ROOM."""
-    from enfilade.scenes import write_scene
+    from studies.scenes import write_scene
 
     files = write_scene("room", folder / "room", preset="small")
     flags = ["--size", "160x120", "--frames", frames, "--method", "reference", "--spp", str(spp)]

@@ -26,11 +26,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     activate("auto")
-    from enfilade.path import load_path
+    from enfilade.camera import load_path
     from enfilade.pipeline.job import open_renderer
     from enfilade.renderer import Purpose, RandomKey
-    from enfilade.scenes import write_scene
     from enfilade.settings import TraceSettings
+    from studies.scenes import write_scene
 
     width, height = map(int, arguments.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:

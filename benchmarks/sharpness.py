@@ -57,21 +57,21 @@ def frames_of(folder: Path) -> list[Path]:
 
 def radiance(file: Path) -> np.ndarray:
     """Linear colours of a frame, (H, W, 3)."""
-    from enfilade.codec import read_exr
+    from enfilade.images import read_exr
 
     return read_exr(file)["RGB"].astype(np.float32)
 
 
 def encoded(color: np.ndarray, exposure_ev: float) -> np.ndarray:
     """Colours as a display is sent them."""
-    from enfilade.pixels.tone import srgb_encode
+    from enfilade.kernels.tone import srgb_encode
 
     return srgb_encode(np.clip(color * np.float32(2.0**exposure_ev), 0.0, 1.0))
 
 
 def spectra(folder: Path, every: int, exposure_ev: float) -> list[np.ndarray]:
     """Fourier transforms of the encoded luminance of some frames, windowed."""
-    from enfilade.pixels.tone import luminance
+    from enfilade.kernels.tone import luminance
 
     found = []
     for file in frames_of(folder)[::every]:

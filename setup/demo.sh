@@ -6,7 +6,7 @@ run=$2
 scene=build/demo
 
 echo "demo: writing the scene ROOM into $scene"
-"$commands/enfilade" scene room --preset small --out "$scene" >/dev/null
+"$commands/python" -m studies scene room --preset small --out "$scene" >/dev/null
 echo "demo: rendering 50 frames into $run; run again, it goes on where it stopped"
 "$commands/enfilade" render "$scene/scene.xml" --path "$scene/camera_path.json" --frames 11-60 --out "$run"
 "$commands/enfilade" report "$run"

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from enfilade.backends.mitsuba3 import MitsubaRenderer
-from enfilade.camera import Camera, look_at
-from enfilade.geometry import find_geometry
-from enfilade.irradiance import LightCache, Shader
-from enfilade.pixels.estimate import Estimate, Samples
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.gbuffer import find_geometry
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.methods.decoupled import LightCache, Shader
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.scene.mitsuba import MitsubaRenderer
 from enfilade.settings import TraceSettings
 
 PIXEL_ANGLE = 0.02  # radians

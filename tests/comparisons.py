@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.codec import write_exr
+from enfilade.compare import FlowChoice, SequenceDifference, Terms, compare, metric_options
+from enfilade.images import write_exr
 from enfilade.monitor import Silence
-from enfilade.pipeline.compare import FlowChoice, SequenceDifference, Terms, compare, metric_options
 from enfilade.settings import MetricSettings
 from enfilade.store.identity import FORMAT
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.judges import Shown, shown
-from enfilade.pixels.tone import srgb_decode
+from enfilade.compare.measures import Shown, shown
+from enfilade.kernels.tone import srgb_decode
 from enfilade.records import Flow
 from enfilade.viewing import Viewing
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.backends.analytic import AnalyticRenderer
-from enfilade.backends.analytic_scene import AnalyticScene, Plane, Quad, Sphere
-from enfilade.camera import Camera
-from enfilade.geometry import find_geometry
+from enfilade.camera.pinhole import Camera
+from enfilade.gbuffer import find_geometry
 from enfilade.records import Geometry, Keyframe, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.scene.analytic import AnalyticRenderer
+from enfilade.scene.analytic_scene import AnalyticScene, Plane, Quad, Sphere
 
 
 def geometry_of(scene: AnalyticScene, camera: Camera) -> Geometry:

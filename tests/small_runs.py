@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.backends.analytic_scene import AnalyticScene, scene_text
-from enfilade.codec import read_exr
+from enfilade.camera.path import CameraPath
+from enfilade.images import read_exr
 from enfilade.monitor import Silence
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.walkthrough import render
-from enfilade.records import CameraPath
+from enfilade.scene.analytic_scene import AnalyticScene, scene_text
 from enfilade.settings import Settings
 from enfilade.store import Run
 

@@ -10,8 +10,9 @@ import click
 import numpy as np
 import pytest
 
+from enfilade.camera import load_path
 from enfilade.cli import main
-from enfilade.path import load_path
+from studies.__main__ import main as studies
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -35,7 +36,8 @@ def test_files_that_a_document_names_exist(document: Path) -> None:
 @pytest.fixture(scope="module")
 def flags() -> set[str]:
     """Of all commands."""
-    own = {flag for parameter in parameters(main) for flag in (*parameter.opts, *parameter.secondary_opts)}
+    options = [option for command in (main, studies) for option in parameters(command)]
+    own = {flag for option in options for flag in (*option.opts, *option.secondary_opts)}
     return own | {"--help"}
 
 

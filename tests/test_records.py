@@ -5,17 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enfilade.camera import Camera, look_at
-from enfilade.records import (
-    CameraPath,
-    Flow,
-    Frame,
-    Geometry,
-    Segment,
-    Shading,
-    SurfaceClass,
-    Warped,
-)
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.records import Flow, Frame, Geometry, Shading, SurfaceClass, Warped
 
 H, W = 3, 4
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)

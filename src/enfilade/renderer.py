@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.camera import Camera
+from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, U32, Shading
 
 

@@ -8,13 +8,12 @@ import pytest
 from PIL import Image
 
 from enfilade.cli.compare import DEPARTURES, FLOWS, IMAGES
-from enfilade.codec import write_exr
+from enfilade.compare import FlowChoice
+from enfilade.images import encode_video, open_sequence, write_exr
+from enfilade.images.stored import SUFFIXES
 from enfilade.metric import MetricOptions
-from enfilade.pipeline.compare import FlowChoice
 from enfilade.report.heatmap import HeatmapPainter
 from enfilade.settings import VideoSettings
-from enfilade.video import encode_video, open_sequence
-from enfilade.video.images import SUFFIXES
 from enfilade.viewing import DISPLAYS
 
 KEYS = {  # docs/compare.md

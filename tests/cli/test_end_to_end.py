@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import scenes_analytic
-from enfilade.backends.analytic_scene import scene_text
-from enfilade.camera import look_at
+from enfilade.camera.pinhole import look_at
+from enfilade.scene.analytic_scene import scene_text
 
 FRAMES = 5
 

@@ -6,10 +6,10 @@ import drjit
 import pytest
 
 import scenes_analytic
-from enfilade.backends.analytic_scene import scene_text
 from enfilade.cli import work
 from enfilade.errors import EnfiladeError
 from enfilade.pipeline.crew import Crew
+from enfilade.scene.analytic_scene import scene_text
 from enfilade.store import Run
 from enfilade.store.lock import Lock
 
@@ -231,7 +231,7 @@ def test_flags_that_would_say_nothing_are_refused(run, begun, tmp_path, monkeypa
     assert refused.stdout == ""
 
 
-@pytest.mark.parametrize("command", [("render",), ("plan",), ("calibrate", "threshold")])
+@pytest.mark.parametrize("command", [("render",), ("plan",)])
 def test_a_scene_is_tried_by_a_process_of_its_own_first(run, camera_path, tmp_path, command):
     scene = tmp_path / "scene.xml"
     scene.write_text(

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from enfilade.codec import read_json, write_json
 from enfilade.errors import DeviceError, ImageError, NoSpaceError, RunFolderError
 from enfilade.executors import Failure, FailureKind
+from enfilade.files import read_json, write_json
 from enfilade.store.checksum import checksum
 from toy_worker import unit
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enfilade.antialias import reconstruct
+from enfilade.methods.paper import reconstruct
 from enfilade.metric import Aqm
 from enfilade.metric.amplitude import response
 from enfilade.metric.cortex import CortexTransform

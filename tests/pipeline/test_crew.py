@@ -9,13 +9,13 @@ import time
 import pytest
 
 from enfilade.errors import NoSpaceError, SettingsError, UnfinishedError
+from enfilade.images import open_sequence
 from enfilade.monitor import Silence
 from enfilade.pipeline import units, worker
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job, read_job
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
-from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
 from small_runs import Watcher, children, frame_bytes, job_of
 

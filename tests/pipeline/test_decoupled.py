@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from enfilade.camera import Camera, look_at
-from enfilade.codec import read_exr
+from enfilade.camera import load_path
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SettingsError
+from enfilade.images import read_exr
 from enfilade.monitor import Silence
-from enfilade.path import load_path
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.plan import plan
@@ -17,12 +18,11 @@ from enfilade.pipeline.rehearsal import excerpt_of
 from enfilade.pipeline.share import Share, do_share, go_on
 from enfilade.pipeline.units import STEPS
 from enfilade.pipeline.walkthrough import prepare, render
-from enfilade.records import CameraPath, Segment
-from enfilade.scenes import write_scene
 from enfilade.settings import Settings
 from enfilade.store import Run
 from scenes_analytic import slide, wall
 from small_runs import frame_bytes, job_of, rendered
+from studies.scenes import write_scene
 
 FRAMES = (1, 22, 24, 26, 28)
 

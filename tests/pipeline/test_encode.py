@@ -9,12 +9,12 @@ from click.testing import CliRunner
 
 from enfilade.cli import main
 from enfilade.errors import DamagedFileError, RunFolderError, SettingsError, UnfinishedError
+from enfilade.images import open_sequence
 from enfilade.monitor import Silence
 from enfilade.pipeline.encode import encode
 from enfilade.pipeline.walkthrough import prepare
 from enfilade.settings import Settings
 from enfilade.store import Run
-from enfilade.video import open_sequence
 from scenes_analytic import room, room_walk
 from small_runs import Told, colors, job_of, rendered
 

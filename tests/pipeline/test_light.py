@@ -4,10 +4,10 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from enfilade.camera import load_path
 from enfilade.errors import DamagedFileError
-from enfilade.irradiance import light_of
+from enfilade.methods.decoupled import light_of
 from enfilade.monitor import Silence
-from enfilade.path import load_path
 from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.kept import either_side
@@ -15,9 +15,9 @@ from enfilade.pipeline.light import LEAST_HOLES, LEAST_SHARE, LightTable
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.workshop import Workshop
-from enfilade.scenes import write_scene
 from enfilade.settings import Settings
 from enfilade.store import Run
+from studies.scenes import write_scene
 
 FRAMES = tuple(range(20, 36, 2))  # the camera turns: between the keyframes something else is seen
 

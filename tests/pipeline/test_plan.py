@@ -2,7 +2,8 @@
 
 import pytest
 
-from enfilade.camera import Camera, look_at
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import InputError, SettingsError
 from enfilade.monitor import Silence
 from enfilade.pipeline import plan as module
@@ -13,7 +14,6 @@ from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.rehearsal import excerpt_of, forecast_decoupled
 from enfilade.pipeline.walkthrough import prepare
-from enfilade.records import CameraPath, Segment
 from enfilade.settings import Settings
 from enfilade.store import Run
 from scenes_analytic import room_walk, slide, wall

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from enfilade.codec import read_json, write_json
+from enfilade.camera.path import CameraPath
 from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
+from enfilade.files import read_json, write_json
 from enfilade.monitor import Silence
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.farm import submit, write_template
 from enfilade.pipeline.share import Share, _Patience, do_share, go_on
 from enfilade.pipeline.walkthrough import prepare, render
-from enfilade.records import CameraPath
 from enfilade.store import Run
 from enfilade.store.lock import Lock
 from scenes_analytic import room, room_walk

@@ -10,18 +10,19 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.backends.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
-from enfilade.codec import read_exr
+from enfilade.camera.path import CameraPath
 from enfilade.errors import RunFolderError, SettingsError
-from enfilade.masks import slow_pixels
+from enfilade.images import read_exr
+from enfilade.methods.paper.masks import slow_pixels
 from enfilade.monitor import Silence
 from enfilade.pipeline.inbetween import make_keyframe, read_raw
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.walkthrough import kept, prepare, render
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import CameraPath, Source, SurfaceClass
+from enfilade.records import Source, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
+from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
 from enfilade.store import Run
 from keyframes_analytic import psnr
 from scenes_analytic import ball, room, room_walk, slide, wall

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from enfilade.codec import write_result
+from enfilade.images import write_result
 from enfilade.report import against
 from enfilade.report.against import Against
 from enfilade.report.seen import SeenRun

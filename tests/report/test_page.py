@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from enfilade.codec import read_exr, write_exr
+from enfilade.compare import Terms, compare
 from enfilade.errors import RunFolderError, SettingsError
+from enfilade.images import read_exr, write_exr
+from enfilade.images.view import open_view
+from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Silence
-from enfilade.pipeline.compare import Terms, compare
-from enfilade.pixels.tone import srgb_encode
 from enfilade.records import Source
 from enfilade.report.film import encode_film
 from enfilade.report.layers import SOURCE_COLORS
@@ -24,7 +25,6 @@ from enfilade.report.tables import percent
 from enfilade.settings import Settings, VideoSettings
 from enfilade.store.ledger import sealed
 from enfilade.store.lock import Lock
-from enfilade.video.view import open_view
 from small_runs import TABLES
 
 FRAMES = 10

@@ -2,10 +2,10 @@
 
 import pytest
 
-from enfilade.report.bench_tables import bench_tables
 from enfilade.report.tables import comparison_table, percent, plan_tables, run_tables, seconds
 from made_up_runs import made_up_plan, made_up_summary
 from printed import as_text
+from studies.bench.tables import bench_tables
 
 
 def rows(table):

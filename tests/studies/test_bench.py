@@ -7,23 +7,22 @@ import shutil
 import numpy as np
 import pytest
 
-from enfilade.codec import read_exr
-from enfilade.denoise import why_no_denoiser
+from enfilade.compare.measures import JUDGES, why_missing
 from enfilade.errors import RunFolderError, SettingsError
-from enfilade.judges import JUDGES, why_missing
+from enfilade.images import open_sequence, read_exr
+from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Silence
-from enfilade.report.bench import plot_bench
-from enfilade.report.bench_pictures import plot_crops, plot_slices, write_differences
-from enfilade.report.bench_tables import bench_tables
 from enfilade.settings import Metering
-from enfilade.studies.bench import bench as module
-from enfilade.studies.bench.bench import Terms, bench
-from enfilade.studies.bench.contestants import Preset, chosen, lineup, read_presets
-from enfilade.studies.bench.race import Spent
-from enfilade.video import open_sequence
 from printed import as_text
 from scenes_analytic import room, room_walk
 from small_runs import Told, job_of
+from studies.bench import bench as module
+from studies.bench.bench import Terms, bench
+from studies.bench.charts import plot_bench
+from studies.bench.contestants import Preset, chosen, lineup, read_presets
+from studies.bench.pictures import plot_crops, plot_slices, write_differences
+from studies.bench.race import Spent
+from studies.bench.tables import bench_tables
 
 PRESETS = (
     Preset("paper-2", "paper", {"trace": {"spp": 2}}),

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from enfilade.backends.analytic import load
-from enfilade.backends.analytic_scene import scene_text
-from enfilade.camera import Camera, look_at
-from enfilade.geometry import find_geometry
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.gbuffer import find_geometry
 from enfilade.pipeline.job import open_renderer
+from enfilade.scene.analytic import load
+from enfilade.scene.analytic_scene import scene_text
 from enfilade.settings import TraceSettings
-from enfilade.studies.bench.guides import guides
 from scenes_analytic import room, room_walk
+from studies.bench.guides import guides
 
 CHUNK = 1 << 20
 MIRROR = """<scene version="3.0.0">

@@ -10,7 +10,7 @@ from bench_tasks import HELD_MIB, SPIN_S, Dies, Fails, Holds, Spins
 from enfilade.device import Device
 from enfilade.errors import EnfiladeError, SceneError
 from enfilade.monitor import Silence
-from enfilade.studies.bench.race import _run, race
+from studies.bench.race import _run, race
 
 
 def test_cpu_time_is_charged_by_stage_and_sleep_is_none(tmp_path):

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from enfilade.studies.bench.equal import Point, cost_at, front, ratio_at, ratio_over
-from enfilade.studies.bench.judging import without_silent
-from enfilade.studies.bench.verdict import verdict
+from studies.bench.equal import Point, cost_at, front, ratio_at, ratio_over
+from studies.bench.judging import without_silent
+from studies.bench.verdict import verdict
 
 # Monte Carlo: four times the paths, half the error.
 RIVAL = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]

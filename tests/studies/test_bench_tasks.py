@@ -9,9 +9,9 @@ from enfilade.monitor import Silence
 from enfilade.pipeline.job import Job
 from enfilade.renderer import PixelFilter
 from enfilade.settings import Settings
-from enfilade.studies.bench.tasks import EveryFrame, Interpolated
 from scenes_analytic import room, room_walk
 from small_runs import colors, job_of
+from studies.bench.tasks import EveryFrame, Interpolated
 
 
 @pytest.mark.parametrize("task", [lambda job: EveryFrame(job, PixelFilter.BOX), Interpolated])

@@ -5,27 +5,28 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enfilade.geometry import find_geometry, image_flow
-from enfilade.keyframes import place_keyframes
+from enfilade.camera.path import Segment
+from enfilade.gbuffer import find_geometry, image_flow
+from enfilade.methods.keyframes import place_keyframes
 from enfilade.monitor import Silence
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import open_renderer
 from enfilade.pipeline.plan import hole_percent
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
-from enfilade.records import Segment, SurfaceClass
+from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import AntialiasSettings, KeyframeSettings, Placement, Settings
-from enfilade.studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
-from enfilade.studies.cases import times as table2
-from enfilade.studies.cases.filtering import antialiased
-from enfilade.studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
-from enfilade.studies.cases.plain import PlainlyLit
-from enfilade.studies.cases.seen import Viewer, score_in, visible_percent
-from enfilade.studies.cases.speed import mean_cost, spread_over
-from enfilade.studies.cases.windows import Windows, probes_of
 from scenes_analytic import room, room_walk
 from small_runs import job_of
+from studies.cases import placement, reflections, separation, shares, statistics, supports, threshold
+from studies.cases import times as table2
+from studies.cases.filtering import antialiased
+from studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
+from studies.cases.plain import PlainlyLit
+from studies.cases.seen import Viewer, score_in, visible_percent
+from studies.cases.speed import mean_cost, spread_over
+from studies.cases.windows import Windows, probes_of
 
 
 def windows_of(folder, *, specular=False, count=24, is_plain=True, **tables):
@@ -85,8 +86,8 @@ def test_plain_light_shows_what_mirrors_reflect(shiny):
 
 def test_the_virtual_image_of_a_plane_mirror_stands_still(tmp_path):
     """A mirror as back wall: the reflected room is a room behind it, whose flow is that of its points."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Checker, Material, Quad
-    from enfilade.camera import Camera, look_at
+    from enfilade.camera.pinhole import Camera, look_at
+    from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 
     mirror = Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR)
     checks = Material(Checker((0.8, 0.8, 0.8), (0.2, 0.2, 0.2), 0.5))
@@ -354,7 +355,7 @@ def test_outlines_by_hand():
 
 def test_the_flow_of_the_reflection_keeps_what_the_mirror_shows(tmp_path):
     """Along a plane mirror: its own flow blurs the reflection, that of the virtual image does not."""
-    from enfilade.backends.analytic_scene import AnalyticScene, Checker, Material, Quad
+    from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 
     mirror = Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR)
     checks = Material(Checker((0.9, 0.9, 0.9), (0.1, 0.1, 0.1), 2.4))

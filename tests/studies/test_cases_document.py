@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from enfilade.codec import write_arrays
 from enfilade.errors import InputError
+from enfilade.images import write_arrays
 from enfilade.pipeline.versions import code_digest
-from enfilade.studies.cases.blocks import BLOCKS
-from enfilade.studies.cases.case import Measured
-from enfilade.studies.cases.document import check_blocks, replaced, write_document
-from enfilade.studies.cases.runner import ITEMS, forecast_s
-from enfilade.studies.cases.terms import TERMS
 from made_up_runs import made_up_summary
+from studies.cases.blocks import BLOCKS
+from studies.cases.case import Measured
+from studies.cases.document import check_blocks, replaced, write_document
+from studies.cases.runner import ITEMS, forecast_s
+from studies.cases.terms import TERMS
 
-TEMPLATE = Path(__file__).parents[2] / "docs" / "case-studies.md"
+TEMPLATE = Path(__file__).parents[2] / "studies" / "cases" / "README.md"
 SMALL = TERMS["small"]
 
 

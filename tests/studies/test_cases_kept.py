@@ -7,15 +7,15 @@ import shutil
 import numpy as np
 import pytest
 
-from enfilade.codec import read_json
 from enfilade.errors import RunFolderError
+from enfilade.files import read_json
 from enfilade.monitor import Silence
 from enfilade.report.plots import walkthrough_figure
-from enfilade.studies.cases.case import Case
-from enfilade.studies.cases.runner import ITEMS, measure
-from enfilade.studies.cases.terms import TERMS
 from scenes_analytic import room, room_walk
 from small_runs import Told, job_of
+from studies.cases.case import Case
+from studies.cases.runner import ITEMS, measure
+from studies.cases.terms import TERMS
 
 
 def test_results_are_read_again_and_made_anew_on_other_terms(tmp_path):
@@ -49,7 +49,7 @@ def case(tmp_path, monkeypatch):
         values |= {"seconds": 0.1, "camera_path": cameras}
         (folder / "camera_path.json").write_text(json.dumps(values))
 
-    monkeypatch.setattr("enfilade.studies.cases.case.write_scene", write)
+    monkeypatch.setattr("studies.cases.case.write_scene", write)
     return lambda preset="small", **other: Case(
         "room", dataclasses.replace(TERMS["small"], preset=preset, **other), tmp_path / "room", Silence()
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.metric import Fitted
-from enfilade.studies.people.fits import APERTURES_DEG, TRANSDUCERS, fit
+from studies.observers.fits import APERTURES_DEG, TRANSDUCERS, fit
 
 CANDIDATES = ((1.0,), (2.0,))
 

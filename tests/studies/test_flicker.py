@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enfilade.studies.people.flicker import EXAMPLES, SHARE, Pair, sequences
+from studies.observers.flicker import EXAMPLES, SHARE, Pair, sequences
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enfilade.studies.people.foley import (
+from studies.observers.foley import (
     FREQUENCY_CPD,
     PIXELS_PER_DEGREE,
     SIGMA_DEG,
@@ -11,10 +11,10 @@ from enfilade.studies.people.foley import (
     Masking,
     gabor_and_sine,
 )
-from enfilade.studies.people.mode import PAPER
-from enfilade.studies.people.screen import screen
-from enfilade.studies.people.tables import read_columns
-from enfilade.studies.people.threshold import threshold_contrast
+from studies.observers.mode import PAPER
+from studies.observers.screen import screen
+from studies.observers.tables import read_columns
+from studies.observers.threshold import threshold_contrast
 
 
 def test_target_and_mask_are_in_phase_and_of_contrast_1():

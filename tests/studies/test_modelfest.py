@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from enfilade.studies.people import modelfest
-from enfilade.studies.people.mode import PAPER
-from enfilade.studies.people.modelfest import PIXELS_PER_DEGREE, SIZE_PX, Thresholds, target
-from enfilade.studies.people.screen import screen
-from enfilade.studies.people.threshold import response_jnd, threshold_contrast
+from studies.observers import modelfest
+from studies.observers.mode import PAPER
+from studies.observers.modelfest import PIXELS_PER_DEGREE, SIZE_PX, Thresholds, target
+from studies.observers.screen import screen
+from studies.observers.threshold import response_jnd, threshold_contrast
 
 NUMBERS = [n for n in range(1, 44) if n not in modelfest.IMAGES]
 CENTRE = SIZE_PX // 2

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from enfilade.studies.people import moving_texture
-from enfilade.studies.people.mode import PAPER
-from enfilade.studies.people.moving_texture import DISPLAYS, Condition, Losses, conditions, frames, shown
-from enfilade.studies.people.tables import read_columns, read_textures
+from studies.observers import moving_texture
+from studies.observers.mode import PAPER
+from studies.observers.moving_texture import DISPLAYS, Condition, Losses, conditions, frames, shown
+from studies.observers.tables import read_columns, read_textures
 
 
 def texels(seed=1):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from enfilade.studies.people import sensitivity
-from enfilade.studies.people.mode import MODERN, PAPER
+from studies.observers import sensitivity
+from studies.observers.mode import MODERN, PAPER
 
 
 def test_sensitivities_of_modelfest_are_those_of_its_targets():

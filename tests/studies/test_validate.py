@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from enfilade.cli import main
 from enfilade.metric import MetricOptions
 from enfilade.monitor import Silence
-from enfilade.studies.people import validate as validation
-from enfilade.studies.people.figures import ASKED, Asked, Figure, Measured
-from enfilade.studies.people.fits import Fit
-from enfilade.studies.people.flicker import Pair
-from enfilade.studies.people.foley import Masking
-from enfilade.studies.people.mode import MODERN, PAPER
-from enfilade.studies.people.modelfest import Thresholds
-from enfilade.studies.people.moving_texture import Losses, conditions
-from enfilade.studies.people.sensitivity import STUDIES, Sensitivities
-from enfilade.studies.people.validate import Validation, ablations
+from studies.__main__ import main
+from studies.observers import validate as validation
+from studies.observers.figures import ASKED, Asked, Figure, Measured
+from studies.observers.fits import Fit
+from studies.observers.flicker import Pair
+from studies.observers.foley import Masking
+from studies.observers.mode import MODERN, PAPER
+from studies.observers.modelfest import Thresholds
+from studies.observers.moving_texture import Losses, conditions
+from studies.observers.sensitivity import STUDIES, Sensitivities
+from studies.observers.validate import Validation, ablations
 
 
 def made_up(mode, *, error_db=0.5, flicker_jnd=2.0, is_bound=True):

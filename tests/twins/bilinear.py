@@ -1,4 +1,4 @@
-"""Twin of `enfilade.pixels.gather`: one position at a time, float64."""
+"""Twin of `enfilade.kernels.gather`: one position at a time, float64."""
 
 import math
 

@@ -17,8 +17,8 @@ from enfilade.cli.outcome import check_png
 from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
-    from enfilade.pipeline.compare import JudgedFrame, Terms
-    from enfilade.pipeline.compare.judge import Show
+    from enfilade.compare import JudgedFrame, Terms
+    from enfilade.compare.judge import Show
     from enfilade.report.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
@@ -146,7 +146,7 @@ def command(
     _check_apart(test, reference, heatmap, graph)
     terms = _terms(ctx, **choices)
     from enfilade.cli.progress import watch
-    from enfilade.pipeline.compare import compare
+    from enfilade.compare import compare
 
     with watch(quiet=quiet) as monitor:
         found = compare(test, reference, terms, monitor, show=show).to_dict()
@@ -175,7 +175,7 @@ def _terms(
     layers: tuple[str, ...],
     device: str,
 ) -> Terms:
-    from enfilade.pipeline.compare import FlowChoice, Terms, kernels_serve, metric_options
+    from enfilade.compare import FlowChoice, Terms, kernels_serve, metric_options
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
@@ -245,7 +245,7 @@ def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | 
     """Refuse to write over what is compared."""
     if heatmap is None and graph is None:
         return
-    from enfilade.video import files_of
+    from enfilade.images import files_of
 
     ours, theirs = files_of(test), files_of(reference)
     read = {_place_on_disk(file) for file in (*ours, *theirs)} - {None}

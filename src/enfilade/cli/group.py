@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shlex
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -11,20 +12,7 @@ import click
 from enfilade import __version__
 from enfilade.errors import EnfiladeError, InputError
 
-COMMANDS = (
-    "render",
-    "work",
-    "farm",
-    "encode",
-    "plan",
-    "compare",
-    "report",
-    "bench",
-    "calibrate",
-    "scene",
-    "validate",
-    "doctor",
-)
+COMMANDS = ("render", "work", "farm", "encode", "plan", "compare", "report", "doctor")
 FAILURE = 1
 WRONG_INPUT = 2
 INTERRUPTED = 130
@@ -47,19 +35,31 @@ class WrongInput(click.ClickException):
 
 
 class EnfiladeGroup(click.Group):
-    """A group that loads a command's module when it is used and turns errors into exit codes."""
+    """A group that loads a command's module when it is used and turns errors into exit codes.
+
+    Parameters
+    ----------
+    modules
+        The module of each command, by its name; it has the command as ``command``.
+    attributes
+        Of a click group.
+    """
+
+    def __init__(self, *, modules: Mapping[str, str] | None = None, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self._modules = modules or {name: f"enfilade.cli.{name}" for name in COMMANDS}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands, in the order of use."""
         del ctx
-        return list(COMMANDS)
+        return list(self._modules)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Load the module of one command."""
         del ctx
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self._modules:
             return None
-        command: click.Command = importlib.import_module(f"enfilade.cli.{cmd_name}").command
+        command: click.Command = importlib.import_module(self._modules[cmd_name]).command
         return command
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -99,7 +99,7 @@ def _message(error: Exception) -> str:
 def _farewell(ctx: click.Context) -> str:
     if not ctx.meta.get(_RESUMABLE):
         return "\nInterrupted."
-    line = shlex.join(["enfilade", *ctx.meta[_ARGUMENTS]])
+    line = f"{ctx.find_root().info_name} {shlex.join(ctx.meta[_ARGUMENTS])}"
     return f"\nInterrupted. What is finished stays in the run folder; to continue:\n  {line}"
 
 

@@ -195,7 +195,7 @@ def job_of(
             )
     if note := activate(device).note:
         click.echo(f"note    rendered on the CPU: {note}", err=True)
-    from enfilade.path import load_path, parse_frames
+    from enfilade.camera import load_path, parse_frames
     from enfilade.pipeline.job import Job
 
     selected = None if frames is None else parse_frames(frames)

@@ -79,8 +79,8 @@ def command(
         raise SettingsError("--out says nothing to --serve, which writes no page; leave one of them out")
     if port and not is_served:
         raise SettingsError("--port says nothing without --serve; add that, or leave it out")
+    from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
-    from enfilade.path import parse_frames
     from enfilade.report.page import Wishes, write_page
 
     numbers = None if frames is None else parse_frames(frames)

@@ -10,8 +10,8 @@ from enum import Enum
 from typing import Any, Protocol
 
 from enfilade import errors
-from enfilade.codec.whole import is_passing
 from enfilade.executors.unit import Unit
+from enfilade.files import is_passing
 
 Tell = Callable[[str, Any], None]
 Hear = Callable[[Unit, str, Any], None]

@@ -17,11 +17,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from enfilade.codec.whole import unwritable
 from enfilade.executors.executor import Event, Failure, FailureKind, Hear, Recipe
 from enfilade.executors.resources import oom_kills
 from enfilade.executors.unit import Unit
 from enfilade.executors.watch import Limits, Watch
+from enfilade.files import unwritable
 
 CHILD = "enfilade.executors.child"
 RECEIVED = 1 << 16  # bytes taken at once

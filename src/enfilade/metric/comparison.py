@@ -9,13 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.metric.cortex import Band
-from enfilade.metric.pooling import (
-    POOLING_EXPONENT,
-    detection_probability,
-    percent_visible,
-    raised,
-    root,
-)
+from enfilade.metric.pooling import POOLING_EXPONENT, detection_probability, percent_visible, raised, root
 from enfilade.metric.pyramid import double, halve, halved_shape
 from enfilade.metric.spatial import Aperture
 

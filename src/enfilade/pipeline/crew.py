@@ -11,7 +11,6 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from enfilade.codec import whole_file
 from enfilade.device import active
 from enfilade.errors import EnfiladeError, NoSpaceError, UnfinishedError
 from enfilade.executors import (
@@ -26,6 +25,7 @@ from enfilade.executors import (
     supervise,
 )
 from enfilade.executors.inprocess import InProcess
+from enfilade.files import whole_file
 from enfilade.monitor import Monitor
 from enfilade.pipeline.hire import Distant
 from enfilade.pipeline.job import Job, check_identity

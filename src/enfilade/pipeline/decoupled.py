@@ -15,17 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.codec import read_parts, write_parts
-from enfilade.irradiance import LightCache, open_scattered, over_time, smoothed
-from enfilade.masks import lamp_pixels
+from enfilade.images import read_parts, write_parts
+from enfilade.kernels.estimate import LUMINANCE, Estimate
+from enfilade.kernels.lookup import Page
+from enfilade.methods.decoupled import LightCache, open_scattered, over_time, smoothed
+from enfilade.methods.paper.masks import lamp_pixels
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept, around
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.units import REACH
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import LUMINANCE, Estimate
-from enfilade.pixels.lookup import Page
 from enfilade.records import F32, LOBE_LAYERS, U8, Frame, Geometry, Mask, Shading, Source
 from enfilade.renderer import PixelFilter, Purpose
 

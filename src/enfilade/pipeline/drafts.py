@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from enfilade.codec import read_arrays, read_light, write_arrays, write_light
-from enfilade.geometry import find_geometry
-from enfilade.irradiance import Estimates, LightCache, open_cache, open_page, pooled
-from enfilade.irradiance.cells import Cells
+from enfilade.gbuffer import find_geometry
+from enfilade.images import read_arrays, read_light, write_arrays, write_light
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.lookup import Page
+from enfilade.methods.decoupled import Estimates, LightCache, open_cache, open_page, pooled
+from enfilade.methods.decoupled.cells import Cells
 from enfilade.pipeline.kept import Kept, nearest
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import Estimate, Samples
-from enfilade.pixels.lookup import Page
 from enfilade.records import LOBE_LAYERS, LightPage
 from enfilade.renderer import PixelFilter, Purpose
 

@@ -10,16 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.codec import read_exr
 from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
+from enfilade.images import check_encodable, encode_video, read_exr, video_suffix
+from enfilade.images.codecs import odd_size_note
 from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.records import F32
 from enfilade.settings import VideoSettings, ViewingSettings
 from enfilade.store import Run
 from enfilade.store.guest import guest
-from enfilade.video import check_encodable, encode_video, video_suffix
-from enfilade.video.codecs import odd_size_note
 
 NAME = "encoded"  # of the video where none is given
 OWN = "video"  # ... and of the run's

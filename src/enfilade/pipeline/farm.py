@@ -16,8 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from enfilade.codec import write_json
 from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.files import write_json
 from enfilade.pipeline.job import read_job
 from enfilade.pipeline.units import CLIPS_STEP, STEPS, clips_of
 

@@ -9,20 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.antialias import (
-    Slice,
-    filter_along_flow,
-    reconstruct,
-    temporal_limits,
-)
-from enfilade.codec import read_exr, write_result
-from enfilade.geometry import positions
+from enfilade.gbuffer import positions
+from enfilade.images import encode_video, exact_fps, join_videos, read_exr, video_suffix, write_result
+from enfilade.methods.paper import Slice, filter_along_flow, reconstruct, temporal_limits
 from enfilade.pipeline.inbetween import read_raw
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import F32, U8, Frame, Source
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.video import encode_video, exact_fps, join_videos, video_suffix
 
 BEYOND = 1e10  # depth of the sky
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.codec import read_frame, write_frame
-from enfilade.masks import slow_pixels, sources, specular_pixels
+from enfilade.camera.path import Segment
+from enfilade.images import read_frame, write_frame
+from enfilade.methods.paper import composite
+from enfilade.methods.paper.masks import slow_pixels, sources, specular_pixels
 from enfilade.pipeline.refine import Verdict, warped_pair
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import F32, Frame, Mask, Segment, Source
+from enfilade.records import F32, Frame, Mask, Source
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.warp import composite
 
 
 def raw_unit(workshop: Workshop, frame: int) -> str:

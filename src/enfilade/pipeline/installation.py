@@ -129,7 +129,7 @@ def _variant(choice: Choice) -> Check:
 def _codecs() -> Iterator[Check]:
     from av.codec import codecs_available
 
-    from enfilade.video.codecs import CODECS
+    from enfilade.images.codecs import CODECS
 
     for name, codec in CODECS.items():
         is_there = codec.encoder in codecs_available

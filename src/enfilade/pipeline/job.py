@@ -11,18 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.camera import Camera
-from enfilade.codec import read_json
-from enfilade.denoise import denoiser_name, why_no_denoiser
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera
 from enfilade.device import active
 from enfilade.errors import CameraPathError, RunFolderError, SettingsError
+from enfilade.files import read_json
+from enfilade.images import check_encodable
+from enfilade.images.view import view_identity
+from enfilade.methods.denoise import denoiser_name, why_no_denoiser
 from enfilade.pipeline.versions import makers
-from enfilade.records import CameraPath
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings, TraceSettings
 from enfilade.store import Run
-from enfilade.video import check_encodable
-from enfilade.video.view import view_identity
 from enfilade.viewing import Viewing
 
 ANALYTIC_SUFFIX = ".analytic.json"
@@ -129,8 +129,8 @@ class Job:
                     "Mitsuba scene; add --method paper"
                 )
             return  # its files are its own, and it has no plugins
-        from enfilade.backends.scenecheck import check_scene
-        from enfilade.backends.trial import try_scene
+        from enfilade.scene.scenecheck import check_scene
+        from enfilade.scene.trial import try_scene
 
         check_scene(self.scene, self.settings.limits)
         if is_tried:
@@ -260,10 +260,10 @@ def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:
         No usable LLVM or CUDA.
     """
     if scene.name.endswith(ANALYTIC_SUFFIX):
-        from enfilade.backends.analytic import load
+        from enfilade.scene.analytic import load
 
         return load(scene, chunk=settings.chunk)
-    from enfilade.backends.mitsuba3 import MitsubaRenderer
+    from enfilade.scene.mitsuba import MitsubaRenderer
 
     return MitsubaRenderer(scene, settings)
 
@@ -271,10 +271,10 @@ def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:
 def _renderer_and_fingerprint(scene: Path) -> tuple[str, str]:
     """Name of the renderer, and what the scene's files hold, without loading either."""
     if scene.name.endswith(ANALYTIC_SUFFIX):
-        from enfilade.backends.analytic_scene import NAME, read_scene, scene_text
+        from enfilade.scene.analytic_scene import NAME, read_scene, scene_text
 
         return NAME, hashlib.sha256(scene_text(read_scene(scene)).encode()).hexdigest()
-    from enfilade.backends.scenefile import fingerprint
+    from enfilade.scene.scenefile import fingerprint
 
     return f"Mitsuba {importlib.metadata.version('mitsuba')}", fingerprint(scene)
 

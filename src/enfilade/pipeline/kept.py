@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import TypeVar
 
-from enfilade.records import CameraPath
+from enfilade.camera.path import CameraPath
 
 T = TypeVar("T")
 

@@ -8,24 +8,17 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from enfilade.codec import read_light, write_light
-from enfilade.denoise import denoise
+from enfilade.camera.path import Segment
 from enfilade.errors import DamagedFileError
-from enfilade.irradiance import (
-    LightCache,
-    known,
-    light_of,
-    open_cache,
-    open_page,
-    pooled,
-    seen_from,
-)
+from enfilade.images import read_light, write_light
+from enfilade.kernels.estimate import Estimate
+from enfilade.kernels.lookup import Page
+from enfilade.methods.decoupled import LightCache, known, light_of, open_cache, open_page, pooled, seen_from
+from enfilade.methods.denoise import denoise
 from enfilade.pipeline.drafts import Drafts
 from enfilade.pipeline.kept import Kept, either_side, nearest
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.estimate import Estimate
-from enfilade.pixels.lookup import Page
-from enfilade.records import F32, Geometry, LightPage, Mask, Segment, Shading
+from enfilade.records import F32, Geometry, LightPage, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
 
 LEAST_SHARE = 1e-3  # of a page: it counts where no other knows the surface

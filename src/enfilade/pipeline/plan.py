@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.camera.path import Segment
+from enfilade.methods.paper import composite, warp_keyframe
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job, open_renderer
@@ -16,9 +18,8 @@ from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import check_job
-from enfilade.records import Keyframe, Segment, Shading
+from enfilade.records import Keyframe, Shading
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
-from enfilade.warp import composite, warp_keyframe
 
 HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
 PROBE_PIXELS, PROBE_SPP = 4096, 16  # paths traced to learn what a path costs

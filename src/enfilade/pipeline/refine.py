@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.antialias import reconstruct
-from enfilade.masks import slow_pixels, specular_pixels, unseen_items
+from enfilade.camera.path import Segment
+from enfilade.kernels.convolve import SIGMAS
+from enfilade.methods.paper import agrees, reconstruct, warp_keyframe
+from enfilade.methods.paper.masks import slow_pixels, specular_pixels, unseen_items
 from enfilade.metric import Pursuit
 from enfilade.pipeline.views import View
 from enfilade.pipeline.workshop import Workshop
-from enfilade.pixels.convolve import SIGMAS
-from enfilade.records import F32, Mask, Segment, Warped
-from enfilade.warp import agrees, warp_keyframe
+from enfilade.records import F32, Mask, Warped
 
 JUDGED_SHARE = 0.05  # of the image: fewer unmasked pixels than this say nothing about a segment
 GAIN = 0.9  # a half must show less than this part of its whole's differences to be split again

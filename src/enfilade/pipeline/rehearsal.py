@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from enfilade.camera.path import CameraPath, Segment
 from enfilade.monitor import Monitor
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.light import paths_for
 from enfilade.pipeline.walkthrough import render
-from enfilade.records import CameraPath, Segment
 from enfilade.store import Run, tally
 
 __all__ = ["excerpt_of", "forecast_decoupled"]

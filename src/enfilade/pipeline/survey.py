@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.keyframes import place_keyframes
-from enfilade.masks import slow_pixels
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.methods.keyframes import place_keyframes
+from enfilade.methods.paper.masks import slow_pixels
 from enfilade.monitor import Monitor
 from enfilade.pipeline.views import Views
-from enfilade.records import CameraPath, Segment
 from enfilade.settings import Settings
 
 

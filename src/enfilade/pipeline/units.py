@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from enfilade.camera.path import Segment
 from enfilade.executors import Unit
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.kept import around
 from enfilade.pipeline.survey import Survey, initial_segments
-from enfilade.records import Segment
 from enfilade.store import Run
 
 

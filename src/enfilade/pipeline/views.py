@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from enfilade.camera import Camera
-from enfilade.geometry import find_geometry, image_flow
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera
+from enfilade.gbuffer import find_geometry, image_flow
 from enfilade.pipeline.cost import Costs
-from enfilade.records import F32, CameraPath, Flow, Geometry
+from enfilade.records import F32, Flow, Geometry
 from enfilade.renderer import Renderer
 from enfilade.viewing import Viewing
 

@@ -7,9 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from enfilade.codec import read_json
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.executors.opener import check_executor
+from enfilade.files import read_json
+from enfilade.images.codecs import odd_size_note
 from enfilade.monitor import Monitor
 from enfilade.pipeline.crew import Crew, carry_out
 from enfilade.pipeline.encode import encode_instead, is_of_video
@@ -19,7 +20,6 @@ from enfilade.pipeline.units import Blueprint
 from enfilade.store import Run
 from enfilade.store.identity import RUN_FILE
 from enfilade.store.identity import prepare as make_fit
-from enfilade.video.codecs import odd_size_note
 
 METHODS = ("decoupled", "paper", "reference")
 LEAST_SPP = 2  # of the paper's method

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from enfilade.arrays import release_memory
+from enfilade.camera.path import Segment
 from enfilade.monitor import Monitor
 from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.finish import Antialiasing, trace_reference, write_clip, write_video
@@ -18,7 +19,6 @@ from enfilade.pipeline.refine import Verdict, refine
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.units import clip_name, clips_of, segment_name, segments_of
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import Segment
 from enfilade.store import Run
 
 LEAST_CHUNK = 1024

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.antialias import spatial_support_px
-from enfilade.codec import read_shading, write_shading
 from enfilade.errors import SettingsError
-from enfilade.irradiance import Shader, VirtualImages
+from enfilade.images import read_shading, write_shading
+from enfilade.kernels.tone import display_luminance
+from enfilade.methods.decoupled import Shader, VirtualImages
+from enfilade.methods.paper import spatial_support_px
 from enfilade.metric import Aqm, MetricOptions
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
-from enfilade.pixels.tone import display_luminance
 from enfilade.records import F32, Keyframe, Mask, Shading
 from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.store import Run

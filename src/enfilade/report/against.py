@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from enfilade.compare.measures.shown import Shown, shown
 from enfilade.errors import ImageError, RunFolderError
-from enfilade.judges.shown import Shown, shown
+from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Pursuit, SequenceAqm
-from enfilade.pixels.tone import srgb_encode
 from enfilade.records import F32, Flow
 from enfilade.report.seen import SeenFrame, SeenRun
 from enfilade.settings import MetricSettings

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.ticker import MaxNLocator
 
-from enfilade.codec import whole_file
+from enfilade.files import whole_file
 
 __all__ = [
     "BLUE",

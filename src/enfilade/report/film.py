@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from enfilade.errors import ImageError, RunFolderError
+from enfilade.images.stills import encode_webp, resized
+from enfilade.images.view import View
 from enfilade.monitor import Monitor
 from enfilade.records import U8
 from enfilade.report.against import Against, Beside
 from enfilade.report.layers import LAYERS, painted
 from enfilade.report.seen import SeenFrame, SeenRun
-from enfilade.video.stills import encode_webp, resized
-from enfilade.video.view import View
 
 __all__ = ["Film", "encode_film"]
 

@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.errors import RunFolderError, SettingsError
-from enfilade.pixels.tone import srgb_decode
+from enfilade.images import encode_video
+from enfilade.kernels.tone import srgb_decode
 from enfilade.records import F32, U8
 from enfilade.report.charts import Figure, pixels, save_picture
 from enfilade.settings import VideoSettings
-from enfilade.video import encode_video
 
 __all__ = ["VIDEO_CODECS", "HeatmapPainter", "overlay", "write_heatmap_images", "write_heatmap_video"]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.images.view import View
 from enfilade.metric.pooling import detection_probability
 from enfilade.records import F32, U8, Source
 from enfilade.report import heatmap
 from enfilade.report.against import Beside
 from enfilade.report.scales import DIFFERENCE, VELOCITY, Scale
 from enfilade.report.seen import SeenFrame
-from enfilade.video.view import View
 from enfilade.viewing import Viewing
 
 __all__ = ["LAYERS", "SOURCE_COLORS", "Layer", "painted"]

@@ -14,8 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from enfilade import __version__
-from enfilade.codec import whole_file
 from enfilade.errors import SettingsError
+from enfilade.files import whole_file
+from enfilade.images.view import View, open_view
 from enfilade.monitor import Monitor
 from enfilade.report.against import Against
 from enfilade.report.contents import contents
@@ -23,7 +24,6 @@ from enfilade.report.film import Film, encode_film
 from enfilade.report.layers import LAYERS
 from enfilade.report.seen import SeenRun
 from enfilade.report.tables import percent, seconds
-from enfilade.video.view import View, open_view
 
 __all__ = ["LEAST_MB", "Wishes", "write_page"]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from enfilade import __version__
-from enfilade.codec import read_exr
 from enfilade.errors import ImageError, RunFolderError
+from enfilade.images import read_exr
 from enfilade.records import F32, LOBE_LAYERS, U8, Flow
 from enfilade.report.alive import silent_since
 from enfilade.settings import MaskSettings, VideoSettings, ViewingSettings

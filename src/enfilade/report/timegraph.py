@@ -8,17 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.report.charts import (
-    BLUE,
-    GREY,
-    INK,
-    VERMILION,
-    Figure,
-    frame_edges,
-    legend,
-    new_figure,
-    save,
-)
+from enfilade.report.charts import BLUE, GREY, INK, VERMILION, Figure, frame_edges, legend, new_figure, save
 
 __all__ = ["plot_comparison", "time_figure"]
 

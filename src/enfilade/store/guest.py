@@ -7,7 +7,7 @@ import fcntl
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from enfilade.codec import sweep
+from enfilade.files import sweep
 from enfilade.store.identity import RUN_FILE
 
 __all__ = ["guest", "sweep_but_guests"]

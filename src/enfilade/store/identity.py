@@ -8,9 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from enfilade.codec import read_json, write_json
-from enfilade.codec.whole import MARK, is_full, json_bytes, unwritable
 from enfilade.errors import RunFolderError
+from enfilade.files import MARK, is_full, json_bytes, read_json, unwritable, write_json
 from enfilade.store.checksum import checksum
 from enfilade.store.ledger import head_of
 from enfilade.store.lock import LOCK_NAME

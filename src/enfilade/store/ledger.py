@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from enfilade.codec import whole
+from enfilade import files as whole
 from enfilade.errors import RunFolderError
 
 __all__ = ["Ledger", "covered", "head_of"]

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from enfilade.codec.whole import is_full, unwritable
 from enfilade.errors import RunFolderError
+from enfilade.files import is_full, unwritable
 
 __all__ = ["LOCK_NAME", "PART_LOCKS", "Lock", "Wait", "sign_workers", "writers_of"]
 

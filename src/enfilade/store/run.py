@@ -9,9 +9,8 @@ from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self
 
-from enfilade.codec import write_json
-from enfilade.codec.whole import unwritable
 from enfilade.errors import DamagedFileError, RunFolderError
+from enfilade.files import unwritable, write_json
 from enfilade.store.checksum import checksum, size_of
 from enfilade.store.guest import sweep_but_guests
 from enfilade.store.identity import LEDGER_FILE, RUN_FILE, claim, identity_of, prepare

@@ -1,5 +1,0 @@
-"""Mitsuba 3, embedded (Jakob et al. 2022): the renderer that comes with enfilade."""
-
-from enfilade.backends.mitsuba3.renderer import MitsubaRenderer
-
-__all__ = ["MitsubaRenderer"]

@@ -1,0 +1,285 @@
+"""Two sequences side by side: what has to be alike, and each pair of frames as the screen shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.errors import ImageError
+from enfilade.files import read_json
+from enfilade.images import FencedSequence, Sequence
+from enfilade.kernels.tone import display_luminance, srgb_encode
+from enfilade.monitor import Monitor
+from enfilade.records import F32
+from enfilade.settings import LimitSettings
+from enfilade.viewing import Viewing
+
+__all__ = ["Pair", "Pairs", "open_pairs"]
+
+DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
+FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One frame of each sequence, as the screen shows them.
+
+    Attributes
+    ----------
+    index : int
+        From 0.
+    name : str
+        Of the test's frame.
+    number : int
+        Of the test's frame; from 1 where it has none of its own.
+    test, reference : (H, W) float32
+        Luminance, cd/m2.
+    reference_relative : (H, W) float32
+        Of the reference, 1 = white.
+    squared_error : float
+        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+    """
+
+    index: int
+    name: str
+    number: int
+    test: F32
+    reference: F32
+    reference_relative: F32
+    squared_error: float
+
+
+class Pairs:
+    """Two sequences of one length and size, read frame by frame, each once.
+
+    Parameters
+    ----------
+    test, reference : Sequence
+    fps
+        Frames per second that are shown; None takes the reference's, the test's, or 30.
+    exposure_ev
+        Stops, of OpenEXR frames; others are as shown. None takes what the run folders say, else 0.
+
+    Attributes
+    ----------
+    test, reference : Sequence
+    fps, exposure_ev : float
+    starts : frozenset of int or None
+        Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
+        says so.
+    note : str
+        What to know of how the frames are paired, or of what they can show; empty where there is nothing.
+
+    Raises
+    ------
+    ImageError
+        They differ in length, size or frame rate, or are runs of other frames or of different exposure.
+    """
+
+    def __init__(
+        self, test: Sequence, reference: Sequence, *, fps: float | None, exposure_ev: float | None
+    ) -> None:
+        _check_alike(test, reference)
+        self.test, self.reference = test, reference
+        self.fps = _common_fps(test, reference) if fps is None else fps
+        self.exposure_ev = _common_exposure_ev(test, reference) if exposure_ev is None else exposure_ev
+        known = [s.starts for s in (test, reference) if s.starts is not None]
+        self.starts = frozenset[int]().union(*known) if known else None
+        self.note = _note_on_numbers(test, reference)
+        self._exposures_ev = [self.exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
+
+    def __len__(self) -> int:
+        return len(self.test)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.test.width, self.test.height
+
+    def shown(self, viewing: Viewing, monitor: Monitor) -> Iterator[Pair]:
+        """Frames as the screen of `viewing` shows them; each is read when it is asked for.
+
+        Negative values, which no screen shows, are black; that is said once.
+
+        Raises
+        ------
+        ImageError
+            A frame can't be read, or holds a NaN or an infinity.
+        """
+        is_said = False
+        for index, images in enumerate(zip(self.test, self.reference, strict=True)):
+            least = [
+                _checked(image, s.name(index))
+                for image, s in zip(images, (self.test, self.reference), strict=True)
+            ]
+            if min(least) < 0.0 and not is_said:
+                first = (self.test, self.reference)[least.index(min(least))].name(index)
+                monitor.say(f"{first} holds negative values; a screen shows them, and more like them, as 0")
+                is_said = True
+            yield self._pair(index, images, viewing)
+
+    def _pair(self, index: int, images: tuple[F32, F32], viewing: Viewing) -> Pair:
+        # What is equal stays exactly equal: both take the same steps.
+        exposed = [
+            np.clip(image * np.float32(2.0**ev), 0.0, 1.0)
+            for image, ev in zip(images, self._exposures_ev, strict=True)
+        ]
+        relative = [
+            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0) for image in exposed
+        ]
+        span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
+        test, reference = (image * span + black for image in relative)
+        error = _squared_error(*exposed)
+        name, numbers = self.test.name(index), self.test.numbers
+        number = index + 1 if numbers is None else numbers[index]
+        return Pair(index, name, number, test, reference, relative[1], error)
+
+
+def open_pairs(
+    test: Path | str,
+    reference: Path | str,
+    limits: LimitSettings,
+    *,
+    fps: float | None,
+    exposure_ev: float | None,
+    layers: tuple[str | None, str | None] = (None, None),
+) -> Pairs:
+    """Open two sequences to be compared, each decoded by a process of its own.
+
+    Parameters
+    ----------
+    test, reference
+        Whatever :func:`enfilade.images.open_sequence` reads.
+    limits
+        Memory and time of those processes.
+    fps, exposure_ev
+        See :class:`Pairs`.
+    layers
+        Of the test and the reference, where they are OpenEXR frames: what is the picture.
+
+    Raises
+    ------
+    ImageError
+        One can't be read, a layer is asked for and none has layers, they differ in length, size or frame
+        rate, or are runs of other frames or of different exposure.
+    """
+    sides = zip((test, reference), layers, strict=True)
+    sequences = [FencedSequence(source, limits, layer=layer) for source, layer in sides]
+    if any(layers) and not any(_is_exr(sequence) for sequence in sequences):
+        raise ImageError(
+            f"neither {sequences[0].name(0)} nor {sequences[1].name(0)} has layers; leave out --layer, which "
+            "chooses one of OpenEXR frames"
+        )
+    pairs = Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
+    pairs.note = pairs.note or _note_on_paths(test, reference)
+    return pairs
+
+
+def _squared_error(test: F32, reference: F32) -> float:
+    if np.array_equal(test, reference):
+        return 0.0
+    difference = srgb_encode(test) - srgb_encode(reference)
+    return float(np.vdot(difference, difference)) / difference.size
+
+
+def _checked(image: F32, name: str) -> float:
+    least, most = float(image.min()), float(image.max())
+    if np.isfinite(least) and np.isfinite(most):
+        return least
+    bad = ~np.isfinite(image).all(axis=2)
+    row, column = np.argwhere(bad)[0].tolist()
+    raise ImageError(
+        f"{name} has {np.count_nonzero(bad)} pixels that are NaN or infinite, the first in row {row}, "
+        f"column {column} (from 0); render it again or repair them"
+    )
+
+
+def _check_alike(test: Sequence, reference: Sequence) -> None:
+    if test.starts is not None and reference.starts is not None:
+        _check_same_frames(test, reference)
+    if len(test) != len(reference):
+        raise ImageError(
+            f"the test has {len(test)} frames (first {test.name(0)}) and the reference {len(reference)} "
+            f"(first {reference.name(0)}); give equal ones"
+        )
+    sizes = [f"{s.width}x{s.height}" for s in (test, reference)]
+    if sizes[0] != sizes[1]:
+        raise ImageError(
+            f"the test's images are {sizes[0]} ({test.name(0)}) and the reference's {sizes[1]} "
+            f"({reference.name(0)}); give equal ones"
+        )
+
+
+def _check_same_frames(test: Sequence, reference: Sequence) -> None:
+    ours, theirs = test.numbers or (), reference.numbers or ()
+    differing = set(ours) ^ set(theirs)
+    if not differing:
+        return
+    number = min(differing)
+    roles = (("test", test, ours), ("reference", reference, theirs))
+    (role, has, numbers), (other, lacks, _) = roles if number in ours else roles[::-1]
+    raise ImageError(
+        f"the {role}'s run has the frame {number} ({has.name(numbers.index(number))}), and the {other}'s "
+        f"(first {lacks.name(0)}) does not: give runs of the same --frames, finish the one that lacks it, or "
+        "give patterns of frames that both have"
+    )
+
+
+def _note_on_paths(test: Path | str, reference: Path | str) -> str:
+    ours, theirs = _path_of(test), _path_of(reference)
+    # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
+    # them: another host may round the same poses otherwise.
+    is_told = "poses" in ours and "poses" in theirs and ours.get("frames") == theirs.get("frames")
+    if not is_told or ours["poses"] == theirs["poses"]:
+        return ""
+    return (
+        f"camera: {test} and {reference} are of different camera paths (other poses in run.json): "
+        "frames of one number may show different views"
+    )
+
+
+def _path_of(source: Path | str) -> dict[str, Any]:
+    """The camera path as a run folder's ``run.json`` has it; nothing where there is none."""
+    file = Path(source) / "run.json"
+    found: Any = read_json(file) if file.is_file() else None
+    for key in ("identity", "path"):
+        found = found.get(key) if isinstance(found, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
+def _note_on_numbers(test: Sequence, reference: Sequence) -> str:
+    if test.numbers is None or reference.numbers is None or test.numbers == reference.numbers:
+        return ""
+    pairs = enumerate(zip(test.numbers, reference.numbers, strict=True))
+    index = next(i for i, (ours, theirs) in pairs if ours != theirs)
+    return (
+        f"frames: their numbers differ, so they are paired in order: {test.name(index)} with "
+        f"{reference.name(index)}, and so on"
+    )
+
+
+def _common_fps(test: Sequence, reference: Sequence) -> float:
+    if test.fps and reference.fps and abs(test.fps / reference.fps - 1.0) > FPS_TOLERANCE:
+        raise ImageError(
+            f"the test plays at {test.fps:g} frames per second ({test.name(0)}) and the reference at "
+            f"{reference.fps:g} ({reference.name(0)}); say with --fps at which both are shown"
+        )
+    return reference.fps or test.fps or DEFAULT_FPS
+
+
+def _common_exposure_ev(test: Sequence, reference: Sequence) -> float:
+    known = [s.exposure_ev for s in (test, reference) if s.exposure_ev is not None]
+    if known and known[0] != known[-1]:
+        raise ImageError(
+            f"the test's run is shown at {known[0]:+g} stops ({test.name(0)}) and the reference's at "
+            f"{known[-1]:+g} ({reference.name(0)}); say with --viewing-exposure-ev at which both are shown"
+        )
+    return known[0] if known else 0.0
+
+
+def _is_exr(sequence: Sequence) -> bool:
+    return sequence.name(0).lower().endswith(".exr")

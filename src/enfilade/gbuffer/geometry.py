@@ -1,0 +1,54 @@
+"""The G-buffer of a frame: range, item and material of what each pixel's centre sees (§1)."""
+
+from __future__ import annotations
+
+import drjit as dr
+import numpy as np
+
+from enfilade.arrays import Float, image, matrix3, pixel_grid, vector3
+from enfilade.camera.pinhole import Camera
+from enfilade.kernels.rays import pinhole_directions
+from enfilade.records import F32, Geometry
+from enfilade.renderer import Rays, Renderer
+
+
+def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
+    """Find what each pixel's centre sees.
+
+    Costs one ray a pixel (more where masked surfaces are looked through), and no shading.
+    """
+    height, width = camera.height, camera.width
+    _, column, row = pixel_grid(height, width)
+    direction = pinhole_directions(
+        Float(column) + 0.5,
+        Float(row) + 0.5,
+        direction_from_pixel=matrix3(camera.direction_from_pixel),
+    )
+    seen = renderer.surfaces(Rays(origin=vector3(camera.eye), direction=direction))
+
+    # Directions are of unit depth, so that distances along them are depths.
+    depth = dr.select(seen.is_hit, seen.distance, 0)
+    normal = dr.select(seen.is_hit, seen.normal, 0)
+    albedo = dr.select(seen.is_hit, seen.albedo, 0)
+    item = dr.select(seen.is_hit, seen.item, 0)
+    surface = dr.select(seen.is_hit, seen.surface, 0)
+    dr.eval(depth, normal, albedo, item, surface)
+    return Geometry(
+        camera=camera,
+        depth=image(depth, height, width),
+        normal=image(normal, height, width),
+        albedo=image(albedo, height, width),
+        item=image(item, height, width),
+        surface=image(surface, height, width).astype(np.uint8),
+    )
+
+
+def positions(geometry: Geometry) -> F32:
+    """World position of what each pixel sees, (H, W, 3) scene units; 0 where nothing is hit."""
+    camera = geometry.camera
+    x = np.arange(camera.width, dtype=np.float64) + 0.5
+    y = np.arange(camera.height, dtype=np.float64) + 0.5
+    p = camera.direction_from_pixel
+    direction = x[None, :, None] * p[:, 0] + y[:, None, None] * p[:, 1] + p[:, 2]
+    world = camera.eye + geometry.depth[..., None] * direction
+    return np.where(geometry.is_hit[..., None], world, 0.0).astype(np.float32)

@@ -1,0 +1,110 @@
+"""Frames made up between others by FFmpeg's ``minterpolate``: motion estimated from the images alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from typing import Any
+
+import av
+import av.filter
+import numpy as np
+
+from enfilade.errors import SettingsError
+from enfilade.images.ycbcr import BT709, planes_from_rgb, rgb_from_planes
+from enfilade.kernels.tone import srgb_decode, srgb_encode
+from enfilade.records import F32
+
+__all__ = ["interpolate", "why_no_interpolation"]
+
+FILTER = "minterpolate"
+OPTIONS = (
+    "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # its best: overlapped blocks of any size
+)
+PIXELS = "yuv444p"  # the filter knows 8 bits only
+MARGIN = 4  # repeats of the first and the last frame: the filter looks at two frames on either side
+
+
+def interpolate(keyframes: Mapping[int, F32], fps: Fraction) -> Iterator[tuple[int, F32]]:
+    """Make up the frames between keyframes.
+
+    Parameters
+    ----------
+    keyframes : mapping of int to (H, W, 3) float32
+        Linear Rec.709, by the number of the frame, two or more, rising.
+    fps
+        Frames per second; only the distances of the keyframes count.
+
+    Yields
+    ------
+    int, (H, W, 3) float32
+        Number and image of each frame from the first keyframe to the last, keyframes included; all of
+        them rounded to 8 bits on the way, as FFmpeg's filter takes them.
+
+    Raises
+    ------
+    SettingsError
+        This build of FFmpeg has no such filter.
+    """
+    if why := why_no_interpolation():
+        raise SettingsError(why)
+    numbers = sorted(keyframes)
+    first, last = numbers[0], numbers[-1]
+    height, width = keyframes[first].shape[:2]
+    graph, source = _graph(width, height, fps)
+    lead = [(first - k, first) for k in range(MARGIN, 0, -1)]
+    tail = [(last + k, last) for k in range(1, MARGIN + 1)]
+    for at, number in [*lead, *((n, n) for n in numbers), *tail]:
+        picture = _picture(keyframes[number])
+        picture.pts, picture.time_base = at - first + MARGIN, 1 / fps
+        source.push(picture)
+        yield from _made(graph, first, last)
+    source.push(None)
+    yield from _made(graph, first, last)
+
+
+def why_no_interpolation() -> str:
+    """Why nothing can be interpolated here; empty where it can."""
+    if FILTER in av.filter.filters_available:
+        return ""
+    return f"the FFmpeg inside PyAV {av.__version__} was built without its filter {FILTER}"
+
+
+def _graph(width: int, height: int, fps: Fraction) -> tuple[Any, Any]:
+    graph = av.filter.Graph()
+    source = graph.add_buffer(width=width, height=height, format=PIXELS, time_base=1 / fps)
+    between = graph.add(FILTER, f"fps={fps.numerator}/{fps.denominator}:{OPTIONS}")
+    sink = graph.add("buffersink")
+    source.link_to(between)
+    between.link_to(sink)
+    graph.configure()
+    return graph, source
+
+
+def _made(graph: Any, first: int, last: int) -> Iterator[tuple[int, F32]]:
+    while True:
+        try:
+            picture = graph.pull()
+        except (av.BlockingIOError, av.EOFError):
+            return
+        number = int(picture.pts) + first - MARGIN
+        if first <= number <= last:
+            yield number, _linear(picture)
+
+
+def _picture(linear: F32) -> Any:
+    encoded = srgb_encode(np.clip(linear, 0.0, 1.0)).astype(np.float32)
+    picture = av.VideoFrame(linear.shape[1], linear.shape[0], PIXELS)
+    for plane, values in zip(picture.planes, planes_from_rgb(encoded, bits=8, is_halved=False), strict=True):
+        rows = np.zeros((plane.height, plane.line_size), np.uint8)
+        rows[:, : values.shape[1]] = values
+        plane.update(rows)
+    return picture
+
+
+def _linear(picture: Any) -> F32:
+    rows = (np.frombuffer(p, np.uint8).reshape(p.height, p.line_size)[:, : p.width] for p in picture.planes)
+    y, cb, cr = rows
+    return srgb_decode(rgb_from_planes((y, cb, cr), bits=8, weights=BT709, is_full_range=False)).astype(
+        np.float32
+    )

@@ -1,0 +1,148 @@
+"""View transforms: from scene-linear Rec.709 to the values that a video stores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from enfilade.errors import SettingsError
+from enfilade.kernels.tone import srgb_encode
+from enfilade.records import F32
+from enfilade.settings import VideoSettings
+
+__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "open_view", "view_identity"]
+
+BT709_TRANSFER = 1  # ITU-T H.273, table 3
+SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
+LINEAR_REC709 = (
+    "Linear Rec.709 (sRGB)",
+    "lin_rec709",
+    "Linear Rec.709",
+    "lin_srgb",
+    "Utility - Linear - sRGB",
+)
+DISPLAYS = (("srgb", SRGB_TRANSFER), ("rec.1886", BT709_TRANSFER), ("rec.709", BT709_TRANSFER))
+
+
+@dataclass(frozen=True)
+class View:
+    """A view transform.
+
+    Attributes
+    ----------
+    encode : callable
+        (H, W, 3) float32 scene-linear Rec.709 -> encoded values, 0..1, Rec.709 primaries.
+    transfer : int
+        What the encoded values are tagged with, ITU-T H.273, table 3.
+    """
+
+    encode: Callable[[F32], F32]
+    transfer: int
+
+
+def open_view(settings: VideoSettings, exposure_ev: float) -> View:
+    """Make the view transform of the settings: sRGB, or one of an OpenColorIO configuration.
+
+    Parameters
+    ----------
+    settings
+        ``ocio``, ``display`` and ``view`` choose; without a view, the default one of the display. The display
+        is one for sRGB, Rec.1886 or Rec.709, unnamed the first one of these: wide-gamut and HDR displays
+        aren't encoded.
+    exposure_ev
+        Stops, before the transform.
+
+    Raises
+    ------
+    SettingsError
+        OpenColorIO is not installed, or the configuration has no such view, no usable display, or no
+        name for linear Rec.709.
+    """
+    gain = np.float32(2.0**exposure_ev)
+    if not settings.ocio:
+        for name in ("view", "display"):
+            if value := getattr(settings, name):
+                raise SettingsError(f"[video] {name} = {value!r} needs a configuration: set [video] ocio too")
+        return View(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
+    processor, transfer = _open_ocio(settings)
+    apply = processor.getDefaultCPUProcessor().applyRGB
+
+    def encode(linear: F32) -> F32:
+        values = np.ascontiguousarray(linear * gain, np.float32)
+        apply(values)
+        return np.clip(values, 0.0, 1.0)
+
+    return View(encode, transfer)
+
+
+def view_identity(settings: VideoSettings) -> dict[str, str]:
+    """What makes the values of an OpenColorIO view what they are; empty for sRGB.
+
+    Parameters
+    ----------
+    settings
+
+    Returns
+    -------
+    dict
+        ``opencolorio``, its version, and ``processor``, its hash of all steps of the view with the tables in
+        them, wherever the files lie.
+
+    Raises
+    ------
+    SettingsError
+        As of :func:`open_view`.
+    """
+    if not settings.ocio:
+        return {}
+    processor, _ = _open_ocio(settings)
+    import PyOpenColorIO
+
+    return {"opencolorio": str(PyOpenColorIO.GetVersion()), "processor": str(processor.getCacheID())}
+
+
+def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
+    """OpenColorIO's processor for a view, and the transfer of its display."""
+    file, view = settings.ocio, settings.view
+    try:
+        import PyOpenColorIO
+    except ImportError as error:
+        raise SettingsError(
+            "[video] ocio needs OpenColorIO, which is not installed: pip install 'enfilade[ocio]'"
+        ) from error
+    try:
+        config = PyOpenColorIO.Config.CreateFromFile(file)
+        display, transfer = _display(config, settings)
+        views = list(config.getViews(display))
+        chosen = view or config.getDefaultView(display)
+        if chosen not in views:
+            raise SettingsError(f"{file} has no view {chosen!r} of {display!r}; it has: {', '.join(views)}")
+        processor = config.getProcessor(
+            _linear_rec709(config, file), display, chosen, PyOpenColorIO.TRANSFORM_DIR_FORWARD
+        )
+    except (PyOpenColorIO.Exception, PyOpenColorIO.ExceptionMissingFile) as error:
+        raise SettingsError(f"OpenColorIO can't use {file}: {error}") from error
+    return processor, transfer
+
+
+def _display(config: Any, settings: VideoSettings) -> tuple[str, int]:
+    names = list(config.getDisplays())
+    for start, transfer in DISPLAYS:
+        for name in names:
+            if name.lower().startswith(start) and settings.display in ("", name):
+                return name, transfer
+    named = f" {settings.display!r}" if settings.display else ""
+    raise SettingsError(
+        f"{settings.ocio} has no display{named} for sRGB or Rec.709; it has: {', '.join(names)}"
+    )
+
+
+def _linear_rec709(config: Any, file: str) -> str:
+    for name in LINEAR_REC709:
+        space = config.getColorSpace(name)
+        if space is not None:
+            return str(space.getName())
+    raise SettingsError(f"{file} has no colour space for linear Rec.709, such as {LINEAR_REC709[0]!r}")

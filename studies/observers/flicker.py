@@ -1,0 +1,152 @@
+"""Flicker: errors that come and go against a steady blur of larger error (three made examples).
+
+No experiment, but what everyone who has seen rendered animation knows: of two sequences with the same
+mean squared error, the one that flickers is worse. The blur's squared error is the larger one in each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import scipy.ndimage
+
+from enfilade.metric import sequence_score
+from enfilade.monitor import Monitor
+from studies.observers.mode import Mode
+from studies.observers.screen import screen
+
+__all__ = ["EXAMPLES", "Pair", "measure", "sequences"]
+
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+Float64Array: TypeAlias = npt.NDArray[np.float64]
+
+SIZE_PX = 256
+PIXELS_PER_DEGREE = 28.0
+FPS = 30.0
+FRAMES = 6
+MEAN_CD_M2 = 40.0
+BLUR_PX = 1.0
+PAN_PX = 3  # a frame, in the third example
+SHARE = 0.9  # of the blur's squared error that the flicker has
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What the metric says of one example.
+
+    Attributes
+    ----------
+    flicker_jnd, blur_jnd : float
+        Scores of the sequence whose error flickers and of the one that is steadily blurred.
+    """
+
+    flicker_jnd: float
+    blur_jnd: float
+
+    @property
+    def ratio(self) -> float:
+        """Above 1 where the flicker is scored worse."""
+        return self.flicker_jnd / self.blur_jnd
+
+
+def _scene() -> Float64Array:
+    """Cloudy texture with sharp-edged discs, cd/m2, periodic."""
+    random = np.random.default_rng(20)
+    fx, fy = np.fft.rfftfreq(SIZE_PX), np.fft.fftfreq(SIZE_PX)[:, None]
+    spectrum = np.fft.rfft2(random.standard_normal((SIZE_PX, SIZE_PX)))
+    cloud = np.fft.irfft2(spectrum / np.maximum(np.hypot(fx, fy), 1.0 / SIZE_PX), s=(SIZE_PX, SIZE_PX))
+    scene: Float64Array = MEAN_CD_M2 * (1.0 + 0.2 * cloud / cloud.std())
+    y, x = np.mgrid[:SIZE_PX, :SIZE_PX]
+    for centre_x, centre_y, level in ((70, 80, 1.5), (170, 110, 0.6), (120, 190, 1.3)):
+        scene = np.where(np.hypot(x - centre_x, y - centre_y) < 28.0, level * scene, scene)
+    bright: Float64Array = np.maximum(scene, 1.0)
+    return bright
+
+
+def _blurred(scene: Float64Array) -> Float64Array:
+    blurred: Float64Array = scipy.ndimage.gaussian_filter(scene, BLUR_PX, mode="wrap")
+    return blurred
+
+
+def _shimmer(frame: int, scene: Float64Array) -> Float64Array:
+    """Edges that jump to and fro by a part of a pixel."""
+    sign = 1.0 if frame % 2 else -1.0
+    return sign * (np.roll(scene, 1, axis=1) - np.roll(scene, -1, axis=1))
+
+
+def _boil(frame: int, scene: Float64Array) -> Float64Array:
+    """Noise that is another one in each frame, of the scene's own contrast."""
+    noise = np.random.default_rng(frame).standard_normal(scene.shape)
+    return scene * scipy.ndimage.gaussian_filter(noise, 1.0, mode="wrap")
+
+
+def _pump(frame: int, scene: Float64Array) -> Float64Array:
+    """Patches of light that go on and off in turn."""
+    y, x = np.mgrid[:SIZE_PX, :SIZE_PX] // 32
+    return np.where((x + y + frame) % 2 == 0, scene, -scene)
+
+
+Error: TypeAlias = Callable[[int, Float64Array], Float64Array]
+EXAMPLES: dict[str, tuple[Error, int]] = {  # error of a frame, pan in pixels a frame
+    "shimmering edges": (_shimmer, 0),
+    "flashing patches": (_pump, 0),
+    "boiling noise in a pan": (_boil, PAN_PX),
+}
+
+
+def sequences(example: str) -> list[tuple[Float32Array, Float32Array, Float32Array]]:
+    """Frames of an example: the reference, with a flickering error, and steadily blurred.
+
+    Parameters
+    ----------
+    example : str
+        One of EXAMPLES.
+
+    Returns
+    -------
+    list of three (256, 256) float32
+        cd/m2. The flicker's mean squared error is 0.9 times that of the blur, in each frame.
+    """
+    error, pan_px = EXAMPLES[example]
+    still = _scene()
+    found = []
+    for frame in range(FRAMES):
+        scene = np.roll(still, frame * pan_px, axis=1)
+        blurred = _blurred(scene)
+        change = error(frame, scene)
+        change *= np.sqrt(SHARE * np.mean((blurred - scene) ** 2) / np.mean(change**2))
+        images = (scene, scene + change, blurred)
+        reference, flickering, steady = (np.maximum(i, 0.0).astype(np.float32) for i in images)
+        found.append((reference, flickering, steady))
+    return found
+
+
+def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
+    """Scores of all examples, by name.
+
+    Parameters
+    ----------
+    mode : Mode
+        The metric.
+    monitor : Monitor
+        Is told of each example.
+    """
+    monitor.stage(f"flicker, {mode.name}", len(EXAMPLES))
+    found = {}
+    for example, (_, pan_px) in EXAMPLES.items():
+        viewing = screen(SIZE_PX, PIXELS_PER_DEGREE, fps=FPS)
+        flow_px = np.zeros((SIZE_PX, SIZE_PX, 2), dtype=np.float32)
+        flow_px[..., 0] = -pan_px
+        frames = sequences(example)
+        scores = []
+        for kind in (1, 2):
+            judge = mode.sequence_judge(viewing)
+            judged = [judge.judge(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames]
+            scores.append(sequence_score(comparison.score for comparison in judged))
+        found[example] = Pair(*scores)
+        monitor.advance()
+    return found

@@ -1,0 +1,45 @@
+"""The measurements of people that this package carries, as they lie in `data/`."""
+
+from __future__ import annotations
+
+import csv
+from importlib.resources import files
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["read_columns", "read_textures"]
+
+Float64Array: TypeAlias = npt.NDArray[np.float64]
+Float32Array: TypeAlias = npt.NDArray[np.float32]
+
+DATA = files("studies.observers") / "data"
+WHITE = 65535.0  # of a 16-bit texture
+
+
+def read_columns(name: str, *numbers: str) -> tuple[list[dict[str, str]], dict[str, Float64Array]]:
+    """Read a table: all rows as text, and the named columns as numbers.
+
+    Parameters
+    ----------
+    name : str
+        File in `data/`.
+    *numbers : str
+        Columns to convert.
+
+    Returns
+    -------
+    list of dict
+        A row each, by the heading of the column.
+    dict of (N,) float64
+        The converted columns.
+    """
+    rows = list(csv.DictReader((DATA / name).read_text(encoding="utf-8").splitlines()))
+    return rows, {n: np.array([float(row[n]) for row in rows]) for n in numbers}
+
+
+def read_textures() -> dict[str, Float32Array]:
+    """Textures of the moving-texture experiment, (512, 512) float32 by name, linear, 1 is white."""
+    with (DATA / "textures.npz").open("rb") as file, np.load(file) as archive:
+        return {name: archive[name].astype(np.float32) / np.float32(WHITE) for name in archive.files}

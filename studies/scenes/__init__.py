@@ -1,0 +1,71 @@
+"""The two generated case-study scenes, ROOM and ATRIUM (§6).
+
+Nothing heavy loads until a scene is written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from enfilade.errors import SceneError, SettingsError
+
+SCENES = ("room", "atrium")
+PRESETS = ("full", "small")
+
+
+@dataclass(frozen=True)
+class SceneFiles:
+    """Where a written scene is.
+
+    Attributes
+    ----------
+    scene
+        Mitsuba 3 XML; meshes and textures lie beside it.
+    path
+        The camera path, nerfstudio's `camera_path.json`.
+    """
+
+    scene: Path
+    path: Path
+
+
+def write_scene(
+    name: str, folder: Path, *, preset: str = "full", size: tuple[int, int] | None = None
+) -> SceneFiles:
+    """Write a generated scene and its camera path. The same call writes the same bytes.
+
+    Parameters
+    ----------
+    name
+        `room`: diffuse, a walk that rests and hurries, 448 frames. `atrium`: mirrors, glass,
+        metal and a polished floor, a steady walk, 200 frames.
+    folder
+        Made if absent; files of the same names are replaced.
+    preset
+        `full` (640 x 480) or `small` (320 x 240, fewer frames, coarser shapes).
+    size
+        Width and height of the frames, pixels, in place of the preset's. The vertical angle of view stays.
+
+    Raises
+    ------
+    SceneError
+        No scene has this name.
+    SettingsError
+        No preset has this name, or no image this size.
+    """
+    if name not in SCENES:
+        known = ", ".join(SCENES)
+        raise SceneError(f"there is no generated scene {name!r}; the known ones are {known}")
+    if preset not in PRESETS:
+        known = ", ".join(PRESETS)
+        raise SettingsError(f"there is no preset {preset!r}; the known ones are {known}")
+    if size is not None and min(size) < 1:
+        raise SettingsError(f"there is no image of {size[0]}x{size[1]} pixels")
+    from studies.scenes.build import build_scene
+
+    scene, path = build_scene(name, Path(folder), preset, size)
+    return SceneFiles(scene=scene, path=path)
+
+
+__all__ = ["PRESETS", "SCENES", "SceneFiles", "write_scene"]

@@ -1,0 +1,52 @@
+"""``enfilade scene``: write one of the two generated scenes with its camera path."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import click
+
+from enfilade.cli.group import debug_option
+from enfilade.cli.inputs import Size, json_option
+from studies.scenes import PRESETS, SCENES
+
+
+@click.command("scene", short_help="Write one of the two generated scenes.")
+@click.argument("name", type=click.Choice(SCENES))
+@click.option(
+    "--out",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    help="The folder that receives the scene; made if absent.",
+)
+@click.option(
+    "--preset",
+    type=click.Choice(PRESETS),
+    default="full",
+    show_default=True,
+    help="The whole walk at 640x480, or a short one at 320x240.",
+)
+@click.option(
+    "--size",
+    type=Size(),
+    help="Width and height of the frames, pixels, of any aspect.  [default: the preset's]",
+)
+@json_option
+@debug_option
+def command(*, name: str, folder: Path, preset: str, size: tuple[int, int] | None, as_json: bool) -> None:
+    """Write a generated scene and its camera path: room (diffuse) or atrium (mirrors, glass, gloss)."""
+    from studies.scenes import write_scene
+
+    files = write_scene(name, folder, preset=preset, size=size)
+    if as_json:
+        click.echo(json.dumps({"scene": str(files.scene), "path": str(files.path)}, indent=2))
+        return
+    click.echo(f"scene   {files.scene}")
+    click.echo(f"path    {files.path}")
+    click.echo("\nNext, see what it would take, then render it:")
+    arguments = shlex.join([str(files.scene), "--path", str(files.path)])
+    click.echo(f"  enfilade plan {arguments}")
+    click.echo(f"  enfilade render {arguments} --out {shlex.quote(f'runs/{name}')}")

@@ -1,0 +1,121 @@
+"""Intrinsics, poses, and the matrices of the warp."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from enfilade.camera.pinhole import Camera, check_rigid, look_at
+from enfilade.errors import CameraPathError
+
+coordinates = st.tuples(*[st.floats(-100, 100)] * 3)
+
+
+def a_camera(width=640, height=480, fov_deg=50.0, pose=None):
+    return Camera(look_at((1, 2, 3), (0, 1, 0)) if pose is None else pose, fov_deg, width, height)
+
+
+def test_the_centre_of_the_image_looks_along_minus_z():
+    camera = a_camera(pose=np.eye(4))
+    np.testing.assert_allclose(camera.direction_from_pixel @ (320, 240, 1), (0, 0, -1), atol=1e-12)
+
+
+def test_x_goes_right_and_y_goes_down():
+    camera = a_camera(pose=np.eye(4))
+    right, down = (camera.direction_from_pixel @ p for p in ((640, 240, 1), (320, 480, 1)))
+    assert right[0] > 0
+    assert down[1] < 0
+
+
+def test_the_field_of_view_is_vertical():
+    camera = a_camera(fov_deg=90, pose=np.eye(4))
+    assert camera.focal_px == pytest.approx(240)
+    top, bottom = (camera.direction_from_pixel @ (320, y, 1) for y in (0, 480))
+    angle = math.degrees(math.acos(top @ bottom / (np.linalg.norm(top) * np.linalg.norm(bottom))))
+    assert angle == pytest.approx(90)
+
+
+@given(coordinates, coordinates, st.floats(1, 170), st.floats(0, 1), st.floats(0, 1), st.floats(0.01, 1000))
+def test_pixel_to_point_and_back(eye, target, fov_deg, across, down, depth):
+    away = np.subtract(target, eye)
+    assume(np.linalg.norm(np.cross(away, (0, 1, 0))) > 1e-3 * max(np.linalg.norm(away), 1e-3))
+    camera = a_camera(fov_deg=fov_deg, pose=look_at(eye, target))
+    pixel = np.array([640 * across, 480 * down, 1.0])
+    direction = camera.direction_from_pixel @ pixel
+    image = camera.pixel_from_direction @ (depth * direction)
+    assert image[2] == pytest.approx(depth)  # unit depth: the third row is the depth
+    np.testing.assert_allclose(image[:2] / image[2], pixel[:2], atol=1e-6)
+    assert -direction @ camera.world_from_camera[:3, 2] == pytest.approx(1)
+
+
+@given(coordinates, coordinates)
+def test_look_at_is_rigid_and_aims(eye, target):
+    away = np.subtract(target, eye)
+    assume(np.linalg.norm(np.cross(away, (0, 1, 0))) > 1e-6)
+    pose = look_at(eye, target)
+    check_rigid(pose)
+    np.testing.assert_allclose(-pose[:3, 2], away / np.linalg.norm(away), atol=1e-9)
+    np.testing.assert_array_equal(pose[:3, 3], eye)
+    assert pose[1, 1] >= 0  # up is up
+
+
+@pytest.mark.parametrize(
+    ("eye", "target", "up"),
+    [
+        ((0, 0, 0), (0, 0, 0), (0, 1, 0)),
+        ((0, 5, 0), (0, 0, 0), (0, 1, 0)),
+        ((0, 0, 1), (0, 0, 0), (0, 0, 0)),
+    ],
+)
+def test_look_at_refuses_what_has_no_answer(eye, target, up):
+    with pytest.raises(CameraPathError, match="can't look at"):
+        look_at(eye, target, up)
+
+
+def changed(row, column, value):
+    matrix = np.eye(4)
+    matrix[row, column] = value
+    return matrix
+
+
+@pytest.mark.parametrize(
+    ("matrix", "problem"),
+    [
+        (np.eye(3), "4x4"),
+        (changed(0, 3, np.nan), "NaN"),
+        (changed(1, 3, np.inf), "infinity"),
+        (changed(3, 0, 0.5), "last row"),
+        (changed(0, 0, 1.01), "not rigid: .* 0.0201"),
+        (changed(0, 1, 0.01), "not rigid"),
+        (np.zeros((4, 4)), "last row"),
+        (changed(0, 0, -1.0), "mirror image"),
+    ],
+)
+def test_poses_that_are_not_rigid_are_refused(matrix, problem):
+    with pytest.raises(CameraPathError, match=problem):
+        Camera(matrix, 50.0, 64, 48)
+
+
+def test_poses_of_few_digits_are_taken():
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler("xyz", (10, 20, 30), degrees=True).as_matrix().round(4)
+    check_rigid(pose)
+
+
+@pytest.mark.parametrize(
+    ("fov_deg", "size"), [(0, (4, 4)), (180, (4, 4)), (math.nan, (4, 4)), (50, (0, 4)), (50, (4, -1))]
+)
+def test_numbers_out_of_range_are_refused(fov_deg, size):
+    with pytest.raises(CameraPathError):
+        a_camera(*size, fov_deg=fov_deg)
+
+
+def test_views_are_the_same_only_when_all_is():
+    camera = a_camera()
+    assert camera.is_same_view(a_camera())
+    assert not camera.is_same_view(a_camera(fov_deg=51))
+    assert not camera.is_same_view(a_camera(width=641))
+    assert not camera.is_same_view(a_camera(pose=look_at((1, 2, 3.0001), (0, 1, 0))))

@@ -1,0 +1,96 @@
+"""View transforms: sRGB, and OpenColorIO where it is installed."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from enfilade.errors import SettingsError
+from enfilade.images.view import open_view
+from enfilade.settings import VideoSettings
+
+CONFIG = """ocio_profile_version: 2
+search_path: ""
+roles: {{default: raw, scene_linear: lin_rec709}}
+displays:
+  {display}:
+    - !<View> {{name: Plain, colorspace: encoded}}
+    - !<View> {{name: Raw, colorspace: raw}}
+active_displays: []
+active_views: []
+colorspaces:
+  - !<ColorSpace> {{name: raw, isdata: true}}
+  - !<ColorSpace> {{name: {linear}}}
+  - !<ColorSpace>
+    name: encoded
+    from_scene_reference: !<ExponentWithLinearTransform> {{gamma: 2.4, offset: 0.055, direction: inverse}}
+"""
+
+
+def config(tmp_path, display="sRGB", linear="lin_rec709"):
+    file = tmp_path / "config.ocio"
+    file.write_text(CONFIG.format(display=display, linear=linear))
+    return str(file)
+
+
+def test_srgb_has_the_numbers_of_the_standard():
+    linear = np.float32([[[0.0, 0.0031308, 0.18]], [[0.5, 1.0, 9.0]]])
+    view = open_view(VideoSettings(), 0.0)
+    np.testing.assert_allclose(view.encode(linear).ravel(), (0, 0.04045, 0.4614, 0.7354, 1, 1), atol=1e-4)
+    assert view.transfer == 13
+    np.testing.assert_allclose(open_view(VideoSettings(), 1.0).encode(linear / 2), view.encode(linear))
+
+
+@pytest.mark.parametrize(("display", "transfer"), [("sRGB", 13), ("Rec.1886 Rec.709 - Display", 1)])
+def test_opencolorio_gives_what_the_configuration_says(tmp_path, display, transfer):
+    pytest.importorskip("PyOpenColorIO")
+    linear = np.random.default_rng(0).random((5, 7, 3), np.float32)
+    before = linear.copy()
+    view = open_view(VideoSettings(ocio=config(tmp_path, display)), 1.0)
+    expected = open_view(VideoSettings(), 1.0).encode(linear)
+    np.testing.assert_allclose(view.encode(linear), expected, atol=1e-3)
+    np.testing.assert_array_equal(linear, before)
+    assert view.transfer == transfer
+    raw = open_view(VideoSettings(ocio=config(tmp_path, display), view="Raw"), 0.0)
+    np.testing.assert_allclose(raw.encode(linear), linear, atol=1e-6)
+
+
+def test_a_display_by_its_name(tmp_path):
+    pytest.importorskip("PyOpenColorIO")
+    file = tmp_path / "config.ocio"
+    file.write_text(
+        CONFIG.format(display="sRGB", linear="lin_rec709").replace(
+            "active_displays",
+            "  Rec.1886:\n    - !<View> {name: Raw, colorspace: raw}\n  P3: []\nactive_displays",
+        )
+    )
+    linear = np.full((1, 1, 3), 0.25, np.float32)
+    view = open_view(VideoSettings(ocio=str(file), display="Rec.1886"), 0.0)
+    assert view.transfer == 1
+    np.testing.assert_allclose(view.encode(linear), linear, atol=1e-6)
+    with pytest.raises(SettingsError, match=r"no display 'P3' for sRGB or Rec\.709; it has: sRGB, Rec.1886"):
+        open_view(VideoSettings(ocio=str(file), display="P3"), 0.0)
+    with pytest.raises(SettingsError, match=r"display = 'sRGB' needs a configuration"):
+        open_view(VideoSettings(display="sRGB"), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "view", "message"),
+    [
+        ({}, "Filmic", "no view 'Filmic' of 'sRGB'; it has: Plain, Raw"),
+        ({"display": "P3 HDR"}, "", "no display for sRGB or Rec.709; it has: P3 HDR"),
+        ({"linear": "acescg"}, "", "OpenColorIO can't use|no colour space"),
+    ],
+)
+def test_what_the_configuration_lacks_is_said(tmp_path, changes, view, message):
+    pytest.importorskip("PyOpenColorIO")
+    with pytest.raises(SettingsError, match=message):
+        open_view(VideoSettings(ocio=config(tmp_path, **changes), view=view), 0.0)
+
+
+def test_opencolorio_that_is_not_installed_is_said(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
+    with pytest.raises(SettingsError, match=r"pip install 'enfilade\[ocio\]'"):
+        open_view(VideoSettings(ocio=config(tmp_path)), 0.0)

@@ -1,0 +1,116 @@
+"""What a page knows of points, against loops."""
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import Array3f, UInt, lanes, matrix3, vector3
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.kernels.lookup import FLOOR, Page, footprint, lookup, packed
+
+HEIGHT, WIDTH = 12, 16
+CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
+TOLERANCE = 0.01
+
+
+@pytest.fixture
+def page():
+    """A wall at z = 0, seen by two items; a stretch of it is not known."""
+    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
+    direction = np.stack([x, y, np.ones_like(x)], -1) @ CAMERA.direction_from_pixel.T
+    depth = (-CAMERA.eye[2] / direction[..., 2]).astype(np.float32)
+    item = np.where(x < 8, 1, 2).astype(np.uint32)
+    depth[:, 13] = 0.0
+    value = np.random.default_rng(1).uniform(0.0, 2.0, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    return depth, item, value
+
+
+def found(page, points, item, normal=(0.0, 0.0, 1.0), normals=None):
+    depth, items, value = page
+    opened = Page(
+        depths=lanes(depth),
+        items=lanes(items),
+        normals=None if normals is None else packed(lanes(normals)),
+        values=(lanes(value), 2.0 * lanes(value)),
+        variances=(lanes(value[..., 0]), lanes(value[..., 1])),
+        eye=vector3(CAMERA.eye),
+        direction_from_pixel=matrix3(CAMERA.direction_from_pixel),
+        pixel_from_direction=matrix3(CAMERA.pixel_from_direction),
+        width=WIDTH,
+        height=HEIGHT,
+    )
+    position = Array3f(np.asarray(points, np.float32).T)
+    return lookup(position, Array3f(*normal), UInt(item), opened, plane_tolerance=TOLERANCE)
+
+
+def by_loops(page, point, item):
+    depth, items, value = page
+    seen = CAMERA.pixel_from_direction @ (point - CAMERA.eye)
+    x, y = seen[:2] / seen[2] - 0.5
+    total, weight = np.zeros(3), 0.0
+    if seen[2] <= 0 or not (-0.5 < x < WIDTH - 0.5 and -0.5 < y < HEIGHT - 0.5):
+        return total, weight
+    for j, wy in ((int(np.floor(y)), 1 - y % 1), (int(np.floor(y)) + 1, y % 1)):
+        for i, wx in ((int(np.floor(x)), 1 - x % 1), (int(np.floor(x)) + 1, x % 1)):
+            u, v = np.clip(i, 0, WIDTH - 1), np.clip(j, 0, HEIGHT - 1)
+            there = CAMERA.eye + depth[v, u] * (CAMERA.direction_from_pixel @ (u + 0.5, v + 0.5, 1.0))
+            if depth[v, u] > 0 and items[v, u] == item and abs(there[2] - point[2]) <= TOLERANCE * seen[2]:
+                total += (wx * wy + FLOOR) * value[v, u]
+                weight += wx * wy + FLOOR
+    return total, weight
+
+
+@pytest.mark.parametrize("item", [1, 2])
+def test_it_does_what_loops_do(page, item):
+    points = np.random.default_rng(2).uniform((-2.5, -1.8, -0.2), (2.5, 1.8, 0.2), (400, 3))
+    points[:300, 2] = 0.0
+    got = found(page, points, item)
+    wanted = [by_loops(page, point, item) for point in points]
+    np.testing.assert_allclose(np.array(got.weight), [w for _, w in wanted], atol=2e-4)
+    np.testing.assert_allclose(np.array(got.totals[0]).T, [t for t, _ in wanted], atol=5e-4)
+    np.testing.assert_allclose(np.array(got.totals[1]), 2.0 * np.array(got.totals[0]), rtol=1e-5)
+    assert 0.2 < np.mean([w > 0 for _, w in wanted]) < 0.8
+
+
+def test_pixels_whose_surface_is_turned_count_by_the_cosine(page):
+    points = np.random.default_rng(3).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
+    turned = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    turned[..., 0], turned[..., 2] = np.sin(1.1), np.cos(1.1)
+    plain, got = found(page, points, 1), found(page, points, 1, normals=turned)
+    np.testing.assert_allclose(np.array(got.weight), np.cos(1.1) * np.array(plain.weight), atol=3e-3)
+    other_way = found(page, points, 1, normals=turned * np.float32([1, 1, -1]))
+    assert not np.array(other_way.weight).any()
+
+
+def test_of_two_surfaces_that_meet_that_with_the_normal_counts_alone(page):
+    upright = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    upright[::2, :, 2], upright[1::2, :, 1] = 1.0, 1.0
+    depth, items, value = page
+    value[::2], value[1::2] = 1.0, 5.0
+    points = np.random.default_rng(4).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
+    got = found((depth, items, value), points, 1, normals=upright)
+    weight = np.array(got.weight)
+    known = weight > 0.05
+    assert known.any()
+    np.testing.assert_allclose(np.array(got.totals[0])[:, known] / weight[known], 1.0, atol=0.02)
+
+
+def test_the_other_side_of_a_surface_is_not_known(page):
+    point = [[0.0, 0.0, 0.0]]
+    assert np.array(found(page, point, 1).weight)[0] + np.array(found(page, point, 2).weight)[0] > 0.5
+    behind = (0.0, 0.0, -1.0)
+    assert np.array(found(page, point, 1, behind).weight)[0] == 0.0
+    assert np.array(found(page, point, 2, behind).weight)[0] == 0.0
+
+
+def test_footprints_grow_with_the_square_of_distance_and_at_grazing_angles():
+    def area(x, z, camera=CAMERA):
+        point, normal = Array3f(x, 0, z), Array3f(0, 0, 1)
+        return np.array(footprint(point, normal, vector3((0, 0, 0)), matrix3(camera.direction_from_pixel)))[0]
+
+    near = area(0, -1)
+    assert near == pytest.approx(CAMERA.pixel_angle**2, rel=1e-5)
+    assert area(0, -3) == pytest.approx(9 * near, rel=1e-5)
+    assert area(1, -1) == pytest.approx(2 * np.sqrt(2) * near, rel=1e-5)
+    assert area(1000, -1) == pytest.approx(20 * (1000**2 + 1) * near, rel=1e-4)
+    twice_as_fine = Camera(CAMERA.world_from_camera, CAMERA.fov_deg, 2 * WIDTH, 2 * HEIGHT)
+    assert area(0, -1, twice_as_fine) == pytest.approx(0.25 * near, rel=1e-5)

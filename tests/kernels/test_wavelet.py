@@ -1,0 +1,206 @@
+"""Smoothing along surfaces, against loops."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import image, lanes, matrix3
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.kernels.wavelet import (
+    Guide,
+    share_without_speckles,
+    smooth,
+    with_soft_edges,
+    with_spread_speckles,
+)
+from twins import wavelet as twin
+
+HEIGHT, WIDTH = 18, 24
+CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
+OPTIONS = {"levels": 3, "deviations": 3.0}
+SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64.0}
+
+
+@dataclasses.dataclass
+class Scene:
+    """A wall with a step in depth and a tilted part, two items, and light with noise."""
+
+    color: np.ndarray
+    variance: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    item: np.ndarray
+
+    def smoothed(self, **options):
+        guide = Guide(
+            lanes(self.depth),
+            lanes(self.normal),
+            lanes(self.item),
+            matrix3(CAMERA.direction_from_pixel),
+            WIDTH,
+            HEIGHT,
+            **SURFACE,
+        )
+        color, variance = smooth(lanes(self.color), lanes(self.variance), guide, **{**OPTIONS, **options})
+        return image(color, HEIGHT, WIDTH), image(variance, HEIGHT, WIDTH)
+
+
+@pytest.fixture
+def scene():
+    rng = np.random.default_rng(3)
+    depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
+    depth[:, 16:] = 4.5
+    normal = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    normal[..., 2] = 1.0
+    normal[12:] = (0.0, 0.6, 0.8)
+    item = np.ones((HEIGHT, WIDTH), np.uint32)
+    item[:, :6] = 2
+    light = np.where(np.arange(WIDTH) < 11, 1.0, 3.0)[None, :, None]
+    noise = rng.normal(0.0, 0.1, (HEIGHT, WIDTH, 1))
+    color = (light + noise * (1.0, 0.9, 0.8)).astype(np.float32)
+    return Scene(color, np.full((HEIGHT, WIDTH), 0.01, np.float32), depth, normal, item)
+
+
+def test_it_does_what_loops_do(scene):
+    color, variance = scene.smoothed()
+    wanted, wanted_variance = twin.smooth(
+        *(a.astype(float) for a in (scene.color, scene.variance, scene.depth, scene.normal)),
+        scene.item,
+        CAMERA.direction_from_pixel,
+        levels=3,
+        deviations=3.0,
+        plane=0.01,
+        exponent=64.0,
+    )
+    np.testing.assert_allclose(color, wanted, rtol=2e-4)
+    np.testing.assert_allclose(variance, wanted_variance, rtol=2e-3)
+
+
+def wall(height, width):
+    """A plain wall that fills the image."""
+    normal = np.zeros((height, width, 3), np.float32)
+    normal[..., 2] = 1.0
+    return Guide(
+        lanes(np.full((height, width), 4.0, np.float32)),
+        lanes(normal),
+        lanes(np.ones((height, width), np.uint32)),
+        matrix3(Camera(CAMERA.world_from_camera, 40, width, height).direction_from_pixel),
+        width,
+        height,
+        **SURFACE,
+    )
+
+
+def grey(light):
+    return (light[..., None] * np.ones(3)).astype(np.float32)
+
+
+def on_a_wall(light, variance, **options):
+    """Smooth grey light on a plain wall, (H, W); with the variance that is left."""
+    color, variance = lanes(grey(light)), lanes(variance.astype(np.float32))
+    color, variance = smooth(color, variance, wall(*light.shape), **{**OPTIONS, **options})
+    return image(color, *light.shape)[..., 0], image(variance, *light.shape)
+
+
+def test_what_is_left_of_the_noise_is_told():
+    light = np.random.default_rng(7).normal(0.5, 0.1, (96, 128))
+    inside = slice(20, -20), slice(20, -20)
+    for levels in (1, 2, 4):
+        smoothed, variance = on_a_wall(light, np.full(light.shape, 0.01), levels=levels, deviations=100.0)
+        told = np.sqrt(variance[inside].mean())
+        assert 0.8 < told / smoothed[inside].std() < 1.25
+
+
+def test_no_light_is_lost():
+    """One path in eight finds a lot: what it found counts as much when it is spread."""
+    light = (np.random.default_rng(8).random((96, 128, 4)) < 0.125).mean(axis=2)
+    smoothed, _ = on_a_wall(light, light * (1.0 - light) / 3.0, levels=4)
+    assert abs(smoothed.mean() / light.mean() - 1.0) < 0.005
+    assert smoothed.std() < 0.35 * light.std()
+
+
+def test_noise_goes_and_edges_stay(scene):
+    color, variance = scene.smoothed(levels=4)
+    inside = color[2:10, 1:4]
+    assert inside.std() < 0.5 * scene.color[2:10, 1:4].std()
+    assert variance.mean() < 0.2 * scene.variance.mean()
+    assert np.abs(color[:, 10].mean() - 1.0) < 0.05
+    assert np.abs(color[:, 11].mean() - 3.0 * 0.9) < 0.4
+
+
+def test_without_noise_nothing_changes(scene):
+    scene.color[:] = np.where(np.arange(WIDTH) % 2, 1.0, 1.1)[None, :, None]
+    scene.variance[:] = 0.0
+    color, _ = scene.smoothed()
+    np.testing.assert_allclose(color, scene.color, rtol=1e-5)
+
+
+def test_no_light_is_lost_where_noise_meets_none(scene):
+    """A noisy pixel among black ones without noise: what it gives away arrives."""
+    scene.normal[:], scene.depth[:], scene.item[:] = (0.0, 0.0, 1.0), 4.0, 1
+    scene.color[:], scene.variance[:] = 0.0, 0.0
+    scene.color[9, 12], scene.variance[9, 12] = 1.0, 1.0
+    color, _ = scene.smoothed(levels=1)
+    assert 0.7 < color.sum() / scene.color.sum() < 1.3
+
+
+def test_a_speckle_is_cut_to_its_brightest_neighbour():
+    color = np.ones((5, 6, 3), np.float32)
+    color[2, 3] = 50.0
+    color[1, 3] = 1.5
+    cut = color * image(share_without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)[..., None]
+    np.testing.assert_allclose(cut[2, 3], 3.0, rtol=1e-5)
+    color[2, 3] = cut[2, 3]
+    np.testing.assert_array_equal(cut, color)
+
+
+def spread(light, variance, **options):
+    options = {"times": 2.0, "levels": 4, **options}
+    color, variance = with_spread_speckles(
+        lanes(grey(light)), lanes(variance.astype(np.float32)), wall(*light.shape), **options
+    )
+    return image(color, *light.shape)[..., 0], image(variance, *light.shape)
+
+
+def test_speckles_of_a_page_are_spread_and_their_light_stays():
+    """One pixel in a hundred glares: alone, in pairs, at the border."""
+    rng = np.random.default_rng(11)
+    light = np.ones((96, 128))
+    light.ravel()[rng.choice(light.size, light.size // 100, replace=False)] = 60.0
+    variance = np.where(light > 1.0, 900.0, 0.0)
+    got, left = spread(light, variance)
+    assert got.mean() == pytest.approx(light.mean(), rel=0.02)
+    assert np.percentile(got, 99.9) < 4.0
+    assert left.max() < 0.01 * variance.max()
+
+
+def test_what_is_bright_beside_bright_pixels_is_no_speckle():
+    light = np.ones((24, 32))
+    light[10, 4:20] = light[15:17, 9:11] = 50.0  # a thin line, and a spot of four pixels
+    got, _ = spread(light, np.zeros_like(light))
+    line, spot = got[10, 5:19], got[15:17, 9:11]
+    np.testing.assert_allclose(line, 50.0, rtol=0.02)
+    np.testing.assert_allclose(spot, 50.0, rtol=0.02)
+
+
+def test_a_speckle_at_the_border_is_one():
+    color = np.ones((5, 6, 3), np.float32)
+    color[0, 0] = color[2, 5] = 50.0
+    cut = color * image(share_without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)[..., None]
+    np.testing.assert_allclose(cut[[0, 2], [0, 5]], 2.0, rtol=1e-5)
+
+
+def test_edges_between_items_are_as_soft_as_the_filter():
+    rng = np.random.default_rng(5)
+    color = rng.random((6, 9, 3)).astype(np.float32)
+    items = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
+    got = image(with_soft_edges(lanes(color), lanes(items), width=9, height=6, sigma=0.5), 6, 9)
+    padded = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    weights = np.exp(-np.add.outer(np.array([1, 0, 1]), np.array([1, 0, 1])) / 0.5)
+    expected = color.copy()
+    for y in range(6):
+        for x in (3, 4):
+            window = padded[y : y + 3, x : x + 3]
+            expected[y, x] = (weights[..., None] * window).sum(axis=(0, 1)) / weights.sum()
+    np.testing.assert_allclose(got, expected, rtol=1e-5)

@@ -1,0 +1,60 @@
+"""Virtual images: where that seems to be which mirrors and panes show."""
+
+import numpy as np
+
+from balls import MATERIALS, front_camera, opened_scene, pane
+from enfilade.gbuffer import find_geometry, positions
+from enfilade.methods.decoupled import VirtualImages
+from enfilade.methods.decoupled.virtual import BEHIND
+
+
+def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
+    mirror = (
+        '</shape><shape type="rectangle" id="mirror"><transform name="to_world"><scale value="3"/>'
+        '<translate z="-1.4"/></transform><bsdf type="conductor"/>'
+    )
+    renderer, camera = opened_scene(tmp_path, {"ball": mirror}), front_camera()
+    seen = find_geometry(renderer, camera)
+    shown = VirtualImages(renderer).reflected(seen)
+    names = renderer.describe().items
+    is_floor = shown.item == BEHIND + names.index("floor") + 1
+    assert is_floor.sum() > 20
+    points = positions(shown)[is_floor]
+    # The floor, y = 0, goes on behind an upright mirror.
+    np.testing.assert_allclose(points[:, 1], 0.0, atol=2e-3)
+    assert points[:, 2].max() < -1.4
+    last = np.flatnonzero(seen.item == names.index("mirror") + 1)[-1]  # also where lanes fill up a kernel
+    assert is_floor.ravel()[last]
+    is_same = shown.item == seen.item
+    np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
+
+
+def test_rough_glass_shows_no_image(tmp_path):
+    balls = {"rough": MATERIALS["roughdielectric"], "glass": MATERIALS["thindielectric"]}
+    renderer, camera = opened_scene(tmp_path, balls), front_camera()
+    seen = find_geometry(renderer, camera)
+    shown = VirtualImages(renderer).reflected(seen)
+    rough, glass = (seen.item == renderer.describe().items.index(name) + 1 for name in balls)
+    assert rough.sum() > 20
+    np.testing.assert_array_equal(shown.item[rough], seen.item[rough])
+    np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
+    assert (shown.item[glass] >= BEHIND).all()
+
+
+def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
+    bare, camera = opened_scene(tmp_path, {"ball": MATERIALS["diffuse"]}), front_camera()
+    behind = find_geometry(bare, camera)
+    renderer = opened_scene(tmp_path, {"ball": pane("front", 1.0)})
+    seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
+    where = seen.item == renderer.describe().items.index("front") + 1
+    assert where.sum() > 50
+    through, mirrored = images.transmitted(seen), images.reflected(seen)
+    np.testing.assert_allclose(positions(through)[where], positions(behind)[where], atol=2e-3)
+    names = renderer.describe().items
+    assert set(through.item[where]) == {BEHIND + names.index(name) + 1 for name in ("ball", "floor", "back")}
+    # The floor before the pane goes on behind it.
+    is_floor = where & (mirrored.item == BEHIND + names.index("floor") + 1)
+    assert is_floor.sum() > 20
+    np.testing.assert_allclose(positions(mirrored)[is_floor][:, 1], 0.0, atol=2e-3)
+    assert positions(mirrored)[is_floor][:, 2].max() < 1.0
+    assert (mirrored.item != through.item)[where].mean() > 0.3

@@ -1,0 +1,180 @@
+"""Compositing: the right surface, the weights, and what neither keyframe sees."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.ndimage
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.paper import agrees, composite, warp_keyframe
+from enfilade.records import Geometry, Warped
+from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere
+from enfilade.settings import WarpSettings
+from keyframes_analytic import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
+from scenes_analytic import room, room_walk
+
+SETTINGS = WarpSettings(depth_tolerance=0.02)
+CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 50.0, 1, 1)
+
+
+def pixel(depth=2.0, item=1):
+    size = (1, 1)
+    return Geometry(
+        CAMERA,
+        np.full(size, depth, np.float32),
+        np.zeros((*size, 3), np.float32),
+        np.zeros((*size, 3), np.float32),
+        np.full(size, item, np.uint32),
+        np.zeros(size, np.uint8),
+    )
+
+
+def warped(value, *, depth=2.0, item=1, magnification=1.0, is_hole=False):
+    size = (1, 1)
+    return Warped(
+        np.full((*size, 3), value, np.float32),
+        np.zeros(size, np.float32),
+        np.full(size, depth, np.float32),
+        np.full(size, item, np.uint32),
+        np.full(size, magnification, np.float32),
+        np.full(size, is_hole),
+    )
+
+
+def joined(before, after, progress=0.5, of=None):
+    color, is_hole = composite(before, after, of or pixel(), progress=progress, settings=SETTINGS)
+    assert color.dtype == np.float32
+    return float(color[0, 0, 0]), bool(is_hole[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("progress", "expected"), [(0.5, 0.5), (0.25, 0.25), (0.9, 0.9), (0.0, 0.0), (1.0, 1.0)]
+)
+def test_the_nearer_keyframe_in_time_counts_more(progress, expected):
+    color, is_hole = joined(warped(0.0), warped(1.0), progress)
+    assert color == pytest.approx(expected, abs=1e-6)
+    assert not is_hole
+
+
+def test_the_less_magnified_sample_counts_more():
+    assert joined(warped(0.0, magnification=4.0), warped(1.0))[0] == pytest.approx(0.8)
+    assert joined(warped(0.0, magnification=0.1), warped(1.0))[0] == pytest.approx(0.5)  # no bonus for small
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"depth": 1.0},  # an occluder
+        {"depth": 3.0},  # what is behind, seen through a hole
+        {"depth": 2.05},
+        {"item": 2},
+        {"is_hole": True},
+    ],
+)
+def test_the_surface_that_the_frame_sees_is_taken(wrong):
+    assert joined(warped(0.2), warped(0.9, **wrong)) == (pytest.approx(0.2), False)
+    assert joined(warped(0.9, **wrong), warped(0.2)) == (pytest.approx(0.2), False)
+    assert joined(warped(0.9, **wrong), warped(0.9, **wrong)) == (0.0, True)
+
+
+def test_depths_agree_within_the_tolerance():
+    assert joined(warped(0.0, depth=2.039), warped(1.0, depth=1.961))[0] == pytest.approx(0.5)
+
+
+def test_sky_is_joined_too():
+    sky = pixel(depth=0.0, item=0)
+    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0, depth=0.0, item=0), of=sky)[0] == 0.5
+    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0), of=sky) == (0.0, False)
+    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0)) == (1.0, False)
+
+
+def test_a_hole_is_no_sky():
+    sky = pixel(depth=0.0, item=0)
+    hole = warped(0.0, depth=0.0, item=0, is_hole=True)
+    assert not agrees(hole, sky, 0.02).any()
+    assert joined(hole, hole, of=sky) == (0.0, True)
+
+
+def between(scene, path, first, last, frame):
+    before, after = (
+        warp_keyframe(keyframe_of(scene, path.cameras[f]), path.cameras[frame], SETTINGS)
+        for f in (first, last)
+    )
+    truth = keyframe_of(scene, path.cameras[frame])
+    progress = (frame - first) / (last - first)
+    color, is_hole = composite(before, after, truth.geometry, progress=progress, settings=SETTINGS)
+    return color, is_hole, truth, (before, after)
+
+
+def test_a_room_between_its_keyframes_looks_as_it_does():
+    path = room_walk(25)
+    color, is_hole, truth, _ = between(room(), path, 0, 12, 5)
+    assert is_hole.mean() < 0.06
+    # Checkerboards sampled once a pixel and resampled: their edges differ by half a pixel.
+    assert psnr(color[~is_hole], truth.shading.color[~is_hole].astype(float)) > 20
+    smooth = np.isin(truth.geometry.item, (2, 3, 4, 5, 7)) & ~is_hole  # walls and ceiling
+    assert psnr(color[smooth], truth.shading.color[smooth].astype(float)) > 34
+
+
+def test_one_keyframe_on_either_side_of_an_occluder():
+    # A ball before a wall: each keyframe sees the wall on another side of the ball; together, nearly all.
+    scene = AnalyticScene(
+        (
+            Plane((0, 0, -2), (0, 0, 1), Material((0.2, 0.3, 0.4))),
+            Sphere((0, 0, 0), 0.6, Material((0.9, 0, 0))),
+        )
+    )
+    middle = Camera(look_at((0, 0, 4), (0, 0, 0)), 45.0, 120, 90)
+
+    def at(x):
+        pose = middle.world_from_camera.copy()
+        pose[0, 3] = x
+        return dataclasses.replace(middle, world_from_camera=pose)
+
+    before, after = (warp_keyframe(keyframe_of(scene, at(x)), middle, SETTINGS) for x in (-0.5, 0.5))
+    geometry = geometry_of(scene, middle)
+    one = [~agrees(w, geometry, SETTINGS.depth_tolerance) for w in (before, after)]
+    color, is_hole = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
+    np.testing.assert_array_equal(is_hole, one[0] & one[1])
+    assert is_hole.mean() < 0.2 * min(one[0].mean(), one[1].mean())
+    ball = (geometry.item == 2) & ~is_hole
+    assert (color[ball][:, 2] == 0).all()  # no wall in it
+    assert (color[(geometry.item == 1) & ~is_hole][:, 2] > 0.05).all()  # no ball in the wall
+
+
+@pytest.mark.parametrize("frame", [3, 8, 12, 16, 21])
+def test_holes_are_where_neither_keyframe_sees_the_surface(frame):
+    scene, path = room(), room_walk(25, size=(160, 120), turn_deg=30)
+    _, is_hole, truth, _ = between(scene, path, 0, 24, frame)
+    camera = path.cameras[frame]
+    direction = ray_directions(camera)
+    depth, item = first_hits(scene, camera.eye, direction)
+    world = camera.eye + depth[..., None] * direction
+    seen = np.zeros(item.shape, bool)
+    edge = edges(item)
+    for end in (0, 24):
+        by = is_seen_by(scene, path.cameras[end], world)
+        seen |= by
+        edge |= edges(by)
+    # A splat covers, or leaves, half a pixel more than the surface; nothing more than a pixel off.
+    border = scipy.ndimage.binary_dilation(edge, np.ones((3, 3)))
+    wrong = (is_hole == seen) & ~border
+    assert (is_hole & ~border).sum() > 20
+    # Surfaces that a keyframe saw so obliquely that their splats are beyond the largest size are holes.
+    assert not (wrong & ~is_hole).any()
+    assert wrong.mean() < 0.002
+    assert (truth.geometry.item > 0).all()
+
+
+def is_seen_by(scene, camera, world):
+    nearest, _ = first_hits(scene, camera.eye, world - camera.eye)
+    at, ahead = projected(camera, world)
+    inside = (ahead > 0) & (at > 0).all(-1) & (at < (camera.width, camera.height)).all(-1)
+    return (nearest > 1 - 1e-6) & inside
+
+
+def edges(labels):
+    low = scipy.ndimage.minimum_filter(labels.astype(int), 3, mode="nearest")
+    high = scipy.ndimage.maximum_filter(labels.astype(int), 3, mode="nearest")
+    return low != high

@@ -1,0 +1,156 @@
+"""The generated scenes: what they write, and that they are the cases that §6 needs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from scene_views import View, folder_bytes, read_path
+
+from enfilade.camera import load_path
+from enfilade.errors import InputError, SettingsError
+from studies.scenes import PRESETS, SCENES, SceneFiles, write_scene
+from studies.scenes.atrium import walk as atrium_walk
+from studies.scenes.presets import PRESETS as SIZES
+from studies.scenes.room import walk as room_walk
+
+DIFFUSE_ONLY = {"twosided", "diffuse"}
+Look = Callable[[str, int], View]
+
+
+def test_import_loads_nothing_heavy() -> None:
+    heavy = ("mitsuba", "drjit", "matplotlib", "trimesh", "scipy", "PIL")
+    code = f"import sys, studies.scenes; print([m for m in {heavy!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_same_call_writes_same_bytes(name: str, small: dict[str, SceneFiles], tmp_path: Path) -> None:
+    again = write_scene(name, tmp_path / "again", preset="small")
+    assert folder_bytes(again.scene.parent) == folder_bytes(small[name].scene.parent)
+
+
+def test_another_size_shows_more_to_the_sides(small: dict[str, SceneFiles], tmp_path: Path) -> None:
+    wide = write_scene("room", tmp_path / "wide", preset="small", size=(64, 36))
+    path, usual = load_path(wide.path), load_path(small["room"].path)
+    assert (path.width, path.height) == (64, 36)
+    assert path.cameras[0].fov_deg == usual.cameras[0].fov_deg
+    film = ET.parse(wide.scene).getroot().find("sensor/film")  # noqa: S314
+    assert film is not None
+    assert [e.get("value") for e in film.iter("integer")] == ["64", "36"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_refers_to_existing_files_below_its_folder(name: str, small: dict[str, SceneFiles]) -> None:
+    root = ET.parse(small[name].scene).getroot()  # noqa: S314
+    assert root.get("version") == "3.0.0"
+    files = [e.get("value") for e in root.iter("string") if e.get("name") == "filename"]
+    assert files
+    for file in files:
+        assert file is not None
+        assert not Path(file).is_absolute()
+        assert ".." not in Path(file).parts
+        assert (small[name].scene.parent / file).is_file()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_names_are_unique_and_references_resolve(name: str, small: dict[str, SceneFiles]) -> None:
+    root = ET.parse(small[name].scene).getroot()  # noqa: S314
+    names = [e.get("id") for e in root if e.get("id")]
+    assert len(names) == len(set(names))
+    assert {e.get("id") for e in root.iter("ref")} <= set(names)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_loads_and_renders_with_sensible_exposure(name: str, loaded: dict[str, Any]) -> None:
+    import mitsuba as mi
+
+    image = np.array(mi.render(loaded[name], spp=8, seed=1))[..., :3]
+    assert image.shape == (240, 320, 3)
+    assert np.isfinite(image).all()
+    shown = np.clip(image, 0.0, 1.0) ** (1 / 2.2)
+    assert 0.25 < shown.mean() < 0.65
+    assert (image.mean(axis=-1) > 1.0).mean() < 0.2
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_frames_of_the_walks(preset: str) -> None:
+    frames = {"full": (448, 200), "small": (60, 60)}[preset]
+    assert (room_walk(SIZES[preset])[1], atrium_walk(SIZES[preset])[1]) == frames
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_path_is_rigid_and_complete(name: str, small: dict[str, SceneFiles]) -> None:
+    document, poses = read_path(small[name])
+    assert document["camera_type"] == "perspective"
+    assert (document["render_width"], document["render_height"], document["fps"]) == (320, 240, 30)
+    assert document["seconds"] == len(poses) / 30
+    turns = poses[:, :3, :3]
+    identity = np.broadcast_to(np.eye(3), turns.shape)
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), identity, atol=1e-7)
+    np.testing.assert_allclose(np.linalg.det(turns), 1.0, atol=1e-7)
+    np.testing.assert_array_equal(poses[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (len(poses), 1)))
+    assert (turns[:, 2, 1] > 0.9).all()  # the camera stays upright
+
+
+@pytest.mark.parametrize("design", [room_walk, atrium_walk])
+def test_full_walk_is_free_of_jerks(design: Callable[..., Any]) -> None:
+    walk, frames = design(SIZES["full"])
+    poses = walk.poses(frames)
+    step = np.diff(poses[:, :3, 3], axis=0)
+    # A 30th of a second changes the velocity by less than 5 mm a frame: 4.5 m/s².
+    assert np.linalg.norm(np.diff(step, axis=0), axis=1).max() < 0.005
+    cosines = np.einsum("nij,nij->n", poses[1:, :3, :3], poses[:-1, :3, :3]) / 2 - 0.5
+    turn_deg = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    assert np.abs(np.diff(turn_deg)).max() < 0.5
+
+
+def test_room_is_diffuse_throughout(small: dict[str, SceneFiles]) -> None:
+    root = ET.parse(small["room"].scene).getroot()  # noqa: S314
+    assert {e.get("type") for e in root.iter("bsdf")} == DIFFUSE_ONLY
+
+
+def test_room_rests_and_hurries(look: Look) -> None:
+    rest, start = look("room", 4), look("room", 12)
+    assert (rest.speed_deg_s < 0.5).mean() > 0.9
+    assert (start.speed_deg_s < 0.5).mean() > 0.7
+    assert rest.speed_deg_s.mean() > 0.02  # it drifts, it does not stand still
+    assert look("room", 45).speed_deg_s.mean() > 5.0
+
+
+def test_atrium_is_view_dependent_for_two_fifths(look: Look) -> None:
+    views = [look("atrium", frame) for frame in (0, 12, 24, 36, 48, 58)]
+    shares = [view.is_view_dependent.mean() for view in views]
+    assert 0.35 < np.mean(shares) < 0.45
+    assert min(shares) > 0.2
+
+
+def test_atrium_moves_steadily(look: Look) -> None:
+    for frame in (0, 20, 40, 58):
+        assert (look("atrium", frame).speed_deg_s < 0.5).mean() < 0.1
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_camera_keeps_clear_and_indoors(name: str, look: Look) -> None:
+    for frame in range(0, 59, 6):
+        distance = look(name, frame).distance
+        assert distance.min() > 0.3
+        assert np.isfinite(distance).all()  # no ray leaves through a gap
+
+
+def test_a_size_without_pixels_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="no image of 0x9 pixels"):
+        write_scene("room", tmp_path, size=(0, 9))
+
+
+@pytest.mark.parametrize(("name", "preset"), [("cellar", "full"), ("room", "huge")])
+def test_unknown_names_are_told_the_known_ones(name: str, preset: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"(room, atrium|full, small)"):
+        write_scene(name, tmp_path, preset=preset)
