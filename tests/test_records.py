@@ -130,7 +130,7 @@ def test_progress_counts_views_and_no_rests():
     # Thirty frames at rest, then thirty steps: the first step is near the view of the rest.
     cameras = [Camera(look_at((max(step, 0), 0, 1), (0, 0, 0)), 50.0, W, H) for step in range(-29, 31)]
     path, segment = CameraPath(tuple(cameras), tuple(range(60)), 24.0), Segment(0, 38)
-    assert path.moving(segment) == list(range(30, 38))
+    assert path.distinct_inbetweens(segment) == list(range(30, 38))
     assert [path.progress(segment, frame) for frame in (30, 37)] == pytest.approx([1 / 9, 8 / 9])
 
 
@@ -142,5 +142,5 @@ def test_neighbours_and_rest_end_at_a_cut():
     assert path.neighbours(2) == (other, None)
     assert path.neighbours(3) == (None, other)
     assert path.neighbours(5) == (other, None)
-    assert [path.original(frame) for frame in range(6)] == [0, 1, 1, 3, 3, 5]
-    assert [path.place(frame) for frame in range(6)] == [0, 1, 1, 2, 2, 3]
+    assert [path.static_frame(frame) for frame in range(6)] == [0, 1, 1, 3, 3, 5]
+    assert [path.distance(frame) for frame in range(6)] == [0, 1, 1, 2, 2, 3]

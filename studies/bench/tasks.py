@@ -172,7 +172,7 @@ class Interpolated:
             return
         tracer = EveryFrame(self.job, PixelFilter.GAUSSIAN)
         keyframes = {frame: tracer.color(renderer, frame, costs) for frame in chosen}
-        rests = {frame: self.job.path.original(frame) for frame in shot}
+        rests = {frame: self.job.path.static_frame(frame) for frame in shot}
         keyframes |= {frame: keyframes[first] for frame, first in rests.items() if first in keyframes}
         files = []
         exposure = np.float32(2.0**self.job.settings.viewing.exposure_ev)

@@ -64,7 +64,7 @@ def recomputed(
     percent: dict[int, float] = {}
     total = 0.0
     for segment in segments:
-        moving = job.path.moving(segment)
+        moving = job.path.distinct_inbetweens(segment)
         looked_at = moving[(step - 1) // 2 :: step] or moving[:1]
         found = {frame: hole_percent(job, views, segment, frame) for frame in looked_at}
         if found:

@@ -18,7 +18,7 @@ class Segment:
     first, last : int
         The keyframes.
     depth : int
-        How often an initial segment was split to make this one.
+        Number of splits that led from an initial segment to this one.
     """
 
     first: int
@@ -32,10 +32,7 @@ class Segment:
 
     def split(self, frame: int) -> tuple[Segment, Segment]:
         """Two halves that share a frame."""
-        return (
-            Segment(self.first, frame, self.depth + 1),
-            Segment(frame, self.last, self.depth + 1),
-        )
+        return Segment(self.first, frame, self.depth + 1), Segment(frame, self.last, self.depth + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +44,11 @@ class CameraPath:
     cameras : tuple of Camera
         One a frame; all of one image size.
     numbers : tuple of int
-        The number by which the user knows each frame, rising.
+        Frame numbers as the user counts them, rising.
     fps : float
         Frames per second.
     cuts : frozenset of int
-        Indices of frames that begin a new shot: nothing is carried across.
+        Indices of frames that begin a new shot: no data is reused across a cut.
     """
 
     cameras: tuple[Camera, ...]
@@ -76,53 +73,49 @@ class CameraPath:
         """Pixels."""
         return self.cameras[0].height
 
-    def neighbours(self, frame: int) -> tuple[Camera | None, Camera | None]:
-        """Cameras of the previous and the next frame; None at the ends of a shot."""
-        previous = None if frame == 0 or frame in self.cuts else self.cameras[frame - 1]
-        is_last = frame == len(self) - 1 or frame + 1 in self.cuts
-        return previous, None if is_last else self.cameras[frame + 1]
-
-    def original(self, frame: int) -> int:
-        """First frame of the run of equal views to which a frame belongs: itself where it moves."""
-        return self._originals[frame]
-
-    @cached_property
-    def _originals(self) -> list[int]:
-        found: list[int] = []
-        for frame, camera in enumerate(self.cameras):
-            rests = frame > 0 and frame not in self.cuts and camera.is_same_view(self.cameras[frame - 1])
-            found.append(found[-1] if rests else frame)
-        return found
-
-    @cached_property
-    def originals(self) -> tuple[int, ...]:
-        """Frames that show a view of their own, in order: those that are no copies."""
-        return tuple(frame for frame in range(len(self)) if self.original(frame) == frame)
-
-    def place(self, frame: int) -> int:
-        """How many other views come before a frame's: how far it is along the path, rests left out."""
-        return self._places[frame]
-
-    @cached_property
-    def _places(self) -> list[int]:
-        moves = [int(original == frame) for frame, original in enumerate(self._originals)]
-        return [place - 1 for place in itertools.accumulate(moves)]
-
-    def moving(self, segment: Segment) -> list[int]:
-        """The in-betweens of a segment that show a view of their own: those that are no copies."""
-        return [frame for frame in segment.inbetweens if self.original(frame) == frame]
-
-    def middle(self, segment: Segment) -> int | None:
-        """The in-between that stands for a segment (§4.3): the middle one of those that move."""
-        moving = self.moving(segment)
-        return moving[(len(moving) - 1) // 2] if moving else None
-
-    def progress(self, segment: Segment, frame: int) -> float:
-        """Where the view of a frame that moves lies between those of a segment's keyframes, in (0, 1)."""
-        first, last = self.place(segment.first), self.place(segment.last)
-        return (self.place(frame) - first) / (last - first)
-
     def shots(self) -> list[range]:
-        """Runs of frames without a cut between them."""
+        """Maximal runs of frames without a cut."""
         starts = sorted({0, *self.cuts})
         return [range(a, b) for a, b in zip(starts, [*starts[1:], len(self)], strict=True)]
+
+    def neighbours(self, frame: int) -> tuple[Camera | None, Camera | None]:
+        """Cameras of the previous and the next frame; None at the ends of a shot."""
+        is_first = frame == 0 or frame in self.cuts
+        is_last = frame == len(self) - 1 or frame + 1 in self.cuts
+        return None if is_first else self.cameras[frame - 1], None if is_last else self.cameras[frame + 1]
+
+    @cached_property
+    def distinct_frames(self) -> tuple[int, ...]:
+        """Frames whose pose differs from that of the frame before, and first frames of shots; rising."""
+        return tuple(frame for frame in range(len(self)) if not self._is_repeated(frame))
+
+    def static_frame(self, frame: int) -> int:
+        """First frame of a repeated pose; `frame` itself where the camera moves into it."""
+        return self.distinct_frames[self.distance(frame)]
+
+    def distance(self, frame: int) -> int:
+        """Distance along the path, in distinct frames from the first one: repeated poses add nothing."""
+        return self._distances[frame]
+
+    def distinct_inbetweens(self, segment: Segment) -> list[int]:
+        """In-betweens of a segment without those that repeat a pose."""
+        return [frame for frame in segment.inbetweens if self.static_frame(frame) == frame]
+
+    def middle(self, segment: Segment) -> int | None:
+        """Middle one of the distinct in-betweens (§4.3); None where there are none."""
+        distinct = self.distinct_inbetweens(segment)
+        return distinct[(len(distinct) - 1) // 2] if distinct else None
+
+    def progress(self, segment: Segment, frame: int) -> float:
+        """Distance of a distinct in-between from the first keyframe over the segment's length, in (0, 1)."""
+        first, last = self.distance(segment.first), self.distance(segment.last)
+        return (self.distance(frame) - first) / (last - first)
+
+    @cached_property
+    def _distances(self) -> list[int]:
+        is_distinct = (int(not self._is_repeated(frame)) for frame in range(len(self)))
+        return [count - 1 for count in itertools.accumulate(is_distinct)]
+
+    def _is_repeated(self, frame: int) -> bool:
+        previous, _ = self.neighbours(frame)
+        return previous is not None and self.cameras[frame].is_same_view(previous)

@@ -64,7 +64,7 @@ class DecoupledFrames:
         workshop = self._workshop
         if workshop.run.done(result_unit(workshop, frame)):
             return
-        original = workshop.job.path.original(frame)
+        original = workshop.job.path.static_frame(frame)
         made, view = self._made.made(original, lambda: self._averaged(original))
         if frame != original:
             made, view = replace(made, source=np.full_like(made.source, Source.REUSED)), workshop.views[frame]
@@ -78,7 +78,7 @@ class DecoupledFrames:
         parts = {f: self._kept.made(f, lambda f=f: self._read(f)) for f in span}  # type: ignore[misc]
         here = parts[frame]
         others = [f for f in span if f != frame]
-        shares = {f: 1.0 - abs(path.place(f) - path.place(frame)) / (REACH + 1) for f in others}
+        shares = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
         color = here.seen
         if np.any(here.source == Source.SPECULAR):
             with workshop.costs.of("over time"):

@@ -63,7 +63,7 @@ def make_copy(workshop: Workshop, frame: int) -> None:
     """Repeat the frame of the same view: where the camera stands still, nothing new is to be seen."""
     if workshop.run.done(raw_unit(workshop, frame)):
         return
-    color = read_raw(workshop, workshop.job.path.original(frame)).color
+    color = read_raw(workshop, workshop.job.path.static_frame(frame)).color
     _write(workshop, frame, Frame(color, np.full(color.shape[:2], Source.REUSED, np.uint8)), 0)
 
 

@@ -37,14 +37,14 @@ class Kept(OrderedDict[int, T]):
 
 def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list[int]:
     """The so many of some frames of a path that are nearest to one, nearest first; rests take no way."""
-    here = path.place(frame)
-    return sorted(frames, key=lambda k: (abs(path.place(k) - here), k))[:count]
+    here = path.distance(frame)
+    return sorted(frames, key=lambda k: (abs(path.distance(k) - here), k))[:count]
 
 
 def around(path: CameraPath, shot: range, frame: int, reach: int) -> list[int]:
     """Frames of a shot that show a view of their own: that of a frame, and so many to each side."""
-    first, here, last = (path.place(f) for f in (shot.start, frame, shot.stop - 1))
-    return list(path.originals[max(here - reach, first) : min(here + reach, last) + 1])
+    first, here, last = (path.distance(f) for f in (shot.start, frame, shot.stop - 1))
+    return list(path.distinct_frames[max(here - reach, first) : min(here + reach, last) + 1])
 
 
 def either_side(fills: list[int], frame: int) -> list[int]:

@@ -111,7 +111,7 @@ class LightTable:
         return shares
 
     def _way(self, one: int, other: int) -> int:
-        return abs(self._path.place(one) - self._path.place(other))
+        return abs(self._path.distance(one) - self._path.distance(other))
 
     def _segment(self, frame: int) -> Segment:
         """A frame's own segment, whose fills it asks: others see other holes."""

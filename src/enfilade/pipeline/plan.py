@@ -131,7 +131,7 @@ def _expected_holes(job: Job, views: Views, segments: list[Segment], monitor: Mo
     monitor.stage("holes", len(segments))
     holes: dict[int, float] = {}
     for segment in segments:
-        moving = job.path.moving(segment)
+        moving = job.path.distinct_inbetweens(segment)
         for frame in sorted({moving[int(len(moving) * share)] for share in HOLE_PROBES} if moving else ()):
             holes[frame] = hole_percent(job, views, segment, frame)
         monitor.advance()
@@ -185,7 +185,7 @@ def _shares(job: Job, survey: Survey, segments: list[Segment], holes: dict[int, 
     for segment in segments:
         known = [holes[f] for f in segment.inbetweens if f in holes]
         hole = sum(known) / len(known) if known else 0.0
-        for frame in job.path.moving(segment):
+        for frame in job.path.distinct_inbetweens(segment):
             slow = survey.slow_percent[frame]
             rest = 1.0 - slow / 100.0  # taken as spread evenly over the image
             shares["slow"] += slow / count

@@ -67,7 +67,7 @@ def forecast_decoupled(job: Job, shots: list[list[Segment]], monitor: Monitor) -
     more = 1.0 if pilot is None else paths / pilot["paths"]
     frames, all_keyframes = len(job.path), sum(keyframes)
     times = {
-        "raw": len(job.path.originals),
+        "raw": len(job.path.distinct_frames),
         "frame": frames,
         **dict.fromkeys(KEYFRAMES, all_keyframes),
         "keyframe": all_keyframes * more,
@@ -137,13 +137,15 @@ def excerpt_of(path: CameraPath, segment: Segment) -> CameraPath:
     """A segment of a path without its rests, at a size that does not take long."""
     scale = min(math.sqrt(PIXELS / (path.width * path.height)), 1.0)
     width, height = (max(round(scale * n), 1) for n in (path.width, path.height))
-    span = [f for f in range(segment.first, segment.last + 1) if path.original(f) == f or f == segment.first]
+    span = [
+        f for f in range(segment.first, segment.last + 1) if path.static_frame(f) == f or f == segment.first
+    ]
     cameras = tuple(replace(path.cameras[f], width=width, height=height) for f in span)
     return CameraPath(cameras, tuple(path.numbers[f] for f in span), path.fps, frozenset())
 
 
 def _views(path: CameraPath, segment: Segment) -> int:
-    return path.place(segment.last) - path.place(segment.first)
+    return path.distance(segment.last) - path.distance(segment.first)
 
 
 def _paths(jnd: float, job: Job, keyframes: list[int]) -> float:

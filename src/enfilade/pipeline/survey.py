@@ -81,7 +81,7 @@ def initial_segments(path: CameraPath, survey: Survey, settings: Settings) -> li
     for shot in path.shots():
         speed = np.array([survey.speed_px[frame] for frame in shot])
         chosen = place_keyframes(speed, settings.keyframes)
-        keyframes = sorted({path.original(shot.start + k) for k in chosen})
+        keyframes = sorted({path.static_frame(shot.start + k) for k in chosen})
         pairs = itertools.pairwise(keyframes)
         shots.append([Segment(a, b) for a, b in pairs] or [Segment(keyframes[0], keyframes[0])])
     return shots

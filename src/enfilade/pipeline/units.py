@@ -133,7 +133,7 @@ class Blueprint:
             for segment in segments:
                 yield self._segment(segment, segment.first)
             for frame in shot:
-                original = path.original(frame)
+                original = path.static_frame(frame)
                 if original != frame:
                     owners = [s.first for s in segments if s.first < original < s.last]
                     facts = {"copy": True, "root": next(iter(owners), original)}
@@ -176,7 +176,7 @@ class Blueprint:
             return
         facts = {"segment": [segment.first, segment.last, segment.depth], "root": root}
         for frame in segment.inbetweens:
-            if self._job.path.original(frame) == frame:
+            if self._job.path.static_frame(frame) == frame:
                 yield self._raw(frame, facts, name)
 
     def _raw(self, frame: int, facts: dict[str, Any], need: str) -> Unit:
@@ -211,7 +211,7 @@ class Blueprint:
             facts = {"frame": frame, "shot": index}
             raw = f"raw {self._numbers[frame]}"
             order, group = (FRAMES, frame, 0), f"frame {frame // BLOCK}"
-            if self._job.path.original(frame) == frame:
+            if self._job.path.static_frame(frame) == frame:
                 yield Unit(raw, "shade", facts, (gate,), order, group, "shading")
             window = around(self._job.path, shot, frame, REACH)
             needs = tuple(f"raw {self._numbers[f]}" for f in window)

@@ -99,7 +99,9 @@ class Worker:
             _ = workshop.light_renderer  # before any work: what it can't do is an error
         survey = survey_path(workshop.views, job.path, job.settings, self._monitor)
         items = len(workshop.renderer.describe().items)
-        workshop.finish("survey", [], survey=survey.to_dict(), views=len(job.path.originals), items=items)
+        workshop.finish(
+            "survey", [], survey=survey.to_dict(), views=len(job.path.distinct_frames), items=items
+        )
 
     def _judge(self, facts: Mapping[str, Any]) -> None:
         whole = None if facts["whole"] is None else self._verdict(facts["whole"])
