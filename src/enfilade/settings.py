@@ -1,7 +1,7 @@
-"""Every option of every stage: one frozen dataclass a stage, with defaults, ranges and help.
+"""Settings: one frozen dataclass a stage, with defaults, ranges and help.
 
-The command line makes its flags from these classes (``--keyframes-spacing``), and a TOML file sets them
-by section (``[keyframes]`` / ``spacing = 25``).
+A method names the sections that it reads. A TOML file sets them by table (``[keyframes]`` and below it
+``spacing = 25``), the command line by flags or ``--set keyframes.spacing=25``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,15 @@ import dataclasses
 import math
 import os
 import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 from enfilade.errors import SettingsError
+
+S = TypeVar("S", bound="Section")
 
 
 def option(
@@ -29,9 +32,23 @@ def option(
     is_path: bool = False,
     joined_by: str = "",
 ) -> Any:
-    """Declare a setting: default, one sentence of help, range (ends included) or words to choose from.
+    """Declare a setting.
 
-    One with `joined_by` may be given as a list, too.
+    Parameters
+    ----------
+    default
+    text
+        One sentence of help.
+    least, most
+        Range, ends included.
+    choices
+        Allowed words.
+    is_odd
+        Only odd numbers are allowed.
+    is_path
+        The value is a path; relative paths are resolved by the reader of the file or flag.
+    joined_by
+        Separator of a list, which may also be given as a TOML array.
     """
     metadata = {
         "help": text, "least": least, "most": most, "choices": choices, "is_odd": is_odd,
@@ -42,27 +59,41 @@ def option(
 
 @dataclass(frozen=True)
 class Section:
-    """What the settings of all stages share: range checks, and reading from a table."""
+    """The settings of one stage. Subclasses are frozen dataclasses whose fields are made by :func:`option`.
+
+    Attributes
+    ----------
+    table : str
+        Name of its table in a TOML file.
+    """
+
+    table: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for f in fields(self):
-            _check(f, getattr(self, f.name), f"[{section_name(type(self))}] {f.name}")
+            _check(f, getattr(self, f.name), f"[{self.table}] {f.name}")
 
     @classmethod
-    def from_table(cls, table: dict[str, Any]) -> Self:
-        """Build from a TOML table; unknown keys raise and list the known ones.
+    def from_table(cls, table: Mapping[str, Any]) -> Self:
+        """Build from a TOML table.
 
         Raises
         ------
         SettingsError
+            An unknown setting, a wrong type, a value out of range.
         """
         known = {f.name: f for f in fields(cls)}
         for key in table:
             if key not in known:
                 raise SettingsError(
-                    f"unknown setting {key!r} in [{section_name(cls)}]; known are: {', '.join(known)}"
+                    f"unknown setting {key!r} in [{cls.table}]; known are: {', '.join(known)}"
                 )
-        return cls(**{k: _converted(known[k], v, cls) for k, v in table.items()})
+        return cls(**{key: _converted(known[key], value, cls) for key, value in table.items()})
+
+    def to_table(self) -> dict[str, Any]:
+        """All values, fit for JSON; read back by :meth:`from_table`."""
+        values = dataclasses.asdict(self)
+        return {key: value.value if isinstance(value, Enum) else value for key, value in values.items()}
 
 
 class Placement(Enum):
@@ -92,22 +123,37 @@ class SampleFilter(Enum):
 class TraceSettings(Section):
     """Path tracing."""
 
-    spp: int = option(
-        64, "Paths traced for a pixel, by the methods paper and reference.", least=1, most=1_048_576
-    )
+    table = "trace"
+
     seed: int = option(0, "Seed of all random numbers.", least=0, most=2**32 - 1)
     max_depth: int = option(
         0, "Longest path in edges; 0 takes what the scene's integrator says.", least=0, most=1024
     )
-    pixel_filter: SampleFilter = option(SampleFilter.GAUSSIAN, "Pixel filter of --method reference.")
-    chunk: int = option(
-        1_048_576, "Paths in flight at once: bounds the memory.", least=1024, most=268_435_456
-    )
+
+
+@dataclass(frozen=True)
+class SamplingSettings(Section):
+    """Samples per pixel of the methods that trace whole pixels: paper and reference."""
+
+    table = "sampling"
+
+    spp: int = option(64, "Paths traced for a pixel.", least=1, most=1_048_576)
+
+
+@dataclass(frozen=True)
+class ReferenceSettings(Section):
+    """The method reference."""
+
+    table = "reference"
+
+    pixel_filter: SampleFilter = option(SampleFilter.GAUSSIAN, "Pixel filter.")
 
 
 @dataclass(frozen=True)
 class ViewingSettings(Section):
     """Who looks at the video, and on what (§5.2): this fixes pixels per degree."""
+
+    table = "viewing"
 
     diagonal_m: float = option(0.25, "Diagonal of the image on the screen, metres.", least=0.01)
     distance_m: float = option(0.5, "Distance of the eye from the screen, metres.", least=0.05)
@@ -123,6 +169,8 @@ class ViewingSettings(Section):
 class KeyframeSettings(Section):
     """Initial placement of keyframes (§4.2)."""
 
+    table = "keyframes"
+
     placement: Placement = option(
         Placement.ADAPTED, "Uniform spacing adapted by flow (Eq. 6), plain, or equal flow."
     )
@@ -136,6 +184,8 @@ class KeyframeSettings(Section):
 class WarpSettings(Section):
     """3D warp and compositing (§2.2)."""
 
+    table = "warp"
+
     max_magnification: float = option(
         4.0, "Splats stretch to at most this many pixels a side; beyond is a hole.", least=1.0, most=16.0
     )
@@ -148,6 +198,8 @@ class WarpSettings(Section):
 class MetricSettings(Section):
     """The animation quality metric (§3)."""
 
+    table = "metric"
+
     metering: Metering = option(
         Metering.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
@@ -157,6 +209,8 @@ class MetricSettings(Section):
 @dataclass(frozen=True)
 class MaskSettings(Section):
     """Which pixels must be traced, and when a segment is split (§4.1, §4.3, §6)."""
+
+    table = "masks"
 
     slow_deg_s: float = option(0.5, "Pixels slower than this are traced (v_t), deg/s.", least=0.0)
     specular_jnd: float = option(
@@ -174,6 +228,8 @@ class MaskSettings(Section):
 @dataclass(frozen=True)
 class AntialiasSettings(Section):
     """Motion-compensated spatiotemporal filter (§5.2, §5.3, §5.4)."""
+
+    table = "antialias"
 
     frames: int = option(11, "Temporal support, frames (odd).", least=1, most=63, is_odd=True)
     slow_frames: int = option(
@@ -195,50 +251,52 @@ class AntialiasSettings(Section):
 
 
 @dataclass(frozen=True)
-class LightSettings(Section):
-    """Keyframes as a cache of light (--method decoupled)."""
+class DecoupledSettings(Section):
+    """The method decoupled: irradiance cached at keyframes."""
+
+    table = "decoupled"
 
     quality: float = option(
-        10.0, "Noise that may be left, JND as compare scores it: lower is dearer.", least=0.5, most=100.0
+        10.0, "Noise that may remain, in JND as compare reports it; lower costs more.", least=0.5, most=100.0
     )
-    paths: int = option(
-        0, "Paths of a keyframe's pixel; 0 finds how many the quality asks for.", least=0, most=1_048_576
+    irradiance_spp: int = option(
+        0, "Paths a pixel of an irradiance image; 0: derived from the quality.", least=0, most=1_048_576
     )
-    spacing: int = option(8, "Uniform spacing of the keyframes of light, frames.", least=2)
-    keyframes: int = option(4, "Keyframes in which a surface is looked up.", least=1, most=16)
-    least_samples: int = option(4, "Camera rays of every pixel in every frame.", least=2, most=4096)
-    samples: int = option(
-        0, "Camera rays of a pixel that shows an edge; 0: as many as the quality asks for.",
-        least=0, most=4096,
-    )  # fmt: skip
-    lobe_samples: int = option(
-        0, "Rays of a pixel that shows a glossy, mirroring or transparent surface, 2 or more; 0: as many as "
-        "the quality asks for.", least=0, most=4096,
-    )  # fmt: skip
+    spacing: int = option(8, "Uniform spacing of the keyframes, frames.", least=2)
+    lookup_keyframes: int = option(4, "Nearest keyframes that are looked up.", least=1, most=16)
+    min_spp: int = option(4, "Camera rays of every pixel.", least=2, most=4096)
+    edge_spp: int = option(
+        0, "Camera rays of a pixel at an edge; 0: derived from the quality.", least=0, most=4096
+    )
+    specular_spp: int = option(
+        0, "Rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.", least=0, most=4096
+    )
     denoiser: str = option(
         "none",
-        "Quality of Open Image Denoise on the light of keyframes, in place of smoothing it along surfaces.",
+        "Quality of Open Image Denoise on irradiance images, instead of the wavelet filter.",
         choices=("none", "fast", "balanced", "high"),
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("paths", "lobe_samples"):
+        for name in ("irradiance_spp", "specular_spp"):
             if getattr(self, name) == 1:
                 raise SettingsError(
-                    f"[light] {name} = 1: of one ray the noise can't be told; give 2 or more, or 0 for as "
-                    "many as the quality asks for"
+                    f"[{self.table}] {name} = 1: the noise of a single sample can't be estimated; give 2 or "
+                    "more, or 0 to derive it from the quality"
                 )
-        if 0 < self.samples < self.least_samples:
+        if 0 < self.edge_spp < self.min_spp:
             raise SettingsError(
-                f"[light] samples = {self.samples}: every pixel has {self.least_samples} (least_samples); "
-                "give as many or more, or 0 for as many as the quality asks for"
+                f"[{self.table}] edge_spp = {self.edge_spp}: every pixel has {self.min_spp} (min_spp); "
+                "give as many or more, or 0 to derive it from the quality"
             )
 
 
 @dataclass(frozen=True)
 class VideoSettings(Section):
     """Encoding of the video."""
+
+    table = "video"
 
     codec: str = option("h264", "Codec of the video.", choices=("h264", "ffv1", "av1", "prores"))
     quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
@@ -247,17 +305,18 @@ class VideoSettings(Section):
     display: str = option("", "Its display, one for sRGB, Rec.1886 or Rec.709; none: the first of these.")
 
 
-LAYERS = ("Z", "P", "N", "albedo", "item", "forward", "backward", "source")  # of delivered frames
+LAYERS = ("Z", "P", "N", "albedo", "shape_index", "forward", "backward", "provenance")  # of delivered frames
 
 
 @dataclass(frozen=True)
 class OutputSettings(Section):
     """Files of delivered frames."""
 
+    table = "output"
+
     layers: str = option(
-        "forward,backward,source",
-        f"Layers beside the colours: some of {','.join(LAYERS)}; or all, or none. Depth, position, normal, "
-        "albedo, number of the item, image flow, and why a pixel has its value.",
+        "forward,backward,provenance",
+        f"AOVs beside the colours: some of {','.join(LAYERS)}; or all, or none.",
         joined_by=",",
     )
 
@@ -278,78 +337,105 @@ class OutputSettings(Section):
 
 @dataclass(frozen=True)
 class LimitSettings(Section):
-    """What scenes and images may ask for before they are read; no result depends on it."""
+    """Limits of resources; no result depends on them."""
+
+    table = "limits"
 
     allow: str = option(
-        "", f"Folders beside the scene's own in which its files may lie, with {os.pathsep!r} between them.",
+        "", f"Folders beside the scene's own that its files may lie in, separated by {os.pathsep!r}.",
         is_path=True, joined_by=os.pathsep,
     )  # fmt: skip
-    file_mb: int = option(4096, "Largest file of a scene, megabytes.", least=1, most=1_000_000)
-    megapixels: int = option(
-        268, "Largest image or film of a scene, millions of pixels.", least=1, most=100_000
+    paths_in_flight: int = option(
+        1_048_576, "Paths traced at once; bounds the memory.", least=1024, most=268_435_456
     )
-    elements_m: int = option(200, "Most vertices or faces of a mesh, millions.", least=1, most=100_000)
-    trial_mb: int = option(
-        16_384,
-        "Memory in which a process of its own must be able to load a scene before it is rendered, or to "
-        "decode what is compared, MB.", least=512, most=10_000_000,
+    task_timeout_s: float = option(
+        0.0, "Seconds after which a worker process is killed that has not finished its task; 0: never.",
+        least=0.0, most=31_536_000.0,
     )  # fmt: skip
-    trial_s: float = option(600.0, "... and seconds, for a scene or a frame.", least=0.1, most=86_400.0)
+    preflight_mb: int = option(
+        16_384, "Memory of the process that loads a scene once before a run begins, MB.",
+        least=512, most=10_000_000,
+    )  # fmt: skip
+    preflight_s: float = option(600.0, "Its time limit, seconds.", least=0.1, most=86_400.0)
 
 
-@dataclass(frozen=True)
+SECTIONS: tuple[type[Section], ...] = (
+    TraceSettings, SamplingSettings, ReferenceSettings, ViewingSettings, KeyframeSettings, WarpSettings,
+    MetricSettings, MaskSettings, AntialiasSettings, DecoupledSettings, VideoSettings, OutputSettings,
+    LimitSettings,
+)  # fmt: skip
+
+
 class Settings:
-    """All settings of a run."""
+    """Settings by section, such as ``settings[MaskSettings].slow_deg_s``; one not given has its defaults.
 
-    trace: TraceSettings = field(default_factory=TraceSettings)
-    viewing: ViewingSettings = field(default_factory=ViewingSettings)
-    keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
-    warp: WarpSettings = field(default_factory=WarpSettings)
-    metric: MetricSettings = field(default_factory=MetricSettings)
-    masks: MaskSettings = field(default_factory=MaskSettings)
-    antialias: AntialiasSettings = field(default_factory=AntialiasSettings)
-    light: LightSettings = field(default_factory=LightSettings)
-    video: VideoSettings = field(default_factory=VideoSettings)
-    output: OutputSettings = field(default_factory=OutputSettings)
-    limits: LimitSettings = field(default_factory=LimitSettings)
+    Parameters
+    ----------
+    sections
+        One of a class; a later one replaces an earlier one.
+    """
+
+    def __init__(self, *sections: Section) -> None:
+        self._sections: dict[type[Section], Section] = {type(section): section for section in sections}
+
+    def __getitem__(self, kind: type[S]) -> S:
+        """The section of a class."""
+        found = self._sections.get(kind)
+        return found if isinstance(found, kind) else kind()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all sections that either of them holds are equal."""
+        if not isinstance(other, Settings):
+            return NotImplemented
+        return all(self[kind] == other[kind] for kind in {*self._sections, *other._sections})
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """The sections that are not at their defaults."""
+        changed = [repr(section) for kind, section in self._sections.items() if section != kind()]
+        return f"Settings({', '.join(changed)})"
+
+    def replace(self, kind: type[Section], **values: Any) -> Settings:
+        """The same settings with other values in one section.
+
+        Raises
+        ------
+        SettingsError
+            A value is out of range.
+        """
+        return Settings(*self._sections.values(), dataclasses.replace(self[kind], **values))
+
+    def only(self, kinds: Iterable[type[Section]]) -> Settings:
+        """The same settings with all other sections at their defaults."""
+        return Settings(*(self[kind] for kind in kinds))
 
     @classmethod
-    def from_tables(cls, tables: dict[str, Any]) -> Self:
+    def from_tables(cls, tables: Mapping[str, Any], kinds: Sequence[type[Section]] = SECTIONS) -> Self:
         """Build from the tables of a TOML or JSON file.
+
+        Parameters
+        ----------
+        tables
+        kinds
+            Sections that there are.
 
         Raises
         ------
         SettingsError
             An unknown section or setting, a wrong type, a value out of range.
         """
-        known = sections()
+        known = {kind.table: kind for kind in kinds}
         for name, table in tables.items():
             if name not in known:
                 raise SettingsError(f"unknown section [{name}]; known are: {', '.join(known)}")
             if not isinstance(table, dict):
                 raise SettingsError(f"[{name}] must be a table of settings, not {table!r}")
-        built: dict[str, Any] = {n: known[n].from_table(t) for n, t in tables.items()}
-        return cls(**built)
+        return cls(*(known[name].from_table(table) for name, table in tables.items()))
 
-    def to_tables(self) -> dict[str, dict[str, Any]]:
-        """All values as plain tables, fit for JSON; read back by :meth:`from_tables`."""
-        return {
-            name: {
-                key: value.value if isinstance(value, Enum) else value
-                for key, value in dataclasses.asdict(getattr(self, name)).items()
-            }
-            for name in sections()
-        }
-
-
-def sections() -> dict[str, type[Section]]:
-    """Name and class of every section of :class:`Settings`, in order."""
-    return {f.name: f.default_factory for f in fields(Settings)}  # type: ignore[misc]
-
-
-def section_name(cls: type[Section]) -> str:
-    """Name under which a section stands in a file."""
-    return next((name for name, c in sections().items() if c is cls), cls.__name__)
+    def to_tables(self, kinds: Iterable[type[Section]] = SECTIONS) -> dict[str, dict[str, Any]]:
+        """All values of some sections, fit for JSON; read back by :meth:`from_tables`."""
+        return {kind.table: self[kind].to_table() for kind in kinds}
 
 
 def read_tables(path: Path) -> dict[str, Any]:
@@ -370,7 +456,7 @@ def read_tables(path: Path) -> dict[str, Any]:
 
 def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any:
     kind = type(f.default)
-    where = f"[{section_name(cls)}] {f.name}"
+    where = f"[{cls.table}] {f.name}"
     if issubclass(kind, Enum):
         choices = [choice.value for choice in kind]
         if value not in choices:

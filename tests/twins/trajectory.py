@@ -1,4 +1,4 @@
-"""Twin of `enfilade.methods.paper.temporal`: one pixel followed from frame to frame, float64."""
+"""Twin of `enfilade.methods.paper.temporal_filter`: one pixel followed from frame to frame, float64."""
 
 import math
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper import warp_keyframe
-from enfilade.methods.paper.forward import _land, disparity_gradient
+from enfilade.methods.paper.warp import _land, disparity_gradient
 from enfilade.records import Geometry, Keyframe, Shading
 from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere, Waves
 from enfilade.settings import WarpSettings

@@ -1,0 +1,116 @@
+"""Statistics of every frame, found before anything is traced: velocities and surfaces (§4.2)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.methods.keyframes import place_keyframes
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.settings import KeyframeSettings, MaskSettings, Settings
+
+
+@dataclass(frozen=True)
+class FrameStatistics:
+    """Statistics of one frame.
+
+    Attributes
+    ----------
+    speed_px : float
+        Mean length of the motion vectors, pixels per frame.
+    speed_deg_s : float
+        The same in degrees per second.
+    slow_percent : float
+        Pixels slower than v_t (``[masks] slow_deg_s``).
+    specular_percent : float
+        Pixels that show glossy, mirroring or transparent surfaces.
+    """
+
+    speed_px: float
+    speed_deg_s: float
+    slow_percent: float
+    specular_percent: float
+
+
+def analyze(walk: Walkthrough, frame: int) -> FrameStatistics:
+    """Statistics of a frame, from its G-buffer and motion vectors."""
+    view = walk.view(frame)
+    # A point close to the eye may move by any number of pixels; it leaves the image.
+    diagonal = float(np.hypot(walk.path.width, walk.path.height))
+    fastest = walk.viewing.velocity_deg_s(diagonal)
+    slow_deg_s = walk.settings[MaskSettings].slow_deg_s
+    return FrameStatistics(
+        speed_px=float(np.minimum(view.flow.speed, diagonal).mean()),
+        speed_deg_s=float(np.minimum(view.speed_deg_s, fastest).mean()),
+        slow_percent=100.0 * float((view.speed_deg_s < slow_deg_s).mean()),
+        specular_percent=100.0 * float(view.geometry.is_specular.mean()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Statistics of all frames of a path.
+
+    Attributes
+    ----------
+    path : CameraPath
+    settings : Settings
+    frames : tuple of FrameStatistics
+    """
+
+    path: CameraPath
+    settings: Settings
+    frames: tuple[FrameStatistics, ...]
+    _segments: dict[int | None, list[list[Segment]]] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
+        """Build from :meth:`FrameStatistics` as plain tables."""
+        return cls(path, settings, tuple(FrameStatistics(**table) for table in tables))
+
+    def segments(self, spacing: int | None = None) -> list[list[Segment]]:
+        """Segments between the initial keyframes of each shot (§4.2).
+
+        A frame that repeats the pose of the one before is never a keyframe.
+
+        Parameters
+        ----------
+        spacing
+            Uniform spacing, instead of ``[keyframes] spacing``.
+
+        Returns
+        -------
+        list of list of Segment
+            One list a shot; a shot of one pose has a single segment from that frame to itself.
+        """
+        if spacing not in self._segments:
+            self._segments[spacing] = self._placed(spacing)
+        return self._segments[spacing]
+
+    def _placed(self, spacing: int | None) -> list[list[Segment]]:
+        settings = self.settings[KeyframeSettings]
+        if spacing is not None:
+            settings = replace(settings, spacing=spacing)
+        shots = []
+        for shot in self.path.shots():
+            speed = np.array([self.frames[frame].speed_px for frame in shot])
+            chosen = place_keyframes(speed, settings)
+            keyframes = sorted({self.path.static_frame(shot.start + k) for k in chosen})
+            pairs = itertools.pairwise(keyframes)
+            shots.append([Segment(a, b) for a, b in pairs] or [Segment(keyframes[0], keyframes[0])])
+        return shots
+
+
+def keyframes_of(segments: Sequence[Segment]) -> list[int]:
+    """Keyframes at the ends of segments, in order."""
+    return sorted({s.first for s in segments} | {s.last for s in segments})
+
+
+def to_table(statistics: FrameStatistics) -> dict[str, float]:
+    """As a plain table, fit for JSON."""
+    return asdict(statistics)

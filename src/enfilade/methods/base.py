@@ -1,0 +1,187 @@
+"""The seam between methods and runs: tasks, passes, and what a method is.
+
+A method says how frames come from a scene and a camera path, as passes in order; a pass maps records of earlier
+passes to new records, one task a frame. A method contains no file, ledger, executor or progress bar:
+:mod:`enfilade.runs` schedules, stores and resumes its tasks, and a test can call it with a few arrays.
+``reference.py`` is the shortest example.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+from enfilade.methods.analysis import Analysis
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.renderer import Renderer
+from enfilade.settings import Section, Settings
+
+FRAMES = "frames"  # the last pass of every method; its records are `records.Frame`
+
+
+class TaskId(NamedTuple):
+    """The name of a task: folder, progress bar, ledger and ``--pass`` use it.
+
+    Attributes
+    ----------
+    pass_name : str
+    frame : int
+        Index on the path; the first one of tasks for several frames.
+    """
+
+    pass_name: str
+    frame: int
+
+
+@dataclass(frozen=True)
+class Task:
+    """A piece of work.
+
+    Attributes
+    ----------
+    pass_name : str
+    frame : int
+        Index on the path; the first one of tasks for several frames.
+    shot : int
+        Index of the shot, from 0.
+    needs : tuple of TaskId
+        Tasks that must be finished first.
+    """
+
+    pass_name: str
+    frame: int
+    shot: int = 0
+    needs: tuple[TaskId, ...] = ()
+
+    @property
+    def id(self) -> TaskId:
+        """Its name."""
+        return TaskId(self.pass_name, self.frame)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One step of a method.
+
+    Attributes
+    ----------
+    name : str
+    record : type or None
+        Class of the records that its tasks write, one file a frame; None: they have facts alone.
+    reads : tuple of str
+        Earlier passes whose records or facts its tasks read.
+    is_barrier : bool
+        Whether its tasks begin when all tasks of earlier passes of the same shot are finished.
+    is_shared : bool
+        Whether it has many tasks, which several commands may share out among them.
+    """
+
+    name: str
+    record: type | None = None
+    reads: tuple[str, ...] = ()
+    is_barrier: bool = False
+    is_shared: bool = True
+
+
+@dataclass(frozen=True)
+class Output:
+    """The result of a task.
+
+    Attributes
+    ----------
+    records : mapping of int to record
+        By frame, as index on the path.
+    facts : mapping
+        Values fit for JSON, for the ledger and for later passes. The report adds up ``rays`` (by kind) and
+        ``dropped``, samples that were left out since they were not finite.
+    """
+
+    records: Mapping[int, Any] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Inputs(Protocol):
+    """Results of earlier passes."""
+
+    @property
+    def analysis(self) -> Analysis:
+        """Of all frames of the path."""
+        ...
+
+    def record(self, pass_name: str, frame: int) -> Any:
+        """The record of a pass for a frame.
+
+        Raises
+        ------
+        DamagedFileError
+            Its file is missing, or is not what was written.
+        """
+        ...
+
+    def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
+        """The facts of the task of a pass.
+
+        Raises
+        ------
+        KeyError
+            The task is not finished.
+        """
+        ...
+
+
+class Method(ABC):
+    """How frames come from a scene and a camera path.
+
+    Attributes
+    ----------
+    name : str
+    revision : int
+        To be raised with every change of the results that is not a change of settings: runs of another
+        revision are not continued.
+    settings : tuple of type
+        Sections that it reads. Runs that differ in other sections are the same run.
+    passes : tuple of Pass
+        In order; the last one is ``frames``.
+    """
+
+    name: ClassVar[str]
+    revision: ClassVar[int] = 1
+    settings: ClassVar[tuple[type[Section], ...]] = ()
+    passes: ClassVar[tuple[Pass, ...]]
+
+    def check(self, settings: Settings) -> None:
+        """Refuse settings that the method can't work with, before anything is loaded.
+
+        Raises
+        ------
+        SettingsError
+        """
+
+    def check_scene(self, renderer: Renderer) -> None:
+        """Refuse a scene that the method can't render, once it is loaded.
+
+        Raises
+        ------
+        SettingsError
+        """
+
+    def keyframes(self, analysis: Analysis) -> list[int]:
+        """Frames that are initially keyframes, for plans and charts; none by default."""
+        del analysis
+        return []
+
+    @abstractmethod
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """All tasks, in any order.
+
+        Parameters
+        ----------
+        analysis
+            Of all frames of the path.
+        """
+
+    @abstractmethod
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Do a task. The result depends on the arguments alone; caches may live in the instance."""

@@ -1,0 +1,61 @@
+"""A method by its name."""
+
+from __future__ import annotations
+
+import importlib
+
+from enfilade.errors import SettingsError
+from enfilade.methods.base import Method
+
+METHODS = {
+    "decoupled": "enfilade.methods.decoupled:Decoupled",
+    "paper": "enfilade.methods.paper:Paper",
+    "reference": "enfilade.methods.reference:Reference",
+}
+
+
+def open_method(name: str) -> Method:
+    """A new instance of a method.
+
+    Parameters
+    ----------
+    name
+        One of :data:`METHODS`, or ``module:Class`` of a method of your own.
+
+    Raises
+    ------
+    SettingsError
+        There is no such method.
+    """
+    module, _, attribute = METHODS.get(name, name).partition(":")
+    if not attribute:
+        raise SettingsError(
+            f"there is no method {name!r}; choose one of {', '.join(METHODS)}, or give your own as module:Class"
+        )
+    try:
+        method = getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError) as error:
+        raise SettingsError(f"the method {name!r} can't be imported: {error}") from error
+    if not isinstance(method, Method):
+        raise SettingsError(f"{name!r} is no method: it must be a subclass of enfilade.methods.Method")
+    return method
+
+
+def name_of(method: str | Method | type[Method]) -> str:
+    """The name by which :func:`open_method` finds a method in any process.
+
+    Raises
+    ------
+    SettingsError
+        Its class is not at the top level of a module that can be imported.
+    """
+    if isinstance(method, str):
+        return method
+    kind = method if isinstance(method, type) else type(method)
+    if kind.__module__ == "__main__" or "." in kind.__qualname__:
+        raise SettingsError(
+            f"the method {kind.__qualname__} must be a class at the top level of a module, which worker processes "
+            "can import"
+        )
+    name = f"{kind.__module__}:{kind.__qualname__}"
+    return next((short for short, full in METHODS.items() if full == name), name)

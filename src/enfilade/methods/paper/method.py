@@ -1,0 +1,202 @@
+"""The passes of the published method (§4.3, Fig. 7): keyframes, segments, in-betweens, filtered frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from enfilade.cache import LruCache
+from enfilade.camera.path import Segment
+from enfilade.errors import SettingsError
+from enfilade.methods.analysis import Analysis, keyframes_of
+from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
+from enfilade.methods.paper.inbetween import derive, fill_slow_pixels
+from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import spatial_support_px, temporal_limits
+from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Frame, Keyframe, Provenance, Shading
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import (
+    AntialiasSettings,
+    KeyframeSettings,
+    MaskSettings,
+    MetricSettings,
+    SamplingSettings,
+    Settings,
+    TraceSettings,
+    ViewingSettings,
+    WarpSettings,
+)
+
+MIN_SPP = 2  # the metric's allowance for noise needs the spread of a pixel's paths
+CACHED_KEYFRAMES = 3
+
+
+class Paper(Method):
+    """The published method."""
+
+    name = "paper"
+    settings = (
+        TraceSettings,
+        SamplingSettings,
+        ViewingSettings,
+        KeyframeSettings,
+        WarpSettings,
+        MetricSettings,
+        MaskSettings,
+        AntialiasSettings,
+    )
+    passes = (
+        Pass("keyframes", Shading),
+        Pass("segments", Shading, reads=("keyframes",)),
+        Pass("inbetweens", Frame, reads=("keyframes", "segments")),
+        Pass(FRAMES, Frame, reads=("inbetweens",)),
+    )
+
+    def __init__(self) -> None:
+        self._keyframes: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
+        self._slices: dict[int, tuple[Slice, Frame]] = {}
+        self._refinement: Refinement | None = None
+
+    def check(self, settings: Settings) -> None:
+        """Refuse a single path a pixel.
+
+        Raises
+        ------
+        SettingsError
+        """
+        if settings[SamplingSettings].spp < MIN_SPP:
+            raise SettingsError(
+                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences by the spread "
+                "of a pixel's paths"
+            )
+
+    def keyframes(self, analysis: Analysis) -> list[int]:
+        """Initial keyframes (§4.2)."""
+        return [frame for segments in analysis.segments() for frame in keyframes_of(segments)]
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """Keyframes; a task for each initial segment, which splits it; all frames before and after filtering."""
+        path, settings = analysis.path, analysis.settings[AntialiasSettings]
+        reach = max(settings.frames, settings.slow_frames) // 2
+        shots = zip(path.shots(), analysis.segments(), strict=True)
+        for number, (shot, segments) in enumerate(shots):
+            for frame in keyframes_of(segments):
+                yield Task("keyframes", frame, number)
+            for segment in segments:
+                ends = TaskId("keyframes", segment.first), TaskId("keyframes", segment.last)
+                yield Task("segments", segment.first, number, ends)
+            sources = {f: TaskId("segments", s.first) for s in segments for f in s.inbetweens}
+            for frame in shot:
+                source = sources.get(frame, TaskId("keyframes", frame))
+                if (static := path.static_frame(frame)) != frame:
+                    source = TaskId("inbetweens", static)
+                yield Task("inbetweens", frame, number, (source,))
+                window = _window(shot, frame, reach)
+                yield Task(FRAMES, frame, number, tuple(TaskId("inbetweens", f) for f in window))
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Do a task."""
+        match task.pass_name:
+            case "keyframes":
+                shading = _traced(walk, task.frame)
+                return Output({task.frame: shading}, {"dropped": shading.dropped})
+            case "segments":
+                return self._refined(task, inputs, walk)
+            case "inbetweens":
+                return self._inbetween(task, inputs, walk)
+            case _:
+                return self._filtered(task, inputs, walk)
+
+    def _refined(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Split an initial segment until reuse can't be seen in it; trace the keyframes that this inserts."""
+        if self._refinement is None:
+            self._refinement = Refinement(walk)
+        segment = next(s for s in inputs.analysis.segments()[task.shot] if s.first == task.frame)
+        inserted: dict[int, Shading] = {}
+
+        def keyframe(frame: int) -> Keyframe:
+            if frame in (segment.first, segment.last):
+                return self._keyframe(inputs, walk, frame, segment)
+            if frame not in inserted:
+                inserted[frame] = _traced(walk, frame)
+            geometry = walk.view(frame).geometry
+            return self._keyframes.get(frame, lambda: Keyframe(frame, geometry, inserted[frame]))
+
+        results = self._refinement.refine(segment, keyframe)
+        facts = [result.to_table(walk.path.numbers) for result in results]
+        return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
+
+    def _inbetween(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """A frame before filtering: a keyframe, a repeated one, or one derived from both keyframes around it."""
+        frame, path = task.frame, walk.path
+        static = path.static_frame(frame)
+        if static != frame:
+            color = inputs.record("inbetweens", static).color
+            return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.REUSED, np.uint8))})
+        segments = inputs.analysis.segments()[task.shot]
+        if frame in keyframes_of(segments):
+            made, dropped = fill_slow_pixels(walk, frame, inputs.record("keyframes", frame))
+            return Output({frame: made}, {"dropped": dropped})
+        initial = next(s for s in segments if s.first < frame < s.last)
+        tables = inputs.facts("segments", initial.first)["segments"]
+        results = [SegmentResult.from_table(table, path.numbers) for table in tables]
+        if any(result.is_split and result.middle == frame for result in results):
+            made, dropped = fill_slow_pixels(walk, frame, inputs.record("segments", frame))
+            return Output({frame: made}, {"dropped": dropped})
+        result = leaf_of(results, frame)
+        first, last = (self._keyframe(inputs, walk, k, initial) for k in (result.first, result.last))
+        made, dropped = derive(walk, result, first, last, frame)
+        return Output({frame: made}, {"dropped": dropped})
+
+    def _keyframe(self, inputs: Inputs, walk: Walkthrough, frame: int, initial: Segment) -> Keyframe:
+        pass_name = "keyframes" if frame in (initial.first, initial.last) else "segments"
+        return self._keyframes.get(
+            frame, lambda: Keyframe(frame, walk.view(frame).geometry, inputs.record(pass_name, frame))
+        )
+
+    def _filtered(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """A delivered frame: antialiased along the motion (§5)."""
+        frame, settings = task.frame, walk.settings[AntialiasSettings]
+        reach = max(settings.frames, settings.slow_frames) // 2
+        window = _window(walk.path.shots()[task.shot], frame, reach)
+        kept = {f: entry for f, entry in self._slices.items() if f in window}
+        self._slices = kept | {f: _slice(inputs, walk, f) for f in window if f not in kept}
+        here, raw = self._slices[frame]
+        color = filter_along_flow(
+            here,
+            [self._slices[f][0] for f in sorted(window, reverse=True) if f < frame],
+            [self._slices[f][0] for f in window if f > frame],
+            temporal_limits(walk.viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
+            settings,
+        )
+        return Output({frame: Frame(color, raw.provenance)})
+
+
+def _traced(walk: Walkthrough, frame: int) -> Shading:
+    """A keyframe: paths start at the pixels' centres, where the G-buffer was found, so that each sees one surface."""
+    size = walk.path.height, walk.path.width
+    traced = walk.trace(
+        frame,
+        np.ones(size, np.bool_),
+        Purpose.KEYFRAME,
+        spp=walk.settings[SamplingSettings].spp,
+        pixel_filter=PixelFilter.CENTRE,
+    )
+    return Shading(traced.color.reshape(*size, 3), traced.variance.reshape(size), traced.dropped)
+
+
+def _slice(inputs: Inputs, walk: Walkthrough, frame: int) -> tuple[Slice, Frame]:
+    """A frame with the spatial part of the filter applied."""
+    view, raw = walk.view(frame), inputs.record("inbetweens", frame)
+    density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]
+    color = reconstruct(raw.color, spatial_support_px(view.speed_deg_s, density, settings))
+    return Slice(color, view.geometry, view.flow), raw
+
+
+def _window(shot: range, frame: int, reach: int) -> range:
+    """Frames of a shot that the temporal filter spans."""
+    return range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))

@@ -1,0 +1,206 @@
+"""Adaptive refinement of keyframe placement: the metric decides which segments are split (§4.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from enfilade.camera.path import Segment
+from enfilade.gbuffer import View
+from enfilade.kernels.convolve import SIGMAS
+from enfilade.methods.paper.composite import agrees
+from enfilade.methods.paper.masks import reusable_specular_shapes, slow_pixels, specular_pixels
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import spatial_support_px
+from enfilade.methods.paper.warp import warp_keyframe
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.metric import Aqm, Pursuit
+from enfilade.records import F32, Keyframe, Mask, Warped
+from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, ViewingSettings, WarpSettings
+
+MIN_JUDGED = 0.05  # share of the image: fewer unmasked pixels than this are not representative of a segment
+GAIN = 0.9  # a half must show less than this part of its parent's differences to be split again
+FFT_THREADS = 2
+
+
+@dataclass(frozen=True)
+class SegmentResult:
+    """The metric's result for a segment.
+
+    Attributes
+    ----------
+    first, last : int
+        The keyframes, as indices on the path.
+    depth : int
+        Number of splits that led to the segment.
+    middle : int or None
+        The frame that was judged; None where there is none.
+    reusable : frozenset of int
+        Specular shapes whose reuse can't be seen; all others must be traced in the whole segment.
+    percent_visible, percent_visible_no_pursuit : float
+        Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
+    is_split : bool
+        More of them than the settings allow, and splitting still helps.
+    """
+
+    first: int
+    last: int
+    depth: int
+    middle: int | None
+    reusable: frozenset[int] = frozenset()
+    percent_visible: float = 0.0
+    percent_visible_no_pursuit: float = 0.0
+    is_split: bool = False
+
+    @property
+    def segment(self) -> Segment:
+        """The segment."""
+        return Segment(self.first, self.last, self.depth)
+
+    def to_table(self, numbers: Sequence[int]) -> dict[str, Any]:
+        """As a plain table, fit for JSON, with frame numbers in place of indices."""
+        return {
+            "first": numbers[self.first],
+            "last": numbers[self.last],
+            "depth": self.depth,
+            "middle": None if self.middle is None else numbers[self.middle],
+            "reusable": sorted(self.reusable),
+            "percent_visible": self.percent_visible,
+            "percent_visible_no_pursuit": self.percent_visible_no_pursuit,
+            "is_split": self.is_split,
+        }
+
+    @staticmethod
+    def from_table(table: Mapping[str, Any], numbers: Sequence[int]) -> SegmentResult:
+        """Read back from :meth:`to_table`."""
+        places = {key: table[key] for key in ("first", "last", "middle")}
+        frames = {key: None if number is None else numbers.index(number) for key, number in places.items()}
+        return SegmentResult(**{**table, **frames, "reusable": frozenset(table["reusable"])})
+
+
+def leaf_of(results: Sequence[SegmentResult], frame: int) -> SegmentResult:
+    """The segment, not split any further, of which a frame is an in-between."""
+    return next(r for r in results if not r.is_split and r.first < frame < r.last)
+
+
+class Refinement:
+    """Splits segments until the metric sees no difference between what is reused and what would be traced.
+
+    Splitting also ends where it does not help: differences that do not shrink with the segment, such as the aliasing
+    of keyframes sampled at pixel centres, are not differences of reuse.
+
+    Parameters
+    ----------
+    walk
+    """
+
+    def __init__(self, walk: Walkthrough) -> None:
+        self._walk = walk
+        self._metric = Aqm(
+            walk.viewing, mask_slope=walk.settings[MetricSettings].mask_slope, workers=FFT_THREADS
+        )
+
+    def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
+        """Judge a segment, and its halves where it is split.
+
+        Parameters
+        ----------
+        initial
+        keyframe
+            Gives a keyframe, which is traced where there is none yet.
+        """
+        results: list[SegmentResult] = []
+        pending: list[tuple[Segment, float]] = [(initial, np.inf)]
+        while pending:
+            segment, parent_percent = pending.pop()
+            result = self.judge(segment, keyframe)
+            if result.percent_visible >= GAIN * parent_percent:
+                result = replace(result, is_split=False)
+            results.append(result)
+            if result.is_split and result.middle is not None:
+                halves = segment.split(result.middle)
+                pending += [(half, result.percent_visible) for half in reversed(halves)]
+        return results
+
+    def judge(self, segment: Segment, keyframe: Callable[[int], Keyframe]) -> SegmentResult:
+        """Warp both keyframes to the middle of a segment and measure the visible difference (§4.3, 2-5)."""
+        walk = self._walk
+        middle = walk.path.middle(segment)
+        ends = segment.first, segment.last, segment.depth
+        if middle is None:
+            return SegmentResult(*ends, middle=None)
+        view, masks = walk.view(middle), walk.settings[MaskSettings]
+        before, after = warped_pair(walk, keyframe(segment.first), keyframe(segment.last), middle)
+
+        # Compare where both keyframes show the surface.
+        tolerance = walk.settings[WarpSettings].depth_tolerance
+        is_judged = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
+        jnd, jnd_no_pursuit = self._differences(view, before, after, is_judged)
+
+        # Mask the pixels that will be traced: slow ones, then specular shapes whose reuse would be seen.
+        reusable = reusable_specular_shapes(jnd, is_judged, view.geometry, masks)
+        is_slow = slow_pixels(view.speed_deg_s, masks)
+        unmasked = is_judged & ~is_slow & ~specular_pixels(view.geometry, reusable)
+        if (is_judged & ~unmasked).any() and unmasked.mean() >= MIN_JUDGED:
+            # Compare again without them: the metric's filters spread a difference over its neighbourhood.
+            jnd, jnd_no_pursuit = self._differences(view, before, after, unmasked)
+        percent, percent_no_pursuit = (_percent_visible(j, unmasked) for j in (jnd, jnd_no_pursuit))
+        return SegmentResult(
+            *ends,
+            middle=middle,
+            reusable=reusable,
+            percent_visible=percent,
+            percent_visible_no_pursuit=percent_no_pursuit,
+            is_split=percent > masks.split_percent,
+        )
+
+    def _differences(self, view: View, before: Warped, after: Warped, is_judged: Mask) -> tuple[F32, F32]:
+        """JND maps between two warped keyframes, with smooth pursuit and without.
+
+        Both are filtered as the delivered frame will be. A difference that their noise explains does not count.
+        """
+        walk = self._walk
+        density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]
+        support = spatial_support_px(view.speed_deg_s, density, settings)
+        shown = [
+            walk.display_luminance(
+                reconstruct(np.where(one.is_hole[..., None], other.color, one.color), support)
+            )
+            for one, other in ((before, after), (after, before))
+        ]
+        noise = self._displayed_variance(before.variance + after.variance)
+        pursuits = (Pursuit.PURSUIT, Pursuit.NONE)
+        jnd, jnd_no_pursuit = (
+            self._metric.compare(
+                *shown,
+                velocity=view.velocity_deg_s,
+                valid=is_judged,
+                noise_variance=noise,
+                noise_blur_px=support / np.float32(SIGMAS),
+                pursuit=pursuit,
+            ).jnd
+            for pursuit in pursuits
+        )
+        return jnd, jnd_no_pursuit
+
+    def _displayed_variance(self, variance: F32) -> F32:
+        """Variance on the display, (cd/m2)^2: exposure and display are linear up to the clipping."""
+        of = self._walk.settings[ViewingSettings]
+        slope = 2.0**of.exposure_ev * (of.peak_cd_m2 - of.black_cd_m2)
+        displayed: F32 = (variance * slope**2).astype(np.float32)
+        return displayed
+
+
+def warped_pair(walk: Walkthrough, first: Keyframe, last: Keyframe, frame: int) -> tuple[Warped, Warped]:
+    """Both keyframes of a segment, reprojected to a frame between them."""
+    camera, settings = walk.path.cameras[frame], walk.settings[WarpSettings]
+    return warp_keyframe(first, camera, settings), warp_keyframe(last, camera, settings)
+
+
+def _percent_visible(jnd: F32, where: Mask) -> float:
+    if where.mean() < MIN_JUDGED:
+        return 0.0
+    return 100.0 * float((jnd[where] > 1.0).mean())

@@ -1,0 +1,43 @@
+"""Every pixel of every frame path traced: the result that other methods are compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from enfilade.methods.analysis import Analysis
+from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Frame, Provenance
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import ReferenceSettings, SamplingSettings, TraceSettings
+
+
+class Reference(Method):
+    """Path tracing."""
+
+    name = "reference"
+    settings = (TraceSettings, SamplingSettings, ReferenceSettings)
+    passes = (Pass(FRAMES, Frame),)
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """One task a frame."""
+        for shot, frames in enumerate(analysis.path.shots()):
+            for frame in frames:
+                yield Task(FRAMES, frame, shot)
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Trace a frame."""
+        del inputs
+        everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
+        shading = walk.trace(
+            task.frame,
+            everywhere,
+            Purpose.REFERENCE,
+            spp=walk.settings[SamplingSettings].spp,
+            pixel_filter=PixelFilter[walk.settings[ReferenceSettings].pixel_filter.name],
+        )
+        color = shading.color.reshape(*everywhere.shape, 3)
+        frame = Frame(color, np.full(everywhere.shape, Provenance.KEYFRAME, np.uint8))
+        return Output({task.frame: frame}, {"dropped": shading.dropped})

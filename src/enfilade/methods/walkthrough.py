@@ -1,0 +1,123 @@
+"""A scene along a camera path: everything that a task may use beside the records of earlier passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import numpy as np
+
+from enfilade.cache import LruCache
+from enfilade.camera.path import CameraPath
+from enfilade.gbuffer import View, find_geometry
+from enfilade.kernels.tone import display_luminance
+from enfilade.records import F32, Mask, Shading
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.settings import Settings, TraceSettings, ViewingSettings
+from enfilade.viewing import Viewing
+
+Timed = Callable[[str], AbstractContextManager[Any]]
+CACHED_VIEWS = 4  # computing a view again costs one ray a pixel
+
+
+def viewing_of(path: CameraPath, settings: Settings) -> Viewing:
+    """Viewing conditions of the video of a path.
+
+    Raises
+    ------
+    InputError
+        They are not consistent.
+    """
+    of = settings[ViewingSettings]
+    return Viewing(
+        width_px=path.width,
+        height_px=path.height,
+        diagonal_m=of.diagonal_m,
+        distance_m=of.distance_m,
+        fps=path.fps,
+        peak_cd_m2=of.peak_cd_m2,
+        black_cd_m2=of.black_cd_m2,
+        persistence=of.persistence,
+    )
+
+
+class Walkthrough:
+    """A scene along a camera path.
+
+    Parameters
+    ----------
+    path
+    settings
+    renderer
+        With the scene loaded.
+    timed
+        Context manager that counts the time of tracing and of G-buffers, by its name.
+
+    Attributes
+    ----------
+    path : CameraPath
+    settings : Settings
+    renderer : Renderer
+    viewing : Viewing
+    """
+
+    def __init__(
+        self, path: CameraPath, settings: Settings, renderer: Renderer, *, timed: Timed = nullcontext
+    ) -> None:
+        self.path = path
+        self.settings = settings
+        self.renderer = renderer
+        self.viewing = viewing_of(path, settings)
+        self._timed = timed
+        self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
+
+    def view(self, frame: int) -> View:
+        """G-buffer and motion vectors of a frame."""
+        return self._views.get(frame, lambda: self._found(frame))
+
+    def _found(self, frame: int) -> View:
+        with self._timed("gbuffer"):
+            geometry = find_geometry(self.renderer, self.path.cameras[frame])
+        return View(geometry, *self.path.neighbours(frame), self.viewing)
+
+    def random(self, frame: int, purpose: Purpose) -> RandomKey:
+        """Key of the random numbers of a frame for a purpose."""
+        return RandomKey(self.settings[TraceSettings].seed, self.path.numbers[frame], purpose)
+
+    def trace(
+        self, frame: int, where: Mask, purpose: Purpose, *, spp: int, pixel_filter: PixelFilter
+    ) -> Shading:
+        """Path trace some pixels of a frame.
+
+        Parameters
+        ----------
+        frame
+        where : (H, W) bool
+        purpose
+            Of the random numbers.
+        spp
+            Paths a pixel.
+        pixel_filter
+
+        Returns
+        -------
+        Shading
+            Of shape (N,), in the order of the image's rows.
+        """
+        with self._timed("trace"):
+            return self.renderer.trace(
+                self.path.cameras[frame],
+                np.flatnonzero(where).astype(np.uint32),
+                self.random(frame, purpose),
+                spp=spp,
+                pixel_filter=pixel_filter,
+            )
+
+    def display_luminance(self, color: F32) -> F32:
+        """Luminance that the display emits for linear colours, (H, W) cd/m2."""
+        of = self.settings[ViewingSettings]
+        luminance: F32 = display_luminance(
+            color, exposure_ev=of.exposure_ev, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
+        )
+        return luminance
