@@ -95,13 +95,13 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
             seen,
             chunk=len(pixels) * arguments.spp,
             pixel_filter=PixelFilter.GAUSSIAN,
-            random=workshop.random(frame, Purpose.GATHER),
+            random=workshop.random(frame, Purpose.DIFFUSE),
         )
         for _ in range(WARM_UP + arguments.repeats):
             rays.add(arguments.spp)
-        is_known = np.array(near.pages[0].items) > 0
-        has_light = workshop.views[frame].geometry.has_light.ravel()
-    return times[WARM_UP:], len(pixels) * arguments.spp, float(is_known[has_light].mean())
+        is_known = np.array(near.pages[0].shape_indices) > 0
+        has_diffuse = workshop.views[frame].geometry.has_diffuse.ravel()
+    return times[WARM_UP:], len(pixels) * arguments.spp, float(is_known[has_diffuse].mean())
 
 
 if __name__ == "__main__":

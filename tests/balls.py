@@ -90,7 +90,7 @@ def scattered(renderer, camera: Camera, spp: int = 8) -> list[Shading]:
         lambda rays, rng, square: shader.scattered(LightCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
-        random=RandomKey(2, 0, Purpose.SCATTER),
+        random=RandomKey(2, 0, Purpose.SPECULAR),
         layers=2,
         is_stratified=True,
     )
@@ -102,10 +102,10 @@ def traced_page(renderer, camera: Camera) -> LightPage:
     light = Estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng: Samples(renderer.light(renderer.lit(rays), rng)),
+        lambda rays, rng: Samples(renderer.estimate_diffuse(renderer.intersect(rays), rng)),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
-        random=RandomKey(3, 0, Purpose.LIGHT),
+        random=RandomKey(3, 0, Purpose.IRRADIANCE),
         layers=2,
     )
     light.add(256)

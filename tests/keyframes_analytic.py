@@ -53,16 +53,16 @@ def ray_directions(camera: Camera, at: np.ndarray | None = None) -> np.ndarray:
 
 
 def first_hits(scene: AnalyticScene, eye: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance in lengths of the direction (infinite where missed) and item of rays (..., 3), float64."""
+    """Distance in lengths of the direction (infinite where missed) and shape of rays (..., 3), float64."""
     nearest = np.full(direction.shape[:-1], np.inf)
-    item = np.zeros(direction.shape[:-1], int)
+    shape_index = np.zeros(direction.shape[:-1], int)
     with np.errstate(divide="ignore", invalid="ignore"):
         for number, shape in enumerate(scene.shapes, 1):
             distance = _distance(shape, eye, direction)
             is_nearer = (distance > 1e-9) & (distance < nearest)
             nearest = np.where(is_nearer, distance, nearest)
-            item = np.where(is_nearer, number, item)
-    return nearest, item
+            shape_index = np.where(is_nearer, number, shape_index)
+    return nearest, shape_index
 
 
 def _distance(shape: Plane | Quad | Sphere, eye: np.ndarray, d: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ def geometry(**fields):
         "depth": floats(),
         "normal": floats(3),
         "albedo": floats(3),
-        "item": words(),
+        "shape_index": words(),
         "surface": words(np.uint8),
     }
     return Geometry(CAMERA, **(known | fields))
@@ -71,8 +71,8 @@ def test_geometry_knows_what_is_hit_and_specular():
     surface = words(np.uint8)
     surface[0] = [SurfaceClass.DIFFUSE, SurfaceClass.EMISSIVE, SurfaceClass.GLOSSY, SurfaceClass.MIRROR]
     surface[1, 0] = SurfaceClass.TRANSPARENT
-    item = (surface > 0).astype(np.uint32)
-    g = geometry(surface=surface, item=item)
+    shape_index = (surface > 0).astype(np.uint32)
+    g = geometry(surface=surface, shape_index=shape_index)
     assert g.is_hit.sum() == 5
     assert g.is_specular.ravel()[:5].tolist() == [False, False, True, True, True]
 

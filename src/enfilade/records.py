@@ -34,7 +34,7 @@ class SurfaceClass(IntEnum):
 
 SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 LOBE_LAYERS = ("reflected", "transmitted")  # of what lobes scatter: the latter straight through what is clear
-LEAST_ALBEDO = 1e-4  # of a surface whose light is worth knowing: below it the diffuse lobe counts as none
+MIN_DIFFUSE_ALBEDO = 1e-4  # below it a surface counts as having no diffuse lobe
 
 
 class Source(IntEnum):
@@ -60,7 +60,7 @@ class Geometry:
         Shading normal in the world, unit length, towards the camera; 0 where nothing is hit.
     albedo : (H, W, 3) float32
         Diffuse reflectance seen from there, a coat included, 0..1.
-    item : (H, W) uint32
+    shape_index : (H, W) uint32
         Number of the shape that is seen, from 1; 0 where nothing is hit (the item buffer, §4.3).
     surface : (H, W) uint8
         :class:`SurfaceClass`.
@@ -70,7 +70,7 @@ class Geometry:
     depth: F32
     normal: F32
     albedo: F32
-    item: U32
+    shape_index: U32
     surface: U8
 
     def __post_init__(self) -> None:
@@ -78,19 +78,19 @@ class Geometry:
         _check(self.depth, size, np.float32, "depth")
         _check(self.normal, (*size, 3), np.float32, "normal")
         _check(self.albedo, (*size, 3), np.float32, "albedo")
-        _check(self.item, size, np.uint32, "item")
+        _check(self.shape_index, size, np.uint32, "shape_index")
         _check(self.surface, size, np.uint8, "surface")
 
     @property
     def is_hit(self) -> Mask:
         """Pixels that see a surface."""
-        return self.item > 0
+        return self.shape_index > 0
 
     @property
-    def has_light(self) -> Mask:
+    def has_diffuse(self) -> Mask:
         """Pixels that see a diffuse surface, (H, W): those that show the light that falls on it."""
-        has_light: Mask = self.is_hit & (self.albedo.max(axis=2) > LEAST_ALBEDO)
-        return has_light
+        has_diffuse: Mask = self.is_hit & (self.albedo.max(axis=2) > MIN_DIFFUSE_ALBEDO)
+        return has_diffuse
 
     @property
     def disparity(self) -> F32:
@@ -216,7 +216,7 @@ class Warped:
         Of the luminance.
     depth : (H, W) float32
         From the new camera; 0 in holes.
-    item : (H, W) uint32
+    shape_index : (H, W) uint32
         0 in holes and where the keyframe saw nothing (sky).
     magnification : (H, W) float32
         Area, in pixels of the new image, of the keyframe's pixel; large where it is stretched.
@@ -226,7 +226,7 @@ class Warped:
     color: F32
     variance: F32
     depth: F32
-    item: U32
+    shape_index: U32
     magnification: F32
     is_hole: Mask
 
@@ -235,7 +235,7 @@ class Warped:
         _check(self.color, (*size, 3), np.float32, "color")
         _check(self.variance, size, np.float32, "variance")
         _check(self.depth, size, np.float32, "depth")
-        _check(self.item, size, np.uint32, "item")
+        _check(self.shape_index, size, np.uint32, "shape_index")
         _check(self.magnification, size, np.float32, "magnification")
 
 

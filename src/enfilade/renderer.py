@@ -23,14 +23,14 @@ class Purpose(IntEnum):
     REFERENCE = 0
     KEYFRAME = 1
     FILL = 2
-    LIGHT = 3
-    GATHER = 4
-    SCATTER = 5
-    SCOUT = 6
+    IRRADIANCE = 3
+    DIFFUSE = 4
+    SPECULAR = 5
+    HASH_GRID = 6
     PILOT = 7
     GUIDE = 8
-    DRAFT = 9
-    DRAFT_SCOUT = 10
+    PREPASS = 9
+    PREPASS_HASH_GRID = 10
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Surfaces:
         Shading normal in the world, unit length, on the side of the ray's origin.
     albedo : Array3f
         Diffuse reflectance seen from there, a coat included, 0..1.
-    item : UInt
+    shape_index : UInt
         Number of the shape, from 1.
     surface : UInt
         ``records.SurfaceClass``.
@@ -96,12 +96,12 @@ class Surfaces:
     distance: Any
     normal: Any
     albedo: Any
-    item: Any
+    shape_index: Any
     surface: Any
 
 
 @dataclass(frozen=True)
-class Lit:
+class ShadingPoint:
     """First hits of rays with what shading them takes, as lanes.
 
     Attributes
@@ -112,7 +112,7 @@ class Lit:
     emission : Array3f
         Radiance towards the ray's origin of what emits: the surface, or the environment where nothing is
         hit. Where lights were already sampled at the ray's origin, weighted against that.
-    has_lobe : Bool
+    has_specular : Bool
         Whether the surface does anything but scatter diffusely.
     native : Any
         The backend's own record of the hit.
@@ -121,7 +121,7 @@ class Lit:
     surfaces: Surfaces
     position: Any
     emission: Any
-    has_lobe: Any
+    has_specular: Any
     native: Any
 
 
@@ -145,7 +145,7 @@ class Bounce:
 
 
 @dataclass(frozen=True)
-class Scattered:
+class BsdfSample:
     """One bounce off the diffuse lobe, or off everything else, as lanes.
 
     Attributes
@@ -167,18 +167,18 @@ class Scattered:
 
 
 @dataclass(frozen=True, eq=False)
-class Lamps:
+class Emitters:
     """Points all over the surfaces that emit.
 
     Attributes
     ----------
     position : (N, 3) float32
         In the world.
-    item : (N,) uint32
+    shape_index : (N,) uint32
     """
 
     position: F32
-    item: U32
+    shape_index: U32
 
 
 @dataclass(frozen=True)
@@ -191,15 +191,15 @@ class SceneFacts:
         Name and version of what traces.
     variant : str
         Of the renderer: what runs its kernels.
-    items : tuple of str
-        Name of item 1, 2, ...
+    shapes : tuple of str
+        Name of shape 1, 2, ...
     fingerprint : str
         SHA-256 over the scene's files: the same scene, the same letters.
     """
 
     renderer: str
     variant: str
-    items: tuple[str, ...]
+    shapes: tuple[str, ...]
     fingerprint: str
 
 
@@ -246,19 +246,20 @@ class Renderer(Protocol):
         ...
 
 
-MOST_EDGES = 4  # that a path may have behind it when the path tracer is asked for the rest of it
+MAX_PATH_DEPTH = 4  # that a path may have behind it when the path tracer is asked for the rest of it
 
 
 @runtime_checkable
-class LightRenderer(Renderer, Protocol):
+class LobeRenderer(Renderer, Protocol):
     """A renderer that can also be asked for the light apart from the surfaces it falls on.
 
-    Every BSDF is a sum: albedo times a diffuse lobe, and the rest. Exactly: what ``light`` estimates, times
-    the albedo, plus what ``scatter`` finds, plus the emission, is what ``trace`` converges to.
+    Every BSDF is a sum: albedo times a diffuse lobe, and the rest. Exactly: what ``estimate_diffuse``
+    estimates, times the albedo, plus what ``sample_specular`` finds, plus the emission, is what ``trace``
+    converges to.
     """
 
     @property
-    def why_no_light(self) -> str:
+    def why_inseparable(self) -> str:
         """Why this scene's light can't be told from its surfaces after all; empty where it can."""
         ...
 
@@ -268,13 +269,13 @@ class LightRenderer(Renderer, Protocol):
         ...
 
     @property
-    def lamps(self) -> Lamps:
+    def emitters(self) -> Emitters:
         """Where light comes from; few camera rays would miss what is small in the image."""
         ...
 
-    def lit(
-        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, is_whole: bool = False
-    ) -> Lit:
+    def intersect(
+        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False
+    ) -> ShadingPoint:
         """Find the first surface along rays, and the light it emits.
 
         Parameters
@@ -284,13 +285,13 @@ class LightRenderer(Renderer, Protocol):
             Where the rays come from; None for camera rays.
         active : Bool
             Rays that are traced; others hit nothing.
-        is_whole
+        opaque_only
             Take surfaces for wholly there or not at all, as :meth:`surfaces` does: for camera rays whose
             light belongs to a G-buffer. Otherwise what is let through a surface is a lobe of it.
         """
         ...
 
-    def light(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
+    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """Estimate the radiance that the diffuse lobe would send if the albedo were one.
 
         One path, with lights sampled at its first vertex: irradiance over pi, as the material's own
@@ -298,10 +299,10 @@ class LightRenderer(Renderer, Protocol):
 
         Parameters
         ----------
-        lit
+        point
         rng : PCG32
-        edges
-            How many lead from the camera to the surface, 1 to ``MOST_EDGES``: they count where the scene
+        path_depth
+            How many lead from the camera to the surface, 1 to ``MAX_PATH_DEPTH``: they count where the scene
             limits the length of paths.
 
         Returns
@@ -311,23 +312,24 @@ class LightRenderer(Renderer, Protocol):
         """
         ...
 
-    def rest(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
-        """Estimate the radiance that everything but the diffuse lobe sends; as :meth:`light` otherwise."""
+    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+        """Estimate the radiance that everything but the diffuse lobe sends; see :meth:`estimate_diffuse`."""
         ...
 
-    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
+    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
         """Sample one bounce off the diffuse lobe, as if the albedo were one.
 
-        What :meth:`light` estimates is its direct light, and its throughput times what its rays find.
+        The estimate of :meth:`estimate_diffuse` is its direct light, and its throughput times what its rays
+        find.
         """
         ...
 
-    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
+    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
         """Sample one bounce off everything but the diffuse lobe.
 
         Parameters
         ----------
-        lit
+        point
         rng : PCG32
         choice : Float
             In [0, 1): which of several lobes, those that let light through last. None leaves it to chance.

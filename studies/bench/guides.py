@@ -14,7 +14,7 @@ from enfilade.kernels.random import streams
 from enfilade.kernels.rays import pinhole_directions
 from enfilade.kernels.replay import padded
 from enfilade.records import F32, SPECULAR, SurfaceClass
-from enfilade.renderer import LightRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
+from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
 SIDE = 4  # strata along each side of a pixel: 16 rays
 BOUNCES = 6  # off mirrors and through glass, before the chain counts as it is
@@ -27,7 +27,7 @@ def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: 
     Parameters
     ----------
     renderer
-        One that can be asked for lobes (:class:`LightRenderer`) is followed through mirrors and glass, as
+        One that can be asked for lobes (:class:`LobeRenderer`) is followed through mirrors and glass, as
         Open Image Denoise recommends; of another, the first surface counts.
     camera, seed, frame
         Of the image; what the random numbers depend on.
@@ -84,24 +84,24 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
     shines = _is_one_of(seen, SPECULAR)
     dr.eval(albedo, normal, shines, rng)
     lane: Any = dr.compress(shines)
-    if not isinstance(renderer, LightRenderer) or len(lane) == 0:
+    if not isinstance(renderer, LobeRenderer) or len(lane) == 0:
         return albedo, normal
     rays, rng = dr.gather(Rays, rays, lane), dr.gather(PCG32, rng, lane)
     throughput = dr.full(Array3f, 1, len(lane))
     for bounce in range(BOUNCES):
-        lit = renderer.lit(rays, is_whole=True)
-        scattered = renderer.scatter(lit, rng)
-        throughput = dr.select(scattered.is_alive, throughput * scattered.throughput, 0)
+        point = renderer.intersect(rays, opaque_only=True)
+        sample = renderer.sample_specular(point, rng)
+        throughput = dr.select(sample.is_alive, throughput * sample.throughput, 0)
 
         # A lobe that is not sharp adds its reflectance and ends the chain.
-        is_sharp = scattered.is_alive & _is_one_of(lit.surfaces, SHARP) & (bounce < BOUNCES - 1)
+        is_sharp = sample.is_alive & _is_one_of(point.surfaces, SHARP) & (bounce < BOUNCES - 1)
         _add(albedo, lane, dr.select(is_sharp, 0, throughput))
-        dr.eval(scattered.rays, throughput, is_sharp, rng)
+        dr.eval(sample.rays, throughput, is_sharp, rng)
         going: Any = dr.compress(is_sharp)
         if len(going) == 0:
             break
         lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
-        rays, throughput = dr.gather(Rays, scattered.rays, going), dr.gather(Array3f, throughput, going)
+        rays, throughput = dr.gather(Rays, sample.rays, going), dr.gather(Array3f, throughput, going)
 
         # A sharp one shows what is behind.
         seen = _surfaces(renderer, rays, len(lane))

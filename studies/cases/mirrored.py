@@ -19,7 +19,7 @@ from enfilade.renderer import Rays, Renderer
 __all__ = ["mirror_pixels", "mirrored"]
 
 OFFSET = 1e-4  # of the distance: how far from the mirror a reflected ray begins
-VIRTUAL = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror
+VIRTUAL = np.uint32(1 << 30)  # added to the number of a shape that is seen in a mirror
 
 
 def mirror_pixels(geometry: Geometry) -> Mask:
@@ -32,7 +32,7 @@ def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
     """Geometry in which pixels on a mirror have what is seen in it, one reflection deep.
 
     Exact for plane mirrors. Depth is that of the virtual image along the camera's axis (0 where the mirror
-    shows nothing), item, albedo, normal and class are those of the surface that is seen; the item's
+    shows nothing), shape, albedo, normal and class are those of the surface that is seen; the shape's
     number is made another by :data:`VIRTUAL`, and its class is its own, so that it need not be specular.
     """
     pixels = np.flatnonzero(mirror_pixels(geometry)).astype(np.uint32)
@@ -57,7 +57,7 @@ def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
         "depth": np.array(dr.select(seen.is_hit, depth + seen.distance, 0)),
         "normal": np.array(dr.select(seen.is_hit, seen.normal, 0)).T,
         "albedo": np.array(dr.select(seen.is_hit, seen.albedo, 0)).T,
-        "item": np.array(dr.select(seen.is_hit, seen.item + UInt(int(VIRTUAL)), 0)),
+        "shape_index": np.array(dr.select(seen.is_hit, seen.shape_index + UInt(int(VIRTUAL)), 0)),
         "surface": np.array(dr.select(seen.is_hit, seen.surface, 0)).astype(np.uint8),
     }
     layers = {}

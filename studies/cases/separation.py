@@ -46,10 +46,10 @@ def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
     return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
 
 
-def outlines(item: U32) -> Mask:
-    """Pixels at most :data:`OUTLINE_PX` from another item, (H, W)."""
-    edge = np.zeros(item.shape, bool)
-    across, down = item[:, 1:] != item[:, :-1], item[1:] != item[:-1]
+def outlines(shape_index: U32) -> Mask:
+    """Pixels at most :data:`OUTLINE_PX` from another shape, (H, W)."""
+    edge = np.zeros(shape_index.shape, bool)
+    across, down = shape_index[:, 1:] != shape_index[:, :-1], shape_index[1:] != shape_index[:-1]
     edge[:, 1:] |= across
     edge[:, :-1] |= across
     edge[1:] |= down
@@ -73,7 +73,7 @@ def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
         return antialiased(windows, frame, lambda f: windows.traced(f).color, chosen)
 
     together, apart = filtered(separate=False), filtered(separate=True)
-    changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.item)
+    changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.shape_index)
     shown = [np.abs(viewer.shown(image) - viewer.shown(reference)) for image in (together, apart)]
     places = {"ghosts": changed & ~near & (shown[0] > shown[1]), "outlines": changed & near}
     maps = {

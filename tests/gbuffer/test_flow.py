@@ -41,15 +41,15 @@ SCENES = {
 
 
 def exact_flow(scene, camera, other):
-    """Displacement of every pixel in float64 (sky as points at infinity), items, and what stays ahead."""
+    """Displacement of every pixel in float64 (sky as points at infinity), shapes, and what stays ahead."""
     direction = ray_directions(camera)
-    depth, item = first_hits(scene, camera.eye, direction)
-    is_sky = item == 0
+    depth, shape_index = first_hits(scene, camera.eye, direction)
+    is_sky = shape_index == 0
     world = camera.eye + np.where(is_sky, 1.0, depth)[..., None] * direction
     world = np.where(is_sky[..., None], other.eye + direction, world)
     at, new_depth = projected(other, world)
     is_seen = (new_depth > 0.05 * np.where(is_sky, 1.0, depth)) & (np.where(is_sky, 1.0, depth) < 100)
-    return at - pixel_centres(camera), item, is_seen
+    return at - pixel_centres(camera), shape_index, is_seen
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -59,8 +59,8 @@ def test_it_is_the_explicit_projection(name, motion):
     other = beside(camera, *MOTIONS[motion])
     geometry = geometry_of(scene, camera)
     flow = image_flow(geometry, other, other)
-    expected, item, is_seen = exact_flow(scene, camera, other)
-    compared = is_seen & (geometry.item == item)
+    expected, shape_index, is_seen = exact_flow(scene, camera, other)
+    compared = is_seen & (geometry.shape_index == shape_index)
     assert compared.mean() > 0.9
     error = np.abs(flow.forward - expected).max(axis=-1)[compared]
     # A sphere's depth near its silhouette is off by up to 1e-3 (see test_gbuffer), and so is its parallax.
@@ -81,7 +81,7 @@ def test_the_error_of_small_motion_is_small_too():
 
 def test_the_sky_moves_with_the_rotation_alone():
     scene, camera = SCENES["ball"]
-    sky = geometry_of(scene, camera).item == 0
+    sky = geometry_of(scene, camera).shape_index == 0
     turn = (1, 2, -0.5)
     shifted = image_flow(geometry_of(scene, camera), None, beside(camera, (0.3, 0.2, -0.5), turn)).forward
     turned = image_flow(geometry_of(scene, camera), None, beside(camera, (0, 0, 0), turn)).forward

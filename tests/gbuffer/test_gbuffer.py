@@ -25,24 +25,26 @@ def seen(request):
 
 
 def truth(scene, camera):
-    """Exact depth and item, and where neighbours agree: away from edges, where rounding may decide."""
-    depth, item = first_hits(scene, camera.eye, ray_directions(camera))
-    padded = np.pad(item, 1, mode="edge")
-    shifted = [padded[j : j + item.shape[0], i : i + item.shape[1]] for j in range(3) for i in range(3)]
-    return depth, item, np.all([s == item for s in shifted], axis=0)
+    """Exact depth and shape, and where neighbours agree: away from edges, where rounding may decide."""
+    depth, shape_index = first_hits(scene, camera.eye, ray_directions(camera))
+    padded = np.pad(shape_index, 1, mode="edge")
+    shifted = [
+        padded[j : j + shape_index.shape[0], i : i + shape_index.shape[1]] for j in range(3) for i in range(3)
+    ]
+    return depth, shape_index, np.all([s == shape_index for s in shifted], axis=0)
 
 
 def test_items_are_exact(seen):
     scene, camera, geometry = seen
-    _, item, inner = truth(scene, camera)
-    np.testing.assert_array_equal(geometry.item[inner], item[inner])
-    assert (geometry.item != item).mean() < 1e-3
+    _, shape_index, inner = truth(scene, camera)
+    np.testing.assert_array_equal(geometry.shape_index[inner], shape_index[inner])
+    assert (geometry.shape_index != shape_index).mean() < 1e-3
 
 
 def test_depth_is_exact(seen):
     scene, camera, geometry = seen
-    depth, item, _ = truth(scene, camera)
-    same = (geometry.item == item) & (item > 0)
+    depth, shape_index, _ = truth(scene, camera)
+    same = (geometry.shape_index == shape_index) & (shape_index > 0)
     error = np.abs(geometry.depth[same] / depth[same] - 1)
     assert np.quantile(error, 0.99) < 2e-6  # float32
     assert error.max() < 1e-3  # at a sphere's silhouette the root magnifies rounding
@@ -60,7 +62,7 @@ def test_what_sees_nothing_holds_nothing(seen):
 def test_classes_are_the_materials(seen):
     scene, _, geometry = seen
     classes = np.array([SurfaceClass.NONE, *(shape.material.surface for shape in scene.shapes)])
-    np.testing.assert_array_equal(geometry.surface, classes[geometry.item])
+    np.testing.assert_array_equal(geometry.surface, classes[geometry.shape_index])
 
 
 def test_normals_are_unit_and_towards_the_camera(seen):
@@ -73,9 +75,9 @@ def test_normals_are_unit_and_towards_the_camera(seen):
 def test_positions_lie_on_the_surfaces():
     scene, camera = SCENES["room"]
     world = positions(geometry_of(scene, camera))
-    depth, item = first_hits(scene, camera.eye, ray_directions(camera))
+    depth, shape_index = first_hits(scene, camera.eye, ray_directions(camera))
     exact = camera.eye + depth[..., None] * ray_directions(camera)
-    np.testing.assert_allclose(world[item > 0], exact[item > 0], atol=2e-4)
+    np.testing.assert_allclose(world[shape_index > 0], exact[shape_index > 0], atol=2e-4)
     scene, camera = SCENES["ball"]
     geometry = geometry_of(scene, camera)
     world = positions(geometry)
@@ -90,10 +92,10 @@ def test_the_nearest_of_several_surfaces_is_seen():
         Sphere((0, 0, 1), 0.3, Material(surface=SurfaceClass.MIRROR)),
     )
     geometry = geometry_of(AnalyticScene(shapes), Camera(look_at((0, 0, 4), (0, 0, 0)), 60.0, 41, 31))
-    assert geometry.item[15, 20] == 3
+    assert geometry.shape_index[15, 20] == 3
     assert geometry.depth[15, 20] == pytest.approx(2.7, rel=1e-6)
-    assert geometry.item[15, 17] == 2
-    assert geometry.item[2, 2] == 1
+    assert geometry.shape_index[15, 17] == 2
+    assert geometry.shape_index[2, 2] == 1
 
 
 def test_an_image_of_one_pixel():

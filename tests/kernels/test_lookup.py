@@ -14,21 +14,21 @@ TOLERANCE = 0.01
 
 @pytest.fixture
 def page():
-    """A wall at z = 0, seen by two items; a stretch of it is not known."""
+    """A wall at z = 0, seen by two shapes; a stretch of it is not known."""
     x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
     direction = np.stack([x, y, np.ones_like(x)], -1) @ CAMERA.direction_from_pixel.T
     depth = (-CAMERA.eye[2] / direction[..., 2]).astype(np.float32)
-    item = np.where(x < 8, 1, 2).astype(np.uint32)
+    shape_index = np.where(x < 8, 1, 2).astype(np.uint32)
     depth[:, 13] = 0.0
     value = np.random.default_rng(1).uniform(0.0, 2.0, (HEIGHT, WIDTH, 3)).astype(np.float32)
-    return depth, item, value
+    return depth, shape_index, value
 
 
-def found(page, points, item, normal=(0.0, 0.0, 1.0), normals=None):
-    depth, items, value = page
+def found(page, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
+    depth, shape_indices, value = page
     opened = Page(
         depths=lanes(depth),
-        items=lanes(items),
+        shape_indices=lanes(shape_indices),
         normals=None if normals is None else packed(lanes(normals)),
         values=(lanes(value), 2.0 * lanes(value)),
         variances=(lanes(value[..., 0]), lanes(value[..., 1])),
@@ -39,11 +39,11 @@ def found(page, points, item, normal=(0.0, 0.0, 1.0), normals=None):
         height=HEIGHT,
     )
     position = Array3f(np.asarray(points, np.float32).T)
-    return lookup(position, Array3f(*normal), UInt(item), opened, plane_tolerance=TOLERANCE)
+    return lookup(position, Array3f(*normal), UInt(shape_index), opened, plane_tolerance=TOLERANCE)
 
 
-def by_loops(page, point, item):
-    depth, items, value = page
+def by_loops(page, point, shape_index):
+    depth, shape_indices, value = page
     seen = CAMERA.pixel_from_direction @ (point - CAMERA.eye)
     x, y = seen[:2] / seen[2] - 0.5
     total, weight = np.zeros(3), 0.0
@@ -53,18 +53,22 @@ def by_loops(page, point, item):
         for i, wx in ((int(np.floor(x)), 1 - x % 1), (int(np.floor(x)) + 1, x % 1)):
             u, v = np.clip(i, 0, WIDTH - 1), np.clip(j, 0, HEIGHT - 1)
             there = CAMERA.eye + depth[v, u] * (CAMERA.direction_from_pixel @ (u + 0.5, v + 0.5, 1.0))
-            if depth[v, u] > 0 and items[v, u] == item and abs(there[2] - point[2]) <= TOLERANCE * seen[2]:
+            if (
+                depth[v, u] > 0
+                and shape_indices[v, u] == shape_index
+                and abs(there[2] - point[2]) <= TOLERANCE * seen[2]
+            ):
                 total += (wx * wy + FLOOR) * value[v, u]
                 weight += wx * wy + FLOOR
     return total, weight
 
 
-@pytest.mark.parametrize("item", [1, 2])
-def test_it_does_what_loops_do(page, item):
+@pytest.mark.parametrize("shape_index", [1, 2])
+def test_it_does_what_loops_do(page, shape_index):
     points = np.random.default_rng(2).uniform((-2.5, -1.8, -0.2), (2.5, 1.8, 0.2), (400, 3))
     points[:300, 2] = 0.0
-    got = found(page, points, item)
-    wanted = [by_loops(page, point, item) for point in points]
+    got = found(page, points, shape_index)
+    wanted = [by_loops(page, point, shape_index) for point in points]
     np.testing.assert_allclose(np.array(got.weight), [w for _, w in wanted], atol=2e-4)
     np.testing.assert_allclose(np.array(got.totals[0]).T, [t for t, _ in wanted], atol=5e-4)
     np.testing.assert_allclose(np.array(got.totals[1]), 2.0 * np.array(got.totals[0]), rtol=1e-5)
@@ -84,10 +88,10 @@ def test_pixels_whose_surface_is_turned_count_by_the_cosine(page):
 def test_of_two_surfaces_that_meet_that_with_the_normal_counts_alone(page):
     upright = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     upright[::2, :, 2], upright[1::2, :, 1] = 1.0, 1.0
-    depth, items, value = page
+    depth, shape_indices, value = page
     value[::2], value[1::2] = 1.0, 5.0
     points = np.random.default_rng(4).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
-    got = found((depth, items, value), points, 1, normals=upright)
+    got = found((depth, shape_indices, value), points, 1, normals=upright)
     weight = np.array(got.weight)
     known = weight > 0.05
     assert known.any()

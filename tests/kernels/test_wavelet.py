@@ -24,19 +24,19 @@ SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64.0}
 
 @dataclasses.dataclass
 class Scene:
-    """A wall with a step in depth and a tilted part, two items, and light with noise."""
+    """A wall with a step in depth and a tilted part, two shapes, and light with noise."""
 
     color: np.ndarray
     variance: np.ndarray
     depth: np.ndarray
     normal: np.ndarray
-    item: np.ndarray
+    shape_index: np.ndarray
 
     def smoothed(self, **options):
         guide = Guide(
             lanes(self.depth),
             lanes(self.normal),
-            lanes(self.item),
+            lanes(self.shape_index),
             matrix3(CAMERA.direction_from_pixel),
             WIDTH,
             HEIGHT,
@@ -54,19 +54,19 @@ def scene():
     normal = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     normal[..., 2] = 1.0
     normal[12:] = (0.0, 0.6, 0.8)
-    item = np.ones((HEIGHT, WIDTH), np.uint32)
-    item[:, :6] = 2
+    shape_index = np.ones((HEIGHT, WIDTH), np.uint32)
+    shape_index[:, :6] = 2
     light = np.where(np.arange(WIDTH) < 11, 1.0, 3.0)[None, :, None]
     noise = rng.normal(0.0, 0.1, (HEIGHT, WIDTH, 1))
     color = (light + noise * (1.0, 0.9, 0.8)).astype(np.float32)
-    return Scene(color, np.full((HEIGHT, WIDTH), 0.01, np.float32), depth, normal, item)
+    return Scene(color, np.full((HEIGHT, WIDTH), 0.01, np.float32), depth, normal, shape_index)
 
 
 def test_it_does_what_loops_do(scene):
     color, variance = scene.smoothed()
     wanted, wanted_variance = twin.smooth(
         *(a.astype(float) for a in (scene.color, scene.variance, scene.depth, scene.normal)),
-        scene.item,
+        scene.shape_index,
         CAMERA.direction_from_pixel,
         levels=3,
         deviations=3.0,
@@ -138,7 +138,7 @@ def test_without_noise_nothing_changes(scene):
 
 def test_no_light_is_lost_where_noise_meets_none(scene):
     """A noisy pixel among black ones without noise: what it gives away arrives."""
-    scene.normal[:], scene.depth[:], scene.item[:] = (0.0, 0.0, 1.0), 4.0, 1
+    scene.normal[:], scene.depth[:], scene.shape_index[:] = (0.0, 0.0, 1.0), 4.0, 1
     scene.color[:], scene.variance[:] = 0.0, 0.0
     scene.color[9, 12], scene.variance[9, 12] = 1.0, 1.0
     color, _ = scene.smoothed(levels=1)
@@ -194,8 +194,8 @@ def test_a_speckle_at_the_border_is_one():
 def test_edges_between_items_are_as_soft_as_the_filter():
     rng = np.random.default_rng(5)
     color = rng.random((6, 9, 3)).astype(np.float32)
-    items = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
-    got = image(with_soft_edges(lanes(color), lanes(items), width=9, height=6, sigma=0.5), 6, 9)
+    shape_indices = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
+    got = image(with_soft_edges(lanes(color), lanes(shape_indices), width=9, height=6, sigma=0.5), 6, 9)
     padded = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
     weights = np.exp(-np.add.outer(np.array([1, 0, 1]), np.array([1, 0, 1])) / 0.5)
     expected = color.copy()

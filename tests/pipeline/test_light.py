@@ -45,8 +45,8 @@ def _begun(job, renderer, run):
 def _known(workshop, table, frame):
     """Share of a frame's lit pixels whose light some page knows."""
     near, _ = table.around(frame)
-    has_light = workshop.views[frame].geometry.has_light
-    return (np.array(near.pages[0].items) > 0)[has_light.ravel()].mean()
+    has_diffuse = workshop.views[frame].geometry.has_diffuse
+    return (np.array(near.pages[0].shape_indices) > 0)[has_diffuse.ravel()].mean()
 
 
 def test_pages_between_the_keyframes_fill_the_holes(lit):
@@ -54,7 +54,9 @@ def test_pages_between_the_keyframes_fill_the_holes(lit):
     assert table.keyframes == [0, 7]
     with pytest.raises(ValueError, match="unit 'light 20-34' is not finished"):
         table.around(3)
-    before = [1.0 - table._holes(f, []).sum() / workshop.views[f].geometry.has_light.sum() for f in range(8)]
+    before = [
+        1.0 - table._holes(f, []).sum() / workshop.views[f].geometry.has_diffuse.sum() for f in range(8)
+    ]
     assert min(before) < 1.0 - 2 * LEAST_HOLES
     for segment in table.segments:
         table.prepare(segment)

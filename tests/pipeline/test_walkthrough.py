@@ -159,7 +159,7 @@ NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A noisy walk that splits and has specular items, never interrupted."""
+    """A noisy walk that splits and has specular shapes, never interrupted."""
     folder = tmp_path_factory.mktemp("whole")
     return rendered(folder, resumed_job(folder))[1]
 

@@ -76,7 +76,7 @@ def test_a_plane_across_the_view_has_one_depth():
     np.testing.assert_array_equal(
         image(found.normal, camera.height, camera.width), np.full((48, 64, 3), (0, 0, 1))
     )
-    assert np.array(found.item).tolist() == [1] * (64 * 48)
+    assert np.array(found.shape_index).tolist() == [1] * (64 * 48)
 
 
 def test_a_tilted_plane_has_its_closed_form():
@@ -153,8 +153,8 @@ def test_the_nearest_shape_is_seen_with_its_class_and_albedo():
     chrome = Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR)
     scene = AnalyticScene((Plane((0, 0, 0), (0, 0, 1), shiny), Sphere((0, 0, 1), 0.5, chrome)))
     floor, mirror = one_ray(scene, (2, 0, 5), (0, 0, -1)), one_ray(scene, (0, 0, 5), (0, 0, -1))
-    assert (floor.item[0], floor.surface[0]) == (1, SurfaceClass.GLOSSY)
-    assert (mirror.item[0], mirror.surface[0]) == (2, SurfaceClass.MIRROR)
+    assert (floor.shape_index[0], floor.surface[0]) == (1, SurfaceClass.GLOSSY)
+    assert (mirror.shape_index[0], mirror.surface[0]) == (2, SurfaceClass.MIRROR)
     np.testing.assert_allclose(np.array(floor.albedo).ravel(), (0.1, 0.2, 0.3), rtol=ROUNDING)
     assert not np.array(mirror.albedo).any()
 
@@ -286,7 +286,7 @@ def test_no_kernel_is_compiled_after_the_first_frame():
     def render(index):
         camera = path.cameras[index]
         found = renderer.surfaces(rays(camera))
-        dr.eval(found.distance, found.normal, found.albedo, found.item, found.surface)
+        dr.eval(found.distance, found.normal, found.albedo, found.shape_index, found.surface)
         renderer.trace(
             camera,
             pixels[index:],
@@ -312,7 +312,7 @@ def test_scenes_survive_their_file(tmp_path):
     file.write_text(scene_text(scene))
     facts = load(file).describe()
     assert facts == AnalyticRenderer(scene).describe()
-    assert facts.items[5] == "ball"
+    assert facts.shapes[5] == "ball"
     assert facts.fingerprint != AnalyticRenderer(room()).describe().fingerprint
 
 

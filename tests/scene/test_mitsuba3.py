@@ -1,4 +1,4 @@
-"""The Mitsuba backend: items, classes, masks, and traced pixels against Mitsuba's own renderer."""
+"""The Mitsuba backend: shapes, classes, masks, and traced pixels against Mitsuba's own renderer."""
 
 import dataclasses
 import gc
@@ -119,8 +119,8 @@ def test_items_and_classes(swatches, name):
     renderer, camera, geometry = swatches
     index = list(MATERIALS).index(name)
     at = pixel_of(camera, place(index))
-    assert renderer.describe().items[index] == name
-    assert geometry.item[at] == index + 1
+    assert renderer.describe().shapes[index] == name
+    assert geometry.shape_index[at] == index + 1
     assert SurfaceClass(geometry.surface[at]) == MATERIALS[name][1]
     assert geometry.depth[at] == pytest.approx(8.0, rel=1e-5)
     if name != "bumpy":
@@ -139,7 +139,7 @@ def test_albedo_is_the_diffuse_reflectance(swatches):
 
 def test_the_sky_is_no_item(swatches):
     _, _, geometry = swatches
-    assert geometry.item[0, 0] == 0
+    assert geometry.shape_index[0, 0] == 0
     assert geometry.surface[0, 0] == SurfaceClass.NONE
     assert geometry.depth[0, 0] == 0.0
     for values in (geometry.depth, geometry.normal, geometry.albedo):
@@ -149,7 +149,7 @@ def test_the_sky_is_no_item(swatches):
 def test_facts(swatches):
     renderer, _, _ = swatches
     facts = renderer.describe()
-    assert facts.items == tuple(MATERIALS)
+    assert facts.shapes == tuple(MATERIALS)
     assert facts.renderer.startswith("Mitsuba 3")
     assert len(facts.fingerprint) == 64
 
@@ -191,7 +191,7 @@ def screens(tmp_path_factory):
 def test_masked_out_surfaces_are_looked_through(screens, point, seen, depth):
     renderer, camera, geometry = screens
     at = pixel_of(camera, point)
-    assert geometry.item[at] == (renderer.describe().items.index(seen) + 1 if seen else 0)
+    assert geometry.shape_index[at] == (renderer.describe().shapes.index(seen) + 1 if seen else 0)
     assert geometry.depth[at] == pytest.approx(depth, rel=1e-4)  # Mitsuba begins anew a little beyond
 
 
@@ -208,8 +208,11 @@ def test_an_instance_is_one_item(tmp_path):
     renderer = opened(file)
     camera = Camera(look_at((0, 0, 8), (0, 0, 0)), 40.0, 64, 48)
     geometry = find_geometry(renderer, camera)
-    items = renderer.describe().items
-    assert [items[geometry.item[pixel_of(camera, (k, 0, 0))] - 1] for k in (-1, 1)] == ["copy -1", "copy 1"]
+    names = renderer.describe().shapes
+    assert [names[geometry.shape_index[pixel_of(camera, (k, 0, 0))] - 1] for k in (-1, 1)] == [
+        "copy -1",
+        "copy 1",
+    ]
 
 
 def test_equal_materials_stay_separate_items(tmp_path):
@@ -217,7 +220,7 @@ def test_equal_materials_stay_separate_items(tmp_path):
     shared = f'<bsdf type="diffuse" id="grey"/>{placed("cube", "a", (-1, 0, 0), "<ref id=%sgrey%s/>")}'
     shared += placed("cube", "b", (1, 0, 0), "<ref id=%sgrey%s/>")
     renderer = opened(write(tmp_path, shared.replace("%s", '"')))
-    assert renderer.describe().items == ("a", "b")
+    assert renderer.describe().shapes == ("a", "b")
 
 
 def test_distance_counts_in_lengths_of_the_direction(swatches):
@@ -417,7 +420,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
     ],
 )  # fmt: skip
 def test_what_has_no_light_of_its_own_says_why(tmp_path, integrator, inside, words):
-    why = opened(of_integrator(tmp_path, integrator, inside)).why_no_light
+    why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable
     assert (words in why) if words else (why == "")
 
 
@@ -427,10 +430,12 @@ def test_a_mask_is_as_diffuse_as_it_is_opaque(tmp_path, opacity):
     renderer = opened(of_integrator(tmp_path, "", f'<bsdf type="twosided">{DIFFUSE}</bsdf>'))
     leaf = opened(of_integrator(tmp_path, "", veil(opacity)))
     rays = Rays(Array3f(0, 0, 6), Array3f(0, 0, -1))
-    whole, lit = renderer.lit(rays), leaf.lit(rays)
-    np.testing.assert_allclose(rows(lit.surfaces.albedo), opacity * rows(whole.surfaces.albedo), rtol=1e-5)
-    assert not whole.has_lobe[0]
-    assert lit.has_lobe[0] == (opacity < 1.0)
+    whole, pierced = renderer.intersect(rays), leaf.intersect(rays)
+    np.testing.assert_allclose(
+        rows(pierced.surfaces.albedo), opacity * rows(whole.surfaces.albedo), rtol=1e-5
+    )
+    assert not whole.has_specular[0]
+    assert pierced.has_specular[0] == (opacity < 1.0)
 
 
 def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):

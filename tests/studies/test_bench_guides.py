@@ -34,11 +34,13 @@ def test_they_are_those_of_the_pixels_where_nothing_changes_within_one(tmp_path)
     renderer, camera = load(file, chunk=CHUNK), room_walk(1).cameras[0]
     albedo, normal = guides(renderer, camera, seed=0, frame=1, chunk=CHUNK)
     seen = find_geometry(renderer, camera)
-    inner = np.zeros(seen.item.shape, bool)
-    same = seen.item[1:-1, 1:-1]
-    around = [np.roll(seen.item, shift, (0, 1))[1:-1, 1:-1] for shift in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    inner = np.zeros(seen.shape_index.shape, bool)
+    same = seen.shape_index[1:-1, 1:-1]
+    around = [
+        np.roll(seen.shape_index, shift, (0, 1))[1:-1, 1:-1] for shift in ((1, 0), (-1, 0), (0, 1), (0, -1))
+    ]
     inner[1:-1, 1:-1] = np.all([same == other for other in around], axis=0)
-    flat = inner & (seen.item != 6)  # the ball's normal changes within a pixel
+    flat = inner & (seen.shape_index != 6)  # the ball's normal changes within a pixel
     assert np.abs(normal - seen.normal)[flat].max() < 1e-4
     assert np.median(np.abs(albedo - seen.albedo)[inner]) < 0.01
     # Neither chunks nor anything but the seed change them.

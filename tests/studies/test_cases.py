@@ -75,10 +75,10 @@ def test_plain_light_shows_what_mirrors_reflect(shiny):
     seen = mirrored(shiny.renderer, geometry)
     mirror = mirror_pixels(geometry)
     assert mirror.any()
-    assert ((seen.item[mirror] >= VIRTUAL) | (seen.item[mirror] == 0)).all()
-    np.testing.assert_array_equal(seen.item[~mirror], geometry.item[~mirror])
+    assert ((seen.shape_index[mirror] >= VIRTUAL) | (seen.shape_index[mirror] == 0)).all()
+    np.testing.assert_array_equal(seen.shape_index[~mirror], geometry.shape_index[~mirror])
     color = shiny.traced(5).color
-    hit = mirror & (seen.item > VIRTUAL)
+    hit = mirror & (seen.shape_index > VIRTUAL)
     wanted = seen.albedo[hit] * (0.3 + 0.7 * np.abs(seen.normal[hit] @ np.array([0.36, 0.48, 0.8])))[:, None]
     is_plain = np.isin(seen.surface[hit], [SurfaceClass.DIFFUSE, SurfaceClass.GLOSSY])
     np.testing.assert_allclose(color[hit][is_plain], wanted[is_plain], atol=2e-3)
@@ -333,7 +333,7 @@ def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them(tmp_path):
     most = max(found["frames"], key=lambda r: r["ghosts"]["pixels"])
     assert found["example"] == most["frame"]
     assert 0.0 < most["ghosts"]["pixels"] < 20.0
-    near = separation.outlines(plain.geometry(most["frame"] - 1).item)
+    near = separation.outlines(plain.geometry(most["frame"] - 1).shape_index)
     viewer = Viewer(plain.job.viewing, plain.job.settings)
     changed = separation.changed_pixels(viewer, example["together"], example["apart"])
     wanted = viewer.shown(example["reference"])
@@ -348,9 +348,9 @@ def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them(tmp_path):
 
 
 def test_outlines_by_hand():
-    item = np.ones((9, 9), np.uint32)
-    item[:, 5:] = 2
-    assert separation.outlines(item)[4].tolist() == [False] * 3 + [True] * 4 + [False] * 2
+    shape_index = np.ones((9, 9), np.uint32)
+    shape_index[:, 5:] = 2
+    assert separation.outlines(shape_index)[4].tolist() == [False] * 3 + [True] * 4 + [False] * 2
 
 
 def test_the_flow_of_the_reflection_keeps_what_the_mirror_shows(tmp_path):

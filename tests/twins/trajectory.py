@@ -30,7 +30,7 @@ def _walk(frame, neighbours, direction, pixel, reach, least, separate_items):
     height, width = reach.shape
     column, row = pixel
     x, y, travelled = column + 0.5, row + 0.5, 0.0
-    item, depth = frame.geometry.item[row, column], float(frame.geometry.depth[row, column])
+    shape_index, depth = frame.geometry.shape_index[row, column], float(frame.geometry.depth[row, column])
     present = frame
     for distance, following in enumerate(neighbours, start=1):
         if distance > reach[row, column]:
@@ -45,7 +45,7 @@ def _walk(frame, neighbours, direction, pixel, reach, least, separate_items):
         if separate_items:
             there = following.geometry
             there_depth = float(there.depth[int(y), int(x)])
-            if there.item[int(y), int(x)] != item or abs(there_depth - depth) > 0.05 * depth:
+            if there.shape_index[int(y), int(x)] != shape_index or abs(there_depth - depth) > 0.05 * depth:
                 return
             depth = there_depth
         yield distance, interpolated(following.color, x, y)

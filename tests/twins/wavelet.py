@@ -6,8 +6,8 @@ SPLINE = np.array([1, 4, 6, 4, 1]) / 16.0
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def smooth(color, variance, depth, normal, item, direction_from_pixel, *, levels, **limits):
-    seen = depth, normal, item, direction_from_pixel
+def smooth(color, variance, depth, normal, shape_index, direction_from_pixel, *, levels, **limits):
+    seen = depth, normal, shape_index, direction_from_pixel
     related = np.ones_like(variance)
     for level in range(levels):
         color, variance, share = _pass(color, variance, seen, step=1 << level, **limits)
@@ -27,7 +27,7 @@ def _independent(level):
 
 
 def _pass(color, variance, seen, *, step, deviations, plane, exponent):
-    depth, normal, item, p = seen
+    depth, normal, shape_index, p = seen
     height, width = variance.shape
     spread = np.zeros_like(variance)
     padded = np.pad(variance, 1, mode="edge")
@@ -50,7 +50,7 @@ def _pass(color, variance, seen, *, step, deviations, plane, exponent):
                     if not i and not j:
                         weight, own = weight + surface, own + surface
                         continue
-                    if item[v, u] != item[y, x]:
+                    if shape_index[v, u] != shape_index[y, x]:
                         continue
                     there = depth[v, u] * (p @ (u + 0.5, v + 0.5, 1.0))
                     away = abs(normal[y, x] @ (there - here)) / (plane * depth[y, x] + 1e-8)

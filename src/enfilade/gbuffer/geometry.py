@@ -1,4 +1,4 @@
-"""The G-buffer of a frame: range, item and material of what each pixel's centre sees (§1)."""
+"""The G-buffer of a frame: range, shape and material of what each pixel's centre sees (§1)."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
     depth = dr.select(seen.is_hit, seen.distance, 0)
     normal = dr.select(seen.is_hit, seen.normal, 0)
     albedo = dr.select(seen.is_hit, seen.albedo, 0)
-    item = dr.select(seen.is_hit, seen.item, 0)
+    shape_index = dr.select(seen.is_hit, seen.shape_index, 0)
     surface = dr.select(seen.is_hit, seen.surface, 0)
-    dr.eval(depth, normal, albedo, item, surface)
+    dr.eval(depth, normal, albedo, shape_index, surface)
     return Geometry(
         camera=camera,
         depth=image(depth, height, width),
         normal=image(normal, height, width),
         albedo=image(albedo, height, width),
-        item=image(item, height, width),
+        shape_index=image(shape_index, height, width),
         surface=image(surface, height, width).astype(np.uint8),
     )
 

@@ -20,7 +20,7 @@ class Page:
     Attributes
     ----------
     depths : Float
-    items : UInt
+    shape_indices : UInt
         Images, width * height lanes; where a pixel is not known, its depth is 0.
     normals : UInt or None
         The same, of :func:`packed`. None for surfaces whose normals say nothing.
@@ -34,7 +34,7 @@ class Page:
     """
 
     depths: Any
-    items: Any
+    shape_indices: Any
     normals: Any | None
     values: tuple[Any, ...]
     variances: tuple[Any, ...]
@@ -64,10 +64,10 @@ class Found:
     weight: Any
 
 
-def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance: float) -> Found:
+def lookup(position: Any, normal: Any, shape_index: Any, page: Page, *, plane_tolerance: float) -> Found:
     """Interpolate a keyframe's values at points in the world.
 
-    Of the four pixels around a point's projection those count that see the same item, within a
+    Of the four pixels around a point's projection those count that see the same shape, within a
     tolerance of the point's own tangent plane: surfaces that hide it, or that meet it at an edge,
     do not. Those whose normals differ count less, by the cosine: the light on them differs, too. A page
     that looked at the other side of the surface knows nothing.
@@ -76,7 +76,7 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
     ----------
     position, normal : Array3f
         Points in the world, and the normals of their surfaces on the side that is asked about, of any length.
-    item : UInt
+    shape_index : UInt
     page
     plane_tolerance
         Distance from the tangent plane, by depth, up to which a pixel is of the same surface.
@@ -109,7 +109,7 @@ def lookup(position: Any, normal: Any, item: Any, page: Page, *, plane_tolerance
             lane = UInt(j * page.width + i)
             depth = dr.gather(Float, page.depths, lane, is_inside)
             distance = offset + depth * dr.dot(slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1))
-            is_same = is_inside & (dr.gather(UInt, page.items, lane, is_inside) == item)
+            is_same = is_inside & (dr.gather(UInt, page.shape_indices, lane, is_inside) == shape_index)
             is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
             share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
             if page.normals is not None:

@@ -27,8 +27,8 @@ class Guide:
     ----------
     depths : Float
     normals : Array3f
-    items : UInt
-        Images, width * height lanes; item 0 is nothing.
+    shape_indices : UInt
+        Images, width * height lanes; shape 0 is nothing.
     direction_from_pixel : Matrix3f
         Of the camera.
     width, height : int
@@ -40,7 +40,7 @@ class Guide:
 
     depths: Any
     normals: Any
-    items: Any
+    shape_indices: Any
     direction_from_pixel: Any
     width: int
     height: int
@@ -90,7 +90,7 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
 
     normal = dr.gather(Array3f, guide.normals, lane)
     depth = dr.gather(Float, guide.depths, lane)
-    item = dr.gather(UInt, guide.items, lane)
+    shape_index = dr.gather(UInt, guide.shape_indices, lane)
     slope = guide.direction_from_pixel.T @ normal
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
     nearness = dr.rcp(guide.plane_tolerance * depth + TINY)
@@ -105,7 +105,7 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
                 weight += Float(weight_x * weight_y)
                 continue
             tap = UInt(dr.select(is_inside, j * width + i, 0))
-            is_same = is_inside & (dr.gather(UInt, guide.items, tap) == item)
+            is_same = is_inside & (dr.gather(UInt, guide.shape_indices, tap) == shape_index)
             other = dr.gather(Array3f, color, tap)
             # By the deviation of the difference: the same seen from both sides.
             deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
@@ -194,16 +194,16 @@ def share_without_speckles(color: Any, *, width: int, height: int, times: float,
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
 
-def with_soft_edges(color: Any, items: Any, *, width: int, height: int, sigma: float) -> Any:
-    """An image whose edges between items are as soft as a Gaussian pixel filter makes them; Array3f.
+def with_soft_edges(color: Any, shape_indices: Any, *, width: int, height: int, sigma: float) -> Any:
+    """An image whose edges between shapes are as soft as a Gaussian pixel filter makes them; Array3f.
 
-    Smoothing takes each pixel for the item at its centre: edges become stairs.
+    Smoothing takes each pixel for the shape at its centre: edges become stairs.
 
     Parameters
     ----------
     color : Array3f
         Image, width * height lanes.
-    items : UInt
+    shape_indices : UInt
         The same.
     width, height
     sigma
@@ -220,7 +220,7 @@ def with_soft_edges(color: Any, items: Any, *, width: int, height: int, sigma: f
             share = math.exp(-(across**2 + down**2) / (2.0 * sigma**2))
             total += share * dr.gather(Array3f, color, tap)
             weight += share
-            is_edge |= dr.gather(UInt, items, tap) != items
+            is_edge |= dr.gather(UInt, shape_indices, tap) != shape_indices
     return dr.select(is_edge, total / weight, color)
 
 

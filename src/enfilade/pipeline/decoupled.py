@@ -19,7 +19,7 @@ from enfilade.images import read_parts, write_parts
 from enfilade.kernels.estimate import LUMINANCE, Estimate
 from enfilade.kernels.lookup import Page
 from enfilade.methods.decoupled import LightCache, open_scattered, over_time, smoothed
-from enfilade.methods.paper.masks import lamp_pixels
+from enfilade.methods.paper.masks import emitter_pixels
 from enfilade.pipeline.finish import result_unit, write_frame_result
 from enfilade.pipeline.kept import Kept, around
 from enfilade.pipeline.light import LightTable
@@ -161,7 +161,7 @@ def _seen(workshop: Workshop, frame: int, view: LightCache, cache: LightCache) -
         lambda rays, rng: workshop.shader.seen(view, cache, rays, rng, pixel_angle=camera.pixel_angle),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
-        random=workshop.random(frame, Purpose.GATHER),
+        random=workshop.random(frame, Purpose.DIFFUSE),
     )
     least, quality = settings.light.least_samples, settings.light.quality
     most = settings.light.samples or _between(EDGE_SAMPLES, quality)
@@ -171,20 +171,20 @@ def _seen(workshop: Workshop, frame: int, view: LightCache, cache: LightCache) -
         is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * quality * _luminance(shading)
         is_edge = is_edge.reshape(path.height, path.width)
         # Small lamps that the first rays miss, and dilute, would lose most of their light.
-        is_edge |= lamp_pixels(workshop.light_renderer.lamps, workshop.views[frame].geometry)
+        is_edge |= emitter_pixels(workshop.lobe_renderer.emitters, workshop.views[frame].geometry)
         seen.add(most - least, _grown(is_edge).ravel())
     return seen
 
 
 def _source(
-    geometry: Geometry, view: LightCache, has_lobe: npt.NDArray[np.bool_], *, is_keyframe: bool
+    geometry: Geometry, view: LightCache, has_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
 ) -> U8:
     """Why pixels have their values: lobes are sampled, and so is light that no page knows, (H, W)."""
-    is_known = np.array(view.pages[0].items) > 0
-    source = np.full(has_lobe.shape, Source.KEYFRAME if is_keyframe else Source.REUSED, np.uint8)
-    source[geometry.has_light.ravel() & ~is_known] = Source.HOLE
-    source[has_lobe] = Source.SPECULAR
-    return source.reshape(geometry.item.shape)
+    is_known = np.array(view.pages[0].shape_indices) > 0
+    source = np.full(has_specular.shape, Source.KEYFRAME if is_keyframe else Source.REUSED, np.uint8)
+    source[geometry.has_diffuse.ravel() & ~is_known] = Source.HOLE
+    source[has_specular] = Source.SPECULAR
+    return source.reshape(geometry.shape_index.shape)
 
 
 def _scattered(
@@ -209,7 +209,7 @@ def _scattered(
         ),
         chunk=settings.trace.chunk,
         pixel_filter=PixelFilter.GAUSSIAN,
-        random=workshop.random(frame, Purpose.SCATTER),
+        random=workshop.random(frame, Purpose.SPECULAR),
         layers=len(LOBE_LAYERS),
         is_stratified=True,
     )

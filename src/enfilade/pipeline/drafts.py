@@ -97,7 +97,7 @@ class Drafts:
         return self._opened.made(frame, lambda: open_page(self.trace(frame)))
 
     def _read_or_trace(self, frame: int) -> LightPage:
-        workshop, renderer = self._workshop, self._workshop.light_renderer
+        workshop, renderer = self._workshop, self._workshop.lobe_renderer
         number = workshop.number(frame)
         unit, file = f"draft {number}", workshop.run.file("drafts", number)
         with workshop.costs.of("draft"):
@@ -109,14 +109,16 @@ class Drafts:
             if workshop.run.done(unit):
                 workshop.run.check(file)
                 return LightPage(frame, geometry, *read_light(file))
-            where = geometry.has_light
+            where = geometry.has_diffuse
             light = Estimate(
                 camera,
                 np.flatnonzero(where).astype(np.uint32),
-                lambda rays, rng: Samples(renderer.light(renderer.lit(rays, is_whole=True), rng, edges=2)),
+                lambda rays, rng: Samples(
+                    renderer.estimate_diffuse(renderer.intersect(rays, opaque_only=True), rng, path_depth=2)
+                ),
                 chunk=workshop.job.settings.trace.chunk,
                 pixel_filter=PixelFilter.CENTRE,
-                random=workshop.random(frame, Purpose.DRAFT),
+                random=workshop.random(frame, Purpose.PREPASS),
                 layers=2,
             )
             light.add(PATHS)
@@ -151,7 +153,7 @@ class Drafts:
             ),
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.BOX,
-            random=self._workshop.random(frame, Purpose.SCOUT),
+            random=self._workshop.random(frame, Purpose.HASH_GRID),
             layers=len(LOBE_LAYERS),
             is_stratified=True,
         )
@@ -169,7 +171,7 @@ class Drafts:
             ),
             chunk=self._workshop.job.settings.trace.chunk,
             pixel_filter=PixelFilter.CENTRE,
-            random=self._workshop.random(frame, Purpose.DRAFT_SCOUT),
+            random=self._workshop.random(frame, Purpose.PREPASS_HASH_GRID),
             layers=2,
             is_stratified=True,
         )

@@ -62,7 +62,7 @@ def trace_reference(workshop: Workshop, frame: int) -> None:
         return
     view = workshop.views[frame]
     pixel_filter = PixelFilter[workshop.job.settings.trace.pixel_filter.name]
-    everything = np.ones(view.geometry.item.shape, bool)
+    everything = np.ones(view.geometry.shape_index.shape, bool)
     shading = workshop.trace(frame, everything, Purpose.REFERENCE, pixel_filter)
     source = np.full(everything.shape, Source.KEYFRAME, np.uint8)
     made = Frame(shading.color.reshape(*everything.shape, 3), source)
@@ -181,7 +181,7 @@ def delivered_layers(chosen: Container[str], view: View, source: U8) -> dict[str
         "P": lambda: positions(geometry),
         "N": lambda: geometry.normal,
         "albedo": lambda: geometry.albedo,
-        "item": lambda: geometry.item,
+        "item": lambda: geometry.shape_index,
         "forward": lambda: view.flow.forward,
         "backward": lambda: view.flow.backward,
         "source": lambda: source.astype(np.uint32),

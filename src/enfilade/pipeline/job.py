@@ -71,7 +71,7 @@ class Job:
         Parameters
         ----------
         renderer
-            Adds the number of items. Without it the scene is not loaded: its files are only hashed.
+            Adds the number of shapes. Without it the scene is not loaded: its files are only hashed.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Job:
             The view of an OpenColorIO configuration can't be opened.
         """
         name, fingerprint = _renderer_and_fingerprint(self.scene)
-        items = {} if renderer is None else {"items": len(renderer.describe().items)}
+        shapes = {} if renderer is None else {"shapes": len(renderer.describe().shapes)}
         settings = self.settings.to_tables()
         del settings["trace"]["chunk"]
         del settings["limits"]
@@ -89,7 +89,7 @@ class Job:
         ocio = {"opencolorio": view["opencolorio"]} if view else {}
         return {
             "method": self.method,
-            "scene": {"fingerprint": fingerprint, **items},
+            "scene": {"fingerprint": fingerprint, **shapes},
             "path": path_identity(self.path),
             "settings": settings,
             **({"view": {"processor": view["processor"]}} if view else {}),
@@ -152,21 +152,21 @@ class Job:
             exposure_ev=self.settings.viewing.exposure_ev,
         )
 
-    def check_light(self, why_no_light: str) -> None:
+    def check_light(self, why_inseparable: str) -> None:
         """Refuse a scene that can't be asked for light, where the method asks for it.
 
         Parameters
         ----------
-        why_no_light
-            What :meth:`enfilade.renderer.LightRenderer.why_no_light` says of the scene.
+        why_inseparable
+            What :meth:`enfilade.renderer.LobeRenderer.why_inseparable` says of the scene.
 
         Raises
         ------
         SettingsError
         """
-        if self.method == "decoupled" and why_no_light:
+        if self.method == "decoupled" and why_inseparable:
             raise SettingsError(
-                f"--method decoupled can't render {self.scene}: {why_no_light}; "
+                f"--method decoupled can't render {self.scene}: {why_inseparable}; "
                 "take --method paper or --method reference"
             )
 

@@ -148,7 +148,7 @@ class LightTable:
         """Pixels whose light is known neither to the keyframes nor to pages that fill holes."""
         geometry = self._workshop.views[frame].geometry
         frames = nearest(self._path, self.keyframes, frame, self._workshop.job.settings.light.keyframes)
-        return geometry.has_light & ~known(geometry, [self._open(f) for f in (*frames, *fills)])
+        return geometry.has_diffuse & ~known(geometry, [self._open(f) for f in (*frames, *fills)])
 
     def _page(self, frame: int) -> Page:
         """A page with what all around it know of its surfaces."""
@@ -165,8 +165,8 @@ class LightTable:
             return pooled(page, pages, partial(self._denoised, page.geometry) if is_denoised else None)
 
     def _denoised(self, geometry: Geometry, light: F32) -> F32:
-        has_light = geometry.has_light[..., None].astype(np.float32)
-        white = np.broadcast_to(has_light, light.shape)  # the light has no albedo in it
+        has_diffuse = geometry.has_diffuse[..., None].astype(np.float32)
+        white = np.broadcast_to(has_diffuse, light.shape)  # the light has no albedo in it
         return denoise(light, white, geometry.normal, quality=self._quality)
 
     def _open(self, frame: int) -> Page:
@@ -186,10 +186,10 @@ class LightTable:
         if holes is None and frame not in self.keyframes:
             # It knew holes alone; which ones, only what prepares its segment can tell.
             raise DamagedFileError(f"{file} is missing", str(file.relative_to(workshop.run.folder)))
-        where = geometry.has_light if holes is None else holes
+        where = geometry.has_diffuse if holes is None else holes
         paths = self.paths
         with workshop.costs.of("trace"):
-            light = self._light(frame, where, Purpose.LIGHT)
+            light = self._light(frame, where, Purpose.IRRADIANCE)
             light.add(paths)
         direct, indirect = _layers(light, where)
         write_light(file, direct, indirect, where)
@@ -229,7 +229,7 @@ class LightTable:
         frame = most if is_dark else middle
         jnd = self._pilot_jnd(frame)
         paths = paths_for(jnd, settings.quality, len(self.keyframes))
-        rays = 2 * PILOT_PATHS * int(workshop.views[frame].geometry.has_light.sum())
+        rays = 2 * PILOT_PATHS * int(workshop.views[frame].geometry.has_diffuse.sum())
         workshop.finish(unit, [], frame=workshop.number(frame), jnd=jnd, paths=paths, rays={"drafts": rays})
         return paths
 
@@ -237,12 +237,12 @@ class LightTable:
         """Visible difference between two estimates of a frame's light, as its surfaces show it."""
         workshop = self._workshop
         geometry = workshop.views[frame].geometry
-        where = geometry.has_light
+        where = geometry.has_diffuse
         if not where.any():
             return 0.0
         shown = []
         with workshop.costs.of("pilot"):
-            for purpose in (Purpose.PILOT, Purpose.LIGHT):
+            for purpose in (Purpose.PILOT, Purpose.IRRADIANCE):
                 light = self._light(frame, where, purpose)
                 light.add(PILOT_PATHS)
                 direct, indirect = _layers(light, where)

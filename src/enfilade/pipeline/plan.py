@@ -19,7 +19,7 @@ from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import check_job
 from enfilade.records import Keyframe, Shading
-from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import LobeRenderer, PixelFilter, Purpose, RandomKey, Renderer
 
 HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
 PROBE_PIXELS, PROBE_SPP = 4096, 16  # paths traced to learn what a path costs
@@ -86,8 +86,8 @@ def plan(job: Job, monitor: Monitor, *, is_tried: bool = False) -> Plan:
     if is_tried:
         job.check_scene(is_tried=True)
     renderer = open_renderer(job.scene, job.settings.trace)
-    if isinstance(renderer, LightRenderer):
-        job.check_light(renderer.why_no_light)
+    if isinstance(renderer, LobeRenderer):
+        job.check_light(renderer.why_inseparable)
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
     shots = segments_of(job, survey)
@@ -155,7 +155,7 @@ def hole_percent(job: Job, views: Views, segment: Segment, frame: int) -> float:
 
 def _unshaded(views: Views, frame: int) -> Keyframe:
     geometry = views[frame].geometry
-    size = geometry.item.shape
+    size = geometry.shape_index.shape
     return Keyframe(frame, geometry, Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)))
 
 

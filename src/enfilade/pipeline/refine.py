@@ -29,7 +29,7 @@ class Verdict:
     middle : int or None
         The frame that was judged; None where there was none to judge.
     unseen : tuple of int
-        Specular items whose reuse is not seen; all others must be traced in the whole segment.
+        Specular shapes whose reuse is not seen; all others must be traced in the whole segment.
     percent_visible, percent_visible_no_pursuit : float
         Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
     is_split : bool
@@ -106,7 +106,7 @@ def judge(workshop: Workshop, segment: Segment) -> Verdict:
     with workshop.costs.of("metric"):
         jnd, jnd_no_pursuit = _differences(workshop, view, before, after, is_judged)
 
-    # Mask out what will be traced: slow pixels, then specular items whose reuse would be seen.
+    # Mask out what will be traced: slow pixels, then specular shapes whose reuse would be seen.
     unseen = unseen_items(jnd, is_judged, view.geometry, settings.masks)
     is_slow = slow_pixels(view.speed_deg_s, settings.masks)
     rest = is_judged & ~is_slow & ~specular_pixels(view.geometry, unseen)

@@ -96,12 +96,10 @@ class Worker:
     def _survey(self) -> None:
         workshop, job = self._workshop, self._job
         if job.method == "decoupled":
-            _ = workshop.light_renderer  # before any work: what it can't do is an error
+            _ = workshop.lobe_renderer  # before any work: what it can't do is an error
         survey = survey_path(workshop.views, job.path, job.settings, self._monitor)
-        items = len(workshop.renderer.describe().items)
-        workshop.finish(
-            "survey", [], survey=survey.to_dict(), views=len(job.path.distinct_frames), items=items
-        )
+        shapes = len(workshop.renderer.describe().shapes)
+        workshop.finish("survey", [], survey=survey.to_dict(), views=len(job.path.originals), shapes=shapes)
 
     def _judge(self, facts: Mapping[str, Any]) -> None:
         whole = None if facts["whole"] is None else self._verdict(facts["whole"])

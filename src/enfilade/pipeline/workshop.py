@@ -19,7 +19,7 @@ from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
 from enfilade.records import F32, Keyframe, Mask, Shading
-from enfilade.renderer import LightRenderer, PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import LobeRenderer, PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.store import Run
 
 KEPT = 3  # keyframes kept in memory
@@ -46,7 +46,7 @@ class Workshop:
         self._keyframes: OrderedDict[int, Keyframe] = OrderedDict()
 
     @cached_property
-    def light_renderer(self) -> LightRenderer:
+    def lobe_renderer(self) -> LobeRenderer:
         """The renderer, which must be one that can be asked for light.
 
         Raises
@@ -54,21 +54,21 @@ class Workshop:
         SettingsError
             It can't.
         """
-        if not isinstance(self.renderer, LightRenderer):
+        if not isinstance(self.renderer, LobeRenderer):
             name = self.renderer.describe().renderer
             raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
-        self.job.check_light(self.renderer.why_no_light)
+        self.job.check_light(self.renderer.why_inseparable)
         return self.renderer
 
     @cached_property
     def shader(self) -> Shader:
         """The shader, whose kernels all shots share."""
-        return Shader(self.light_renderer)
+        return Shader(self.lobe_renderer)
 
     @cached_property
     def virtual_images(self) -> VirtualImages:
         """What is seen in mirrors and through glass."""
-        return VirtualImages(self.light_renderer)
+        return VirtualImages(self.lobe_renderer)
 
     @cached_property
     def aqm(self) -> Aqm:

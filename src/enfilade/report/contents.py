@@ -217,7 +217,7 @@ def _help(default: Settings, section: str, name: str) -> str:
 def _identity(seen: SeenRun) -> list[tuple[str, str]]:
     identity, path = seen.identity, seen.identity["path"]
     scene, versions = identity.get("scene", {}), identity.get("versions", {})
-    items = next((line["items"] for line in seen.lines if "items" in line), "unknown")
+    shapes = next((line["shapes"] for line in seen.lines if "shapes" in line), "unknown")
     numbers, of = seen.numbers, seen.viewing
     screen = (
         f"diagonal {of.diagonal_m:g} m at {of.distance_m:g} m: {of.pixels_per_degree:.1f} pixels per degree"
@@ -230,7 +230,7 @@ def _identity(seen: SeenRun) -> list[tuple[str, str]]:
         ("image", f"{path['size'][0]}x{path['size'][1]} pixels, {path['fps']:g} frames per second"),
         ("screen", screen),
         ("scene", f"{scene.get('fingerprint', 'unknown')}"),
-        ("items in it", str(scene.get("items", items))),
+        ("shapes in it", str(scene.get("shapes", shapes))),
         ("poses", str(path.get("poses", "unknown"))),
         *((f"version: {name}", str(value)) for name, value in versions.items()),
     ]

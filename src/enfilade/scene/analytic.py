@@ -60,20 +60,20 @@ class AnalyticRenderer:
         return SceneFacts(
             renderer=NAME,
             variant=dr.backend_v(Float).name.lower(),
-            items=tuple(shape.name for shape in self._scene.shapes),
+            shapes=tuple(shape.name for shape in self._scene.shapes),
             fingerprint=hashlib.sha256(scene_text(self._scene).encode()).hexdigest(),
         )
 
     def surfaces(self, rays: Rays) -> Surfaces:
         """Find the first surface along each ray. Mirrors and glass have no diffuse albedo."""
         hit = self._find(rays.origin, rays.direction)
-        surface = dr.gather(UInt, self._classes, hit.item)
+        surface = dr.gather(UInt, self._classes, hit.shape_index)
         return Surfaces(
-            is_hit=hit.item > 0,
+            is_hit=hit.shape_index > 0,
             distance=hit.distance,
             normal=hit.normal,
             albedo=dr.select(_is_bounced(surface), Array3f(0), self._reflectance(hit)),
-            item=hit.item,
+            shape_index=hit.shape_index,
             surface=surface,
         )
 
@@ -109,7 +109,7 @@ class AnalyticRenderer:
         radiance = self._shade(hit, direction)
         if not any(shape.material.surface in BOUNCED for shape in self._scene.shapes):
             return radiance
-        surface = dr.gather(UInt, self._classes, hit.item)
+        surface = dr.gather(UInt, self._classes, hit.shape_index)
         mirrors = surface == int(SurfaceClass.MIRROR)
         onward = dr.select(mirrors, _mirrored(direction, hit.normal), direction)
         side = dr.select(mirrors, Float(1), Float(-1)) * OFFSET * dr.maximum(dr.norm(hit.position), 1)
@@ -118,21 +118,23 @@ class AnalyticRenderer:
         return dr.select(_is_bounced(surface), seen, radiance)
 
     def _find(self, origin: Any, direction: Any) -> _Hit:
-        nearest, item, normal = Float(dr.inf), UInt(0), Array3f(0)
+        nearest, shape_index, normal = Float(dr.inf), UInt(0), Array3f(0)
         for number, shape in enumerate(self._scene.shapes, 1):
             distance, outward = _intersect(shape, origin, direction)
             is_nearer = (distance > 0) & (distance < nearest)
             nearest = dr.select(is_nearer, distance, nearest)
-            item = dr.select(is_nearer, UInt(number), item)
+            shape_index = dr.select(is_nearer, UInt(number), shape_index)
             normal = dr.select(is_nearer, outward, normal)
         normal = dr.select(dr.dot(normal, direction) > 0, -normal, normal)
-        nearest = dr.select(item > 0, nearest, 0)
-        return _Hit(nearest, item, normal, origin + nearest * direction)
+        nearest = dr.select(shape_index > 0, nearest, 0)
+        return _Hit(nearest, shape_index, normal, origin + nearest * direction)
 
     def _reflectance(self, hit: _Hit) -> Any:
         albedo = Array3f(0)
         for number, shape in enumerate(self._scene.shapes, 1):
-            albedo = dr.select(hit.item == number, _texture(shape.material.albedo, hit.position), albedo)
+            albedo = dr.select(
+                hit.shape_index == number, _texture(shape.material.albedo, hit.position), albedo
+            )
         return albedo
 
     def _shade(self, hit: _Hit, direction: Any) -> Any:
@@ -146,16 +148,16 @@ class AnalyticRenderer:
         mirrored = dr.maximum(dr.dot(dr.normalize(_mirrored(direction, hit.normal)), to_light), 1e-6)
         added = Array3f(0)
         for number, shape in enumerate(scene.shapes, 1):
-            added = dr.select(hit.item == number, _added(shape.material, mirrored, scene.light), added)
-        return dr.select(hit.item > 0, self._reflectance(hit) * arriving + added, sky)
+            added = dr.select(hit.shape_index == number, _added(shape.material, mirrored, scene.light), added)
+        return dr.select(hit.shape_index > 0, self._reflectance(hit) * arriving + added, sky)
 
 
 @dataclass(frozen=True)
 class _Hit:
-    """Nearest surfaces, as lanes; `item` is 0 where there is none."""
+    """Nearest surfaces, as lanes; `shape_index` is 0 where there is none."""
 
     distance: Any
-    item: Any
+    shape_index: Any
     normal: Any
     position: Any
 

@@ -115,7 +115,7 @@ class AnalyticScene:
     Attributes
     ----------
     shapes
-        Item n is the n-th of them, from 1.
+        Shape n is the n-th of them, from 1.
     to_light : Vector
         Direction to the light; any length.
     light, ambient : Vector

@@ -35,7 +35,7 @@ def try_scene(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
     Returns
     -------
     str
-        See :meth:`enfilade.renderer.LightRenderer.why_no_light`.
+        See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`.
 
     Raises
     ------
@@ -107,12 +107,14 @@ def _load(scene: str, trace: str, megabytes: int, variant: str) -> int:
         limit_memory(megabytes)
     try:
         check_reading(Path(scene))
-        why_no_light = MitsubaRenderer(Path(scene), TraceSettings.from_table(json.loads(trace))).why_no_light
+        why_inseparable = MitsubaRenderer(
+            Path(scene), TraceSettings.from_table(json.loads(trace))
+        ).why_inseparable
     except SceneError as error:
         sys.stdout.write(str(error))
         return REFUSED
-    sys.stdout.write(why_no_light)
-    return UNLIT if why_no_light else 0
+    sys.stdout.write(why_inseparable)
+    return UNLIT if why_inseparable else 0
 
 
 def _main(scene: str, trace: str, megabytes: int, variant: str, parent: int, seconds: float) -> int:

@@ -8,9 +8,9 @@ from enfilade.methods.decoupled import cells as module
 from enfilade.methods.decoupled.cells import LEAST_ESTIMATES, LEVELS, Estimates, cell_key
 
 
-def keys(points, normals, width, coarser=0, item=1):
+def keys(points, normals, width, coarser=0, shape_index=1):
     points, normals = np.asarray(points, np.float32).T, np.asarray(normals, np.float32).T
-    return np.array(cell_key(Array3f(points), Array3f(normals), UInt(item), Float(width), coarser))
+    return np.array(cell_key(Array3f(points), Array3f(normals), UInt(shape_index), Float(width), coarser))
 
 
 def random_points(count, seed=0):
@@ -36,7 +36,9 @@ def test_a_key_is_a_cell_and_a_side():
 
 def test_items_do_not_meet():
     points, normals = random_points(500)
-    assert set(keys(points, normals, 0.7, item=3)).isdisjoint(keys(points, normals, 0.7, item=4))
+    assert set(keys(points, normals, 0.7, shape_index=3)).isdisjoint(
+        keys(points, normals, 0.7, shape_index=4)
+    )
 
 
 def test_levels_do_not_meet():

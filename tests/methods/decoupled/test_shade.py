@@ -26,7 +26,7 @@ def _shaded(renderer, cache: LightCache, camera: Camera, spp: int, seed: int = 2
         _shade(renderer, cache),
         chunk=more.get("chunk", 1 << 20),
         pixel_filter=more.get("pixel_filter", PixelFilter.CENTRE),
-        random=RandomKey(seed, 0, Purpose.GATHER),
+        random=RandomKey(seed, 0, Purpose.DIFFUSE),
         is_stratified=True,
     )
     whole.add(spp)
@@ -52,16 +52,16 @@ def _traced(renderer, camera: Camera, spp: int) -> Shading:
 def test_without_a_cache_every_material_keeps_its_energy(tmp_path):
     renderer, camera = opened_scene(tmp_path, MATERIALS), front_camera()
     ours, reference = _shaded(renderer, LightCache(), camera, 256), _traced(renderer, camera, 256)
-    item = find_geometry(renderer, camera).item.ravel()
-    names = renderer.describe().items
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    names = renderer.describe().shapes
     misses = {}
-    for number in np.unique(item[item > 0]):
-        where = item == number
+    for number in np.unique(shape_index[shape_index > 0]):
+        where = shape_index == number
         difference = ((ours.color - reference.color) @ LUMINANCE)[where].sum()
         deviation = np.sqrt((ours.variance + reference.variance)[where].sum())
         misses[names[number - 1]] = difference / deviation
     assert set(MATERIALS) < set(misses)
-    # Standard errors of sums over a ball's pixels; 15 items, so that four are passed once in a thousand runs.
+    # Standard errors of sums over a ball's pixels; 15 shapes: four are passed once in 1000 runs.
     assert {name: miss for name, miss in misses.items() if abs(miss) > 4.0} == {}
 
 
@@ -71,7 +71,9 @@ def test_without_a_cache_veils_keep_their_energy(tmp_path, opacity):
         black = '<bsdf type="diffuse"><rgb name="reflectance" value="0.02"/></bsdf>'
         return f'<bsdf type="mask"><float name="opacity" value="{share}"/>{black}</bsdf>'
 
-    where = find_geometry(opened_scene(tmp_path, {"veil": veil(1.0)}), front_camera()).item.ravel() == 1
+    where = (
+        find_geometry(opened_scene(tmp_path, {"veil": veil(1.0)}), front_camera()).shape_index.ravel() == 1
+    )
     renderer, camera = opened_scene(tmp_path, {"veil": veil(opacity)}), front_camera()
     ours, reference = _shaded(renderer, LightCache(), camera, 1024), _traced(renderer, camera, 1024)
     difference = ((ours.color - reference.color) @ LUMINANCE)[where]
@@ -115,10 +117,11 @@ def test_light_seen_from_one_side_is_shown_from_another(tmp_path):
     )
     ours = _shaded(renderer, _opened_cache([page]), camera, 64)
     reference = _traced(renderer, camera, 256)
-    item = find_geometry(renderer, camera).item.ravel()
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
     ratios = {
-        name: ours.color[item == number].sum(axis=0) / reference.color[item == number].sum(axis=0)
-        for number, name in enumerate(renderer.describe().items, 1)
+        name: ours.color[shape_index == number].sum(axis=0)
+        / reference.color[shape_index == number].sum(axis=0)
+        for number, name in enumerate(renderer.describe().shapes, 1)
         if name in balls
     }
     assert set(ratios) == set(balls)
@@ -135,7 +138,9 @@ def test_light_under_a_coat_seen_at_a_slant_is_shown_from_above(tmp_path, name):
     renderer = opened_scene(tmp_path, {"ball": f'{table}<translate y="1.5"/></transform>{MATERIALS[name]}'})
     flat = Camera(look_at((0, 1.75, 2.5), (0, 1.5, 0)), 36, 96, 36)
     steep = Camera(look_at((0, 3.6, 0.8), (0, 1.5, 0)), 25, 32, 24)
-    where = find_geometry(renderer, steep).item.ravel() == renderer.describe().items.index("table") + 1
+    where = (
+        find_geometry(renderer, steep).shape_index.ravel() == renderer.describe().shapes.index("table") + 1
+    )
     assert where.sum() > 200
     ours = _shaded(renderer, _opened_cache([traced_page(renderer, flat)]), steep, 64)
     reference = _traced(renderer, steep, 256)
@@ -150,7 +155,7 @@ def test_a_page_knows_its_own_pixels(diffuse):
     image = _shaded(renderer, _opened_cache([page]), geometry.camera, 1).color.reshape(36, 48, 3)
     expected = geometry.albedo * (page.direct.color + page.indirect.color)
     # Inside surfaces; at edges a tap may be another surface, and the lamp emits.
-    inside = (geometry.item == 3) | (geometry.item == 4)
+    inside = (geometry.shape_index == 3) | (geometry.shape_index == 4)
     wrong = np.abs(image - expected).max(axis=2)[inside] > 0.01
     assert wrong.mean() < 0.02
 
@@ -173,7 +178,7 @@ def _gathered(renderer, cache: LightCache, camera: Camera, spp: int) -> list[Sha
         lambda rays, rng, square: shader.gathered(cache, rays, rng, square, pixel_angle=PIXEL_ANGLE),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
-        random=RandomKey(8, 0, Purpose.LIGHT),
+        random=RandomKey(8, 0, Purpose.IRRADIANCE),
         layers=2,
         is_stratified=True,
     )
@@ -213,8 +218,8 @@ def test_metal_and_glass_have_no_diffuse_lobe(tmp_path):
     }
     renderer = opened_scene(tmp_path, balls)
     seen = find_geometry(renderer, front_camera())
-    names = renderer.describe().items
-    albedos = [seen.albedo[seen.item == names.index(name) + 1].mean() for name in balls]
+    names = renderer.describe().shapes
+    albedos = [seen.albedo[seen.shape_index == names.index(name) + 1].mean() for name in balls]
     assert albedos == pytest.approx([0.0, 0.125, 0.5], abs=0.01)
 
 
@@ -223,7 +228,7 @@ def test_pages_that_count_for_nothing_make_nothing_known(diffuse):
     finer = find_geometry(
         renderer, front_camera(width=480, height=360, x=-0.5)
     )  # some points have a hair of a tap
-    at = [lanes(values) for values in (positions(finer), finer.normal, finer.item)]
+    at = [lanes(values) for values in (positions(finer), finer.normal, finer.shape_index)]
     page = open_page(pages[0])
     alone, filled = open_cache([page], [1.0]), open_cache([page] * 6, [1.0, *[0.0] * 5])
     np.testing.assert_array_equal(np.array(alone.find(*at)[1]), np.array(filled.find(*at)[1]))

@@ -15,7 +15,7 @@ from scenes_analytic import wall
 
 def test_light_in_a_thin_band_is_not_smoothed_away():
     geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 32, 24))
-    size = geometry.item.shape
+    size = geometry.shape_index.shape
     where = np.zeros(size, bool)
     where[11:13] = True
     light = np.random.default_rng(5).gamma(1.0, 1.0, (*size, 1)).astype(np.float32).repeat(3, axis=2)
@@ -41,7 +41,7 @@ def test_what_panes_let_through_and_what_they_reflect_is_kept_apart(
     renderer, camera = opened_scene(tmp_path, balls), front_camera()
     seen = find_geometry(renderer, camera)
     is_between = positions(seen)[..., 1] < 0.3  # there the floor between the panes may be seen
-    where = ((seen.item == renderer.describe().items.index("front") + 1) & ~is_between).ravel()
+    where = ((seen.shape_index == renderer.describe().shapes.index("front") + 1) & ~is_between).ravel()
     reflected, transmitted = (layer.color[where] for layer in scattered(renderer, camera))
     assert (reflected.any(), transmitted.any()) == (has_reflected, has_transmitted)
 
@@ -49,8 +49,8 @@ def test_what_panes_let_through_and_what_they_reflect_is_kept_apart(
 def test_only_clear_surfaces_let_through(tmp_path):
     renderer, camera = opened_scene(tmp_path, MATERIALS), front_camera()
     seen, (_, transmitted) = find_geometry(renderer, camera), scattered(renderer, camera)
-    names = renderer.describe().items
-    clear = {names[k - 1] for k in np.unique(seen.item.ravel()[transmitted.color.any(axis=1)])}
+    names = renderer.describe().shapes
+    clear = {names[k - 1] for k in np.unique(seen.shape_index.ravel()[transmitted.color.any(axis=1)])}
     assert clear == {"dielectric", "thindielectric", "glowing air"}
 
 
@@ -62,13 +62,13 @@ def test_total_reflection_inside_glass_belongs_to_what_comes_through(tmp_path):
     ball = f'{MATERIALS["diffuse"]}</shape><shape type="cube" id="block">{cube}'
     renderer, camera = opened_scene(tmp_path, {"ball": ball}), front_camera()
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
-    where = seen.item == renderer.describe().items.index("block") + 1
+    where = seen.shape_index == renderer.describe().shapes.index("block") + 1
     reflected, transmitted = (layer.spread(where | True) for layer in scattered(renderer, camera, 64))
     assert where.mean() > 0.1
     # Seen through two faces at a right angle much is reflected by one of them, whole: 4 to 8 % is the rest.
     shares = (layer.color[where].mean() for layer in (reflected, transmitted))
     assert next(shares) < 0.25 * next(shares)
-    assert (images.transmitted(seen).item[where] >= BEHIND).all()
+    assert (images.transmitted(seen).shape_index[where] >= BEHIND).all()
 
 
 @pytest.mark.parametrize("spp", [2, 4, 12])
@@ -76,10 +76,10 @@ def test_reflections_that_few_rays_meet_keep_their_light(tmp_path, spp):
     renderer = opened_scene(tmp_path, {"ball": pane("front", 1.0)})
     camera = front_camera(96, 72)
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
-    where = np.ones(seen.item.shape, bool)
+    where = np.ones(seen.shape_index.shape, bool)
     layers = [layer.spread(where) for layer in scattered(renderer, camera, spp)]
     found = smoothed([images.reflected(seen), images.transmitted(seen)], layers, where)
-    front = seen.item == renderer.describe().items.index("front") + 1
+    front = seen.shape_index == renderer.describe().shapes.index("front") + 1
     kept, all_of_it = (layer.color[front].mean() for layer in (found[0], layers[0]))
     assert kept == pytest.approx(all_of_it, rel=0.02)
 
@@ -87,11 +87,13 @@ def test_reflections_that_few_rays_meet_keep_their_light(tmp_path, spp):
 def test_the_sky_in_a_pane_is_smoothed(tmp_path):
     renderer, camera = opened_scene(tmp_path, {"ball": pane("front", 1.0)}), front_camera(96, 72)
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
-    where = np.ones(seen.item.shape, bool)
+    where = np.ones(seen.shape_index.shape, bool)
     layers = [layer.spread(where) for layer in scattered(renderer, camera, 4)]
     mirrored = images.reflected(seen)
     reflected, _ = smoothed([mirrored, images.transmitted(seen)], layers, where)
-    sky = (seen.item == renderer.describe().items.index("front") + 1) & (mirrored.item == BEHIND)
+    sky = (seen.shape_index == renderer.describe().shapes.index("front") + 1) & (
+        mirrored.shape_index == BEHIND
+    )
     assert sky.sum() > 200
     assert reflected.color[sky].std() < 0.5 * layers[0].color[sky].std()
 
@@ -102,7 +104,7 @@ def test_what_moves_along_is_averaged(diffuse):
     frames = []
     for x in (0.0, 0.05, -0.05):
         geometry = find_geometry(renderer, front_camera(x=x))
-        size = geometry.item.shape
+        size = geometry.shape_index.shape
         color = rng.normal(1.0, 0.1, (*size, 3)).astype(np.float32)
         frames.append((geometry, Shading(color, np.full(size, 0.01, np.float32)), geometry.is_hit))
     pages = [open_scattered(*frame) for frame in frames]

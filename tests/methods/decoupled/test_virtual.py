@@ -16,16 +16,17 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     renderer, camera = opened_scene(tmp_path, {"ball": mirror}), front_camera()
     seen = find_geometry(renderer, camera)
     shown = VirtualImages(renderer).reflected(seen)
-    names = renderer.describe().items
-    is_floor = shown.item == BEHIND + names.index("floor") + 1
+    names = renderer.describe().shapes
+    is_floor = shown.shape_index == BEHIND + names.index("floor") + 1
     assert is_floor.sum() > 20
     points = positions(shown)[is_floor]
     # The floor, y = 0, goes on behind an upright mirror.
     np.testing.assert_allclose(points[:, 1], 0.0, atol=2e-3)
     assert points[:, 2].max() < -1.4
-    last = np.flatnonzero(seen.item == names.index("mirror") + 1)[-1]  # also where lanes fill up a kernel
+    # Also where lanes fill up a kernel.
+    last = np.flatnonzero(seen.shape_index == names.index("mirror") + 1)[-1]
     assert is_floor.ravel()[last]
-    is_same = shown.item == seen.item
+    is_same = shown.shape_index == seen.shape_index
     np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
 
 
@@ -34,11 +35,11 @@ def test_rough_glass_shows_no_image(tmp_path):
     renderer, camera = opened_scene(tmp_path, balls), front_camera()
     seen = find_geometry(renderer, camera)
     shown = VirtualImages(renderer).reflected(seen)
-    rough, glass = (seen.item == renderer.describe().items.index(name) + 1 for name in balls)
+    rough, glass = (seen.shape_index == renderer.describe().shapes.index(name) + 1 for name in balls)
     assert rough.sum() > 20
-    np.testing.assert_array_equal(shown.item[rough], seen.item[rough])
+    np.testing.assert_array_equal(shown.shape_index[rough], seen.shape_index[rough])
     np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
-    assert (shown.item[glass] >= BEHIND).all()
+    assert (shown.shape_index[glass] >= BEHIND).all()
 
 
 def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
@@ -46,15 +47,17 @@ def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
     behind = find_geometry(bare, camera)
     renderer = opened_scene(tmp_path, {"ball": pane("front", 1.0)})
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
-    where = seen.item == renderer.describe().items.index("front") + 1
+    where = seen.shape_index == renderer.describe().shapes.index("front") + 1
     assert where.sum() > 50
     through, mirrored = images.transmitted(seen), images.reflected(seen)
     np.testing.assert_allclose(positions(through)[where], positions(behind)[where], atol=2e-3)
-    names = renderer.describe().items
-    assert set(through.item[where]) == {BEHIND + names.index(name) + 1 for name in ("ball", "floor", "back")}
+    names = renderer.describe().shapes
+    assert set(through.shape_index[where]) == {
+        BEHIND + names.index(name) + 1 for name in ("ball", "floor", "back")
+    }
     # The floor before the pane goes on behind it.
-    is_floor = where & (mirrored.item == BEHIND + names.index("floor") + 1)
+    is_floor = where & (mirrored.shape_index == BEHIND + names.index("floor") + 1)
     assert is_floor.sum() > 20
     np.testing.assert_allclose(positions(mirrored)[is_floor][:, 1], 0.0, atol=2e-3)
     assert positions(mirrored)[is_floor][:, 2].max() < 1.0
-    assert (mirrored.item != through.item)[where].mean() > 0.3
+    assert (mirrored.shape_index != through.shape_index)[where].mean() > 0.3

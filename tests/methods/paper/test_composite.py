@@ -18,25 +18,25 @@ SETTINGS = WarpSettings(depth_tolerance=0.02)
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 50.0, 1, 1)
 
 
-def pixel(depth=2.0, item=1):
+def pixel(depth=2.0, shape_index=1):
     size = (1, 1)
     return Geometry(
         CAMERA,
         np.full(size, depth, np.float32),
         np.zeros((*size, 3), np.float32),
         np.zeros((*size, 3), np.float32),
-        np.full(size, item, np.uint32),
+        np.full(size, shape_index, np.uint32),
         np.zeros(size, np.uint8),
     )
 
 
-def warped(value, *, depth=2.0, item=1, magnification=1.0, is_hole=False):
+def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_hole=False):
     size = (1, 1)
     return Warped(
         np.full((*size, 3), value, np.float32),
         np.zeros(size, np.float32),
         np.full(size, depth, np.float32),
-        np.full(size, item, np.uint32),
+        np.full(size, shape_index, np.uint32),
         np.full(size, magnification, np.float32),
         np.full(size, is_hole),
     )
@@ -68,7 +68,7 @@ def test_the_less_magnified_sample_counts_more():
         {"depth": 1.0},  # an occluder
         {"depth": 3.0},  # what is behind, seen through a hole
         {"depth": 2.05},
-        {"item": 2},
+        {"shape_index": 2},
         {"is_hole": True},
     ],
 )
@@ -83,15 +83,17 @@ def test_depths_agree_within_the_tolerance():
 
 
 def test_sky_is_joined_too():
-    sky = pixel(depth=0.0, item=0)
-    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0, depth=0.0, item=0), of=sky)[0] == 0.5
-    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0), of=sky) == (0.0, False)
-    assert joined(warped(0.0, depth=0.0, item=0), warped(1.0)) == (1.0, False)
+    sky = pixel(depth=0.0, shape_index=0)
+    assert (
+        joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0, depth=0.0, shape_index=0), of=sky)[0] == 0.5
+    )
+    assert joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0), of=sky) == (0.0, False)
+    assert joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0)) == (1.0, False)
 
 
 def test_a_hole_is_no_sky():
-    sky = pixel(depth=0.0, item=0)
-    hole = warped(0.0, depth=0.0, item=0, is_hole=True)
+    sky = pixel(depth=0.0, shape_index=0)
+    hole = warped(0.0, depth=0.0, shape_index=0, is_hole=True)
     assert not agrees(hole, sky, 0.02).any()
     assert joined(hole, hole, of=sky) == (0.0, True)
 
@@ -113,7 +115,7 @@ def test_a_room_between_its_keyframes_looks_as_it_does():
     assert is_hole.mean() < 0.06
     # Checkerboards sampled once a pixel and resampled: their edges differ by half a pixel.
     assert psnr(color[~is_hole], truth.shading.color[~is_hole].astype(float)) > 20
-    smooth = np.isin(truth.geometry.item, (2, 3, 4, 5, 7)) & ~is_hole  # walls and ceiling
+    smooth = np.isin(truth.geometry.shape_index, (2, 3, 4, 5, 7)) & ~is_hole  # walls and ceiling
     assert psnr(color[smooth], truth.shading.color[smooth].astype(float)) > 34
 
 
@@ -138,9 +140,9 @@ def test_one_keyframe_on_either_side_of_an_occluder():
     color, is_hole = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
     np.testing.assert_array_equal(is_hole, one[0] & one[1])
     assert is_hole.mean() < 0.2 * min(one[0].mean(), one[1].mean())
-    ball = (geometry.item == 2) & ~is_hole
+    ball = (geometry.shape_index == 2) & ~is_hole
     assert (color[ball][:, 2] == 0).all()  # no wall in it
-    assert (color[(geometry.item == 1) & ~is_hole][:, 2] > 0.05).all()  # no ball in the wall
+    assert (color[(geometry.shape_index == 1) & ~is_hole][:, 2] > 0.05).all()  # no ball in the wall
 
 
 @pytest.mark.parametrize("frame", [3, 8, 12, 16, 21])
@@ -149,10 +151,10 @@ def test_holes_are_where_neither_keyframe_sees_the_surface(frame):
     _, is_hole, truth, _ = between(scene, path, 0, 24, frame)
     camera = path.cameras[frame]
     direction = ray_directions(camera)
-    depth, item = first_hits(scene, camera.eye, direction)
+    depth, shape_index = first_hits(scene, camera.eye, direction)
     world = camera.eye + depth[..., None] * direction
-    seen = np.zeros(item.shape, bool)
-    edge = edges(item)
+    seen = np.zeros(shape_index.shape, bool)
+    edge = edges(shape_index)
     for end in (0, 24):
         by = is_seen_by(scene, path.cameras[end], world)
         seen |= by
@@ -164,7 +166,7 @@ def test_holes_are_where_neither_keyframe_sees_the_surface(frame):
     # Surfaces that a keyframe saw so obliquely that their splats are beyond the largest size are holes.
     assert not (wrong & ~is_hole).any()
     assert wrong.mean() < 0.002
-    assert (truth.geometry.item > 0).all()
+    assert (truth.geometry.shape_index > 0).all()
 
 
 def is_seen_by(scene, camera, world):

@@ -41,7 +41,7 @@ def test_onto_itself_gives_the_same_bytes(name):
     got = warp_keyframe(keyframe, keyframe.geometry.camera, SETTINGS)
     assert not got.is_hole.any()
     assert got.color.tobytes() == keyframe.shading.color.tobytes()
-    assert got.item.tobytes() == keyframe.geometry.item.tobytes()
+    assert got.shape_index.tobytes() == keyframe.geometry.shape_index.tobytes()
     assert got.variance.tobytes() == keyframe.shading.variance.tobytes()
     assert (got.magnification == 1.0).all()
     np.testing.assert_allclose(got.depth, keyframe.geometry.depth, rtol=1e-6)
@@ -89,10 +89,10 @@ def test_a_plane_has_no_pinholes_at_any_step(plane, translation):
 
 def seen_by(scene, source, target):
     """Target pixels whose surface lies well inside the source's image, and how much it is magnified."""
-    depth, item = first_hits(scene, target.eye, ray_directions(target))
-    world = target.eye + np.where(item > 0, depth, 0)[..., None] * ray_directions(target)
+    depth, shape_index = first_hits(scene, target.eye, ray_directions(target))
+    world = target.eye + np.where(shape_index > 0, depth, 0)[..., None] * ray_directions(target)
     at, source_depth = projected(source, world)
-    inside = (item > 0) & (source_depth > 0) & (at > 1).all(-1)
+    inside = (shape_index > 0) & (source_depth > 0) & (at > 1).all(-1)
     inside &= (at < (source.width - 1, source.height - 1)).all(-1)
     across = np.linalg.norm(np.gradient(at, axis=1), axis=-1)
     down = np.linalg.norm(np.gradient(at, axis=0), axis=-1)
@@ -137,15 +137,15 @@ def test_a_sphere_does_not_bleed_over_its_silhouette(shift):
     camera = camera_at((0, 0, 4), size=(160, 120))
     target = beside(camera, shift)
     got = warp_keyframe(keyframe_of(scene, camera), target, SETTINGS)
-    _, item = first_hits(scene, target.eye, ray_directions(target))
+    _, shape_index = first_hits(scene, target.eye, ray_directions(target))
     scale = 4 / (4 + shift[2])
     # A splat is its pixel's size: half of it, and the overlap, may stand out over the silhouette;
     # where the sphere turns away from the keyframe, its tangent plane goes a pixel further.
     width = math.ceil(0.55 * scale) + 1
-    sphere = item == 2
+    sphere = shape_index == 2
     for of, where in ((2, ~sphere), (1, sphere)):
         beyond = scipy.ndimage.binary_erosion(where, np.ones((3, 3)), iterations=width, border_value=1)
-        assert not ((got.item == of) & ~got.is_hole & beyond).any()
+        assert not ((got.shape_index == of) & ~got.is_hole & beyond).any()
 
 
 @pytest.mark.parametrize("shift", [(0.5, 0, 0), (-0.3, 0.3, -0.5)])
@@ -154,8 +154,8 @@ def test_colours_do_not_mix_over_a_silhouette(shift):
     camera = camera_at((0, 0, 4), size=(160, 120))
     got = warp_keyframe(keyframe_of(scene, camera), beside(camera, shift), SETTINGS)
     hue = got.color[..., 0] / (got.color[..., 0] + got.color[..., 2] + 1e-9)
-    np.testing.assert_allclose(hue[got.item == 2], 0.9, atol=1e-3)
-    np.testing.assert_allclose(hue[(got.item == 1) & ~got.is_hole], 0.1, atol=1e-3)
+    np.testing.assert_allclose(hue[got.shape_index == 2], 0.9, atol=1e-3)
+    np.testing.assert_allclose(hue[(got.shape_index == 1) & ~got.is_hole], 0.1, atol=1e-3)
 
 
 ORDERS = {
@@ -192,13 +192,13 @@ def test_the_z_buffer_shows_what_the_painter_shows(name, motion):
     )
     order = occlusion_compatible_order(camera, target)
     lanes = painted(table, order, target.width, target.height, math.inf)
-    items = np.where(lanes >= 0, keyframe.geometry.item.ravel()[lanes], 0)
+    shape_indices = np.where(lanes >= 0, keyframe.geometry.shape_index.ravel()[lanes], 0)
     got = warp_keyframe(keyframe, target, SETTINGS)
     np.testing.assert_array_equal(got.is_hole, lanes < 0)
     # The order holds for points; pixels have a width, so that their order is unsure where two surfaces
     # meet in an edge (no occlusion there, and the overlap of the splats decides).
-    differs = got.item != items
-    edge = scipy.ndimage.generic_filter(got.item, np.ptp, size=3, mode="nearest") > 0
+    differs = got.shape_index != shape_indices
+    edge = scipy.ndimage.generic_filter(got.shape_index, np.ptp, size=3, mode="nearest") > 0
     assert not (differs & ~edge).any()
     assert differs.mean() < 0.005
 
@@ -211,7 +211,7 @@ def test_holes_are_where_the_keyframe_did_not_see_the_surface(shift):
     got = warp_keyframe(keyframe_of(scene, camera), target, SETTINGS)
 
     direction = ray_directions(target)
-    depth, item = first_hits(scene, target.eye, direction)
+    depth, shape_index = first_hits(scene, target.eye, direction)
     world = target.eye + depth[..., None] * direction
     to_world = world - camera.eye
     seen_at, _ = first_hits(scene, camera.eye, to_world)
@@ -220,9 +220,9 @@ def test_holes_are_where_the_keyframe_did_not_see_the_surface(shift):
     is_seen = (seen_at > 1 - 1e-6) & is_inside
 
     # Where both agree on the surface: what a splat of half a pixel covers or leaves is a border's matter.
-    shows = ~got.is_hole & (got.item == item)
+    shows = ~got.is_hole & (got.shape_index == shape_index)
     wrong = shows != is_seen
-    border = scipy.ndimage.binary_dilation(edges(is_seen) | edges(item), np.ones((3, 3)))
+    border = scipy.ndimage.binary_dilation(edges(is_seen) | edges(shape_index), np.ones((3, 3)))
     assert is_seen.mean() < 0.98
     assert not (wrong & ~border).any()
 
@@ -239,7 +239,7 @@ def test_holes_hold_nothing():
     keyframe = keyframe_of(ball(), camera_at((0, 0, 4)))
     got = warp_keyframe(keyframe, beside(keyframe.geometry.camera, (0, 0, 0), (0, 15, 0)), SETTINGS)
     assert 0.1 < got.is_hole.mean() < 0.6
-    for values in (got.color, got.variance, got.depth, got.item, got.magnification):
+    for values in (got.color, got.variance, got.depth, got.shape_index, got.magnification):
         assert np.isfinite(values).all()
         assert not values[got.is_hole].any()
 
@@ -250,7 +250,7 @@ def test_the_sky_is_carried_by_the_rotation():
     target = beside(camera, (0.3, 0.1, -0.2), (3, 0, 0))
     got = warp_keyframe(keyframe_of(scene, camera), target, SETTINGS)
     truth = keyframe_of(scene, target)
-    sky = (got.item == 0) & ~got.is_hole & (truth.geometry.item == 0)
+    sky = (got.shape_index == 0) & ~got.is_hole & (truth.geometry.shape_index == 0)
     assert sky.mean() > 0.5
     assert not got.depth[sky].any()
     # The gradient rises by 0.006 a pixel; half a pixel is repeated at the border and beside the ball.
@@ -263,10 +263,10 @@ def test_a_surface_before_the_sky_hides_it():
     camera = camera_at((0, 0, 4))
     target = beside(camera, (0.4, 0, 0))
     got = warp_keyframe(keyframe_of(ball(), camera), target, SETTINGS)
-    _, item = first_hits(ball(), target.eye, ray_directions(target))
-    inner = scipy.ndimage.binary_erosion(item == 1, iterations=2)
+    _, shape_index = first_hits(ball(), target.eye, ray_directions(target))
+    inner = scipy.ndimage.binary_erosion(shape_index == 1, iterations=2)
     visible = inner & ~got.is_hole
-    assert (got.item[visible] == 1).all()
+    assert (got.shape_index[visible] == 1).all()
 
 
 def test_what_falls_behind_the_camera_is_left_out():
@@ -275,7 +275,7 @@ def test_what_falls_behind_the_camera_is_left_out():
     got = warp_keyframe(keyframe_of(room(), camera), target, SETTINGS)
     for values in (got.color, got.variance, got.depth, got.magnification):
         assert np.isfinite(values).all()
-    assert (got.depth[~got.is_hole & (got.item > 0)] > 0).all()
+    assert (got.depth[~got.is_hole & (got.shape_index > 0)] > 0).all()
     turned = warp_keyframe(keyframe_of(room(), camera), beside(camera, (0, 0, 0), (0, 180, 0)), SETTINGS)
     assert turned.is_hole.all()
 
@@ -324,11 +324,13 @@ def test_the_gradient_is_exact_up_to_the_horizon():
 def test_the_gradient_does_not_reach_over_jumps_and_items():
     camera = camera_at((0, 0, 4), size=(4, 1))
 
-    def with_(disparity, item):
-        depth = np.where(np.array(item) > 0, 1 / np.maximum(disparity, 1e-9), 0).astype(np.float32)[None]
+    def with_(disparity, shape_index):
+        depth = np.where(np.array(shape_index) > 0, 1 / np.maximum(disparity, 1e-9), 0).astype(np.float32)[
+            None
+        ]
         zeros = np.zeros((1, 4, 3), np.float32)
-        items = np.array([item], np.uint32)
-        return Geometry(camera, depth, zeros, zeros, items, np.zeros((1, 4), np.uint8))
+        shape_indices = np.array([shape_index], np.uint32)
+        return Geometry(camera, depth, zeros, zeros, shape_indices, np.zeros((1, 4), np.uint8))
 
     even = disparity_gradient(with_([0.50, 0.51, 0.52, 0.53], [1, 1, 1, 1]))[0, :, 0]
     np.testing.assert_allclose(even, 0.01, atol=1e-6)
@@ -346,7 +348,7 @@ def test_a_thin_wall_seen_from_the_edge_disappears():
     assert keyframe.geometry.is_hit.any()
     got = warp_keyframe(keyframe, camera_at((-0.5, 0, 4)), SETTINGS)  # from its other side
     # Left are pixels without a neighbour of the same surface, whose slope is not known.
-    assert (got.item == 1).sum() <= 0.03 * keyframe.geometry.is_hit.sum()
+    assert (got.shape_index == 1).sum() <= 0.03 * keyframe.geometry.is_hit.sum()
 
 
 def test_an_image_of_one_pixel():

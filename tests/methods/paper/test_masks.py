@@ -1,4 +1,4 @@
-"""Slow pixels, specular items, and the order in which traced pixels are counted (§4.1, §4.3, §6)."""
+"""Slow pixels, specular shapes, and the order in which traced pixels are counted (§4.1, §4.3, §6)."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis.extra.numpy import arrays
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.paper.masks import lamp_pixels, slow_pixels, sources, specular_pixels, unseen_items
+from enfilade.methods.paper.masks import emitter_pixels, slow_pixels, sources, specular_pixels, unseen_items
 from enfilade.records import Geometry, Source, SurfaceClass
-from enfilade.renderer import Lamps
+from enfilade.renderer import Emitters
 from enfilade.settings import MaskSettings
 
 H, W = 20, 30
@@ -18,27 +18,29 @@ EVERYWHERE = np.ones((H, W), bool)
 masks = arrays(bool, (4, 5))
 
 
-def scene(item, surface=SurfaceClass.GLOSSY):
-    """Geometry with these items; item 1 diffuse, all others of a class."""
-    classes = np.where(item > 1, surface, np.where(item == 1, SurfaceClass.DIFFUSE, SurfaceClass.NONE))
+def scene(shape_index, surface=SurfaceClass.GLOSSY):
+    """Geometry with these shapes; shape 1 diffuse, all others of a class."""
+    classes = np.where(
+        shape_index > 1, surface, np.where(shape_index == 1, SurfaceClass.DIFFUSE, SurfaceClass.NONE)
+    )
     zeros = np.zeros((H, W, 3), np.float32)
-    depth = np.where(item > 0, 1, 0).astype(np.float32)
-    return Geometry(CAMERA, depth, zeros, zeros, item.astype(np.uint32), classes.astype(np.uint8))
+    depth = np.where(shape_index > 0, 1, 0).astype(np.float32)
+    return Geometry(CAMERA, depth, zeros, zeros, shape_index.astype(np.uint32), classes.astype(np.uint8))
 
 
 def two_panes():
-    """Item 2 is a pane of 10 x 10, item 3 another, item 1 between."""
-    item = np.ones((H, W), int)
-    item[5:15, 3:13] = 2
-    item[5:15, 17:27] = 3
-    return item
+    """Shape 2 is a pane of 10 x 10, shape 3 another, shape 1 between."""
+    shape_index = np.ones((H, W), int)
+    shape_index[5:15, 3:13] = 2
+    shape_index[5:15, 17:27] = 3
+    return shape_index
 
 
-def seen(jnd, item=None, *, is_judged=EVERYWHERE, surface=SurfaceClass.GLOSSY, settings=SETTINGS):
+def seen(jnd, shape_index=None, *, is_judged=EVERYWHERE, surface=SurfaceClass.GLOSSY, settings=SETTINGS):
     """Items of which something must be traced."""
-    geometry = scene(two_panes() if item is None else item, surface)
+    geometry = scene(two_panes() if shape_index is None else shape_index, surface)
     unseen = unseen_items(jnd.astype(np.float32), is_judged, geometry, settings)
-    return frozenset(geometry.item[specular_pixels(geometry, unseen)].tolist())
+    return frozenset(geometry.shape_index[specular_pixels(geometry, unseen)].tolist())
 
 
 def differences(*places):
@@ -73,12 +75,12 @@ def test_each_pixel_is_counted_once_in_the_papers_order(is_slow, is_specular, is
 
 
 def test_what_was_not_judged_unseen_is_traced():
-    # Item 4 comes into view in another frame than the one that was judged.
-    item = two_panes()
-    item[0:3, 0:3] = 4
-    geometry = scene(item)
-    np.testing.assert_array_equal(specular_pixels(geometry, frozenset({2, 3})), item == 4)
-    np.testing.assert_array_equal(specular_pixels(geometry, frozenset()), item > 1)
+    # Shape 4 comes into view in another frame than the one that was judged.
+    shape_index = two_panes()
+    shape_index[0:3, 0:3] = 4
+    geometry = scene(shape_index)
+    np.testing.assert_array_equal(specular_pixels(geometry, frozenset({2, 3})), shape_index == 4)
+    np.testing.assert_array_equal(specular_pixels(geometry, frozenset()), shape_index > 1)
 
 
 def test_nothing_differs():
@@ -132,19 +134,19 @@ def test_a_group_does_not_reach_over_items():
 
 def test_regions_of_one_item_are_judged_separately():
     # A small region, all of it different, and a large one that is not: together less than a quarter.
-    item = np.ones((H, W), int)
-    item[2:6, 2:5] = 2
-    item[8:18, 5:25] = 2
+    shape_index = np.ones((H, W), int)
+    shape_index[2:6, 2:5] = 2
+    shape_index[8:18, 5:25] = 2
     jnd = differences((slice(2, 6), slice(2, 5), 1.5))
-    assert seen(jnd, item) == {2}
-    assert seen(np.zeros((H, W)), item) == frozenset()
+    assert seen(jnd, shape_index) == {2}
+    assert seen(np.zeros((H, W)), shape_index) == frozenset()
 
 
 def test_a_splinter_does_not_decide_by_its_share():
-    item = np.ones((H, W), int)
-    item[2:5, 2] = 2  # 3 pixels of 203: no group can be of 4
-    item[8:18, 5:25] = 2
-    assert seen(differences((slice(2, 5), 2, 9.0)), item) == frozenset()
+    shape_index = np.ones((H, W), int)
+    shape_index[2:5, 2] = 2  # 3 pixels of 203: no group can be of 4
+    shape_index[8:18, 5:25] = 2
+    assert seen(differences((slice(2, 5), 2, 9.0)), shape_index) == frozenset()
 
 
 def test_other_surfaces_are_not_judged():
@@ -177,31 +179,31 @@ def test_an_item_of_which_less_than_half_is_judged_is_traced():
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_tiny_regions(size):
-    item = np.ones((H, W), int)
-    item[4, 4 : 4 + size] = 2
-    assert seen(differences((4, slice(4, 4 + size), 1.5)), item) == {2}
+    shape_index = np.ones((H, W), int)
+    shape_index[4, 4 : 4 + size] = 2
+    assert seen(differences((4, slice(4, 4 + size), 1.5)), shape_index) == {2}
 
 
-def lamps(pixels, depth, item):
+def emitters(pixels, depth, shape_index):
     """Points at the centres of pixels (x, y)."""
     across = np.array([(x + 0.5, y + 0.5, 1.0) for x, y in pixels]).reshape(-1, 3)
     position = CAMERA.eye + depth * (across @ CAMERA.direction_from_pixel.T)
-    return Lamps(position.astype(np.float32), np.full(len(pixels), item, np.uint32))
+    return Emitters(position.astype(np.float32), np.full(len(pixels), shape_index, np.uint32))
 
 
 def test_a_lamp_between_pixels_is_told():
     geometry = scene(np.ones((H, W), int))  # at depth 1, and the lamp before it
-    mask = lamp_pixels(lamps([(4, 7), (4, 7), (29, 19)], 0.9, item=5), geometry)
+    mask = emitter_pixels(emitters([(4, 7), (4, 7), (29, 19)], 0.9, shape_index=5), geometry)
     assert sorted(np.argwhere(mask).tolist()) == [[7, 4], [19, 29]]
 
 
 def test_hidden_lamps_and_the_inside_of_large_ones_are_not():
     geometry = scene(two_panes())
-    assert not lamp_pixels(lamps([(4, 7)], 1.2, item=5), geometry).any()
-    assert not lamp_pixels(lamps([(4, 7)], -0.9, item=5), geometry).any()
-    assert not lamp_pixels(lamps([(-1, 7), (4, 20), (30, 7)], 0.9, item=5), geometry).any()
+    assert not emitter_pixels(emitters([(4, 7)], 1.2, shape_index=5), geometry).any()
+    assert not emitter_pixels(emitters([(4, 7)], -0.9, shape_index=5), geometry).any()
+    assert not emitter_pixels(emitters([(-1, 7), (4, 20), (30, 7)], 0.9, shape_index=5), geometry).any()
     pane = [(x, y) for x in range(3, 13) for y in range(5, 15)]
-    mask = lamp_pixels(lamps(pane, 1.0, item=2), geometry)
+    mask = emitter_pixels(emitters(pane, 1.0, shape_index=2), geometry)
     outline = np.zeros((H, W), bool)
     outline[5:15, 3:13] = True
     outline[6:14, 4:12] = False
@@ -210,5 +212,5 @@ def test_hidden_lamps_and_the_inside_of_large_ones_are_not():
 
 def test_a_lamp_before_the_sky_is_seen():
     geometry = scene(np.zeros((H, W), int))
-    assert lamp_pixels(lamps([(4, 7)], 50.0, item=5), geometry).sum() == 1
-    assert not lamp_pixels(lamps([], 50.0, item=5), geometry).any()
+    assert emitter_pixels(emitters([(4, 7)], 50.0, shape_index=5), geometry).sum() == 1
+    assert not emitter_pixels(emitters([], 50.0, shape_index=5), geometry).any()

@@ -30,12 +30,12 @@ def limits(reach, least=None):
 
 
 def made_up(seed, flow_scale=1.0):
-    """A frame of noise with a flow of noise over two items."""
+    """A frame of noise with a flow of noise over two shapes."""
     random = np.random.default_rng(seed)
     zeros = np.zeros((H, W, 3), np.float32)
     depth = random.uniform(1.0, 1.04, (H, W)).astype(np.float32)
-    item = (1 + (random.random((H, W)) < 0.2)).astype(np.uint32)
-    geometry = Geometry(CAMERA, depth, zeros, zeros, item, np.ones((H, W), np.uint8))
+    shape_index = (1 + (random.random((H, W)) < 0.2)).astype(np.uint32)
+    geometry = Geometry(CAMERA, depth, zeros, zeros, shape_index, np.ones((H, W), np.uint8))
     forward, backward = (flow_scale * random.normal(0.3, 1.0, (2, H, W, 2))).astype(np.float32)
     flow = Flow(backward, forward, has_backward=True, has_forward=True)
     return Slice(random.random((H, W, 3)).astype(np.float32), geometry, flow)
@@ -219,11 +219,11 @@ def test_separate_items_leave_no_ghost_beside_an_occluder():
     )
     cameras = tuple(Camera(look_at((0.06 * i, 0, 4), (0.06 * i, 0, 0)), 45.0, 64, 24) for i in range(-5, 6))
     slices = sequence(scene, CameraPath(cameras, tuple(range(11)), 30.0), support=False)
-    wall = slices[5].geometry.item == 1
+    wall = slices[5].geometry.shape_index == 1
     ghost = middle_filtered(slices)[wall][:, 0]
     apart = middle_filtered(slices, APART)[wall][:, 0]
     assert ghost.max() > 0.1
     # A trajectory that just misses the post interpolates half a pixel of it.
     assert apart.sum() < 0.3 * ghost.sum()
-    post = middle_filtered(slices, APART)[slices[5].geometry.item == 2][:, 0]
+    post = middle_filtered(slices, APART)[slices[5].geometry.shape_index == 2][:, 0]
     assert post.min() > 0.6

@@ -37,13 +37,13 @@ class LightCache:
     shares: tuple[Any, ...] = ()
     cells: Cells | None = None
 
-    def find(self, position: Any, normal: Any, item: Any) -> tuple[Any, Any]:
+    def find(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """Light at points of surfaces.
 
         Parameters
         ----------
         position, normal : Array3f
-        item : UInt
+        shape_index : UInt
 
         Returns
         -------
@@ -54,7 +54,7 @@ class LightCache:
         total, weight = Array3f(0), Float(0)
         known = Float(0)
         for page, share in zip(self.pages, self.shares, strict=True):
-            found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+            found = lookup(position, normal, shape_index, page, plane_tolerance=PLANE_TOLERANCE)
             total += share * sum(found.totals, Array3f(0))
             weight += share * found.weight
             known += dr.select(share > 0.0, found.weight, 0.0)
@@ -69,7 +69,7 @@ def open_cache(pages: Sequence[Page], shares: Sequence[float], cells: Cells | No
 
 def open_page(page: LightPage) -> Page:
     """Make a page ready to be looked up."""
-    guide = guide_of(page.geometry, np.where(page.is_known, page.geometry.item, np.uint32(0)))
+    guide = guide_of(page.geometry, np.where(page.is_known, page.geometry.shape_index, np.uint32(0)))
     indirect = lanes(page.indirect.color), lanes(page.indirect.variance)
     indirect = with_spread_speckles(*indirect, guide, times=SPECKLE, levels=SPECKLE_LEVELS)
     direct = lanes(page.direct.color), lanes(page.direct.variance)
@@ -99,7 +99,7 @@ def pooled(page: LightPage, around: Sequence[Page], denoised: Callable[[F32], F3
     """
     layers, _ = _gathered(page.geometry, around, [1.0] * len(around))
     if denoised is None:
-        groups = np.where(page.is_known, page.geometry.item, np.uint32(0))
+        groups = np.where(page.is_known, page.geometry.shape_index, np.uint32(0))
         smoothed = [smooth_along(page.geometry, groups, light, variance) for light, variance in layers]
     else:
         size = page.is_known.shape
@@ -117,7 +117,7 @@ def light_of(page: Page) -> F32:
 def known(geometry: Geometry, pages: Sequence[Page]) -> Mask:
     """Pixels of a view of which some page knows the light, (H, W)."""
     _, is_known = _gathered(geometry, pages, [1.0] * len(pages))
-    return image(is_known, *geometry.item.shape)
+    return image(is_known, *geometry.shape_index.shape)
 
 
 def seen_from(geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]) -> Page:
@@ -130,10 +130,10 @@ def _gathered(
     geometry: Geometry, pages: Sequence[Page], shares: Sequence[float]
 ) -> tuple[list[tuple[Any, Any]], Any]:
     """Light at what the pixels' centres of a view see, with its variance, by layer; and where it is known."""
-    position, normal, item = (
+    position, normal, shape_index = (
         points_of(geometry, lanes(geometry.depth)),
         lanes(geometry.normal),
-        lanes(geometry.item),
+        lanes(geometry.shape_index),
     )
     camera = geometry.camera
     own = footprint(position, normal, vector3(camera.eye), matrix3(camera.direction_from_pixel))
@@ -142,7 +142,7 @@ def _gathered(
     weight, known = Float(0), Float(0)
     dr.eval(position, own)
     for page, share in zip(pages, shares, strict=True):
-        found = lookup(position, normal, item, page, plane_tolerance=PLANE_TOLERANCE)
+        found = lookup(position, normal, shape_index, page, plane_tolerance=PLANE_TOLERANCE)
         its = footprint(position, normal, page.eye, page.direction_from_pixel)
         counts = opaque(float(share)) * dr.minimum(own / its, 1.0)
         for layer in layers:

@@ -23,7 +23,7 @@ STEPS = 22  # of the binary search
 MOST = 1 << STEPS  # cells that are looked up: of more, those with most estimates
 COORDINATE_BITS = 14  # of a cell's place along an axis, which wraps around
 LEVEL_BITS = 6
-ITEM_BITS = 13
+SHAPE_BITS = 13
 QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 fit into the 53 bits of a float64
 
 
@@ -45,13 +45,13 @@ class Cells:
     light: Any
     last: Any
 
-    def find(self, position: Any, normal: Any, item: Any, width: Any, jitter: Any) -> tuple[Any, Any]:
+    def find(self, position: Any, normal: Any, shape_index: Any, width: Any, jitter: Any) -> tuple[Any, Any]:
         """Light at points of surfaces.
 
         Parameters
         ----------
         position, normal : Array3f
-        item : UInt
+        shape_index : UInt
         width : Float
             Of the path there, scene units.
         jitter : Array3f
@@ -66,7 +66,7 @@ class Cells:
         light, is_known = Array3f(0), Bool(False)
         for level in range(LEVELS):
             for moved in (jitter, 0.5):
-                key = cell_key(position, normal, item, width, level, moved)
+                key = cell_key(position, normal, shape_index, width, level, moved)
                 lane = self._search(key)
                 is_here = dr.gather(UInt64, self.keys, lane) == key
                 light = dr.select(is_here & ~is_known, dr.gather(Array3f, self.light, lane), light)
@@ -84,14 +84,16 @@ class Cells:
         return low
 
 
-def cell_key(position: Any, normal: Any, item: Any, width: Any, coarser: int, jitter: Any = 0.5) -> Any:
+def cell_key(
+    position: Any, normal: Any, shape_index: Any, width: Any, coarser: int, jitter: Any = 0.5
+) -> Any:
     """Key of the cell of a point; UInt64.
 
     Parameters
     ----------
     position, normal : Array3f
-    item : UInt
-        Surfaces of several items never share a cell.
+    shape_index : UInt
+        Surfaces of several shapes never share a cell.
     width : Float
         Scene units: a cell is as wide, rounded down to a power of two.
     coarser
@@ -101,7 +103,7 @@ def cell_key(position: Any, normal: Any, item: Any, width: Any, coarser: int, ji
     level = Int(dr.floor(dr.log2(dr.maximum(width, 1e-9)))) + coarser
     size = dr.exp2(Float(level))
     place = Array3f(position) / size + (jitter - 0.5)
-    key = UInt64(item & ((1 << ITEM_BITS) - 1))
+    key = UInt64(shape_index & ((1 << SHAPE_BITS) - 1))
     key = (key << LEVEL_BITS) | UInt64(UInt(level + (1 << (LEVEL_BITS - 1))) & ((1 << LEVEL_BITS) - 1))
     for axis in place:
         at = UInt(Int(dr.floor(axis))) & ((1 << COORDINATE_BITS) - 1)

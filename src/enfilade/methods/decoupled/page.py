@@ -49,7 +49,7 @@ def guide_of(geometry: Geometry, groups: U32) -> Guide:
     return Guide(
         depths=lanes(geometry.depth),
         normals=lanes(geometry.normal),
-        items=lanes(groups),
+        shape_indices=lanes(groups),
         direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
         width=geometry.camera.width,
         height=geometry.camera.height,
@@ -86,7 +86,7 @@ def page_of(
     camera = geometry.camera
     page = Page(
         depths=dr.select(is_known, lanes(geometry.depth), 0.0),
-        items=dr.select(is_known, lanes(geometry.item), 0),
+        shape_indices=dr.select(is_known, lanes(geometry.shape_index), 0),
         normals=packed(lanes(geometry.normal)) if has_normals else None,
         values=tuple(dr.select(is_known, light, 0.0) for light, _ in layers),
         variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
@@ -96,5 +96,5 @@ def page_of(
         width=camera.width,
         height=camera.height,
     )
-    dr.eval(page.depths, page.items, page.normals, page.values, page.variances)
+    dr.eval(page.depths, page.shape_indices, page.normals, page.values, page.variances)
     return page

@@ -9,7 +9,7 @@ import drjit as dr
 
 from enfilade.arrays import PCG32, Array3f, Float, UInt
 from enfilade.kernels.replay import padded
-from enfilade.renderer import Bounce, Lit, Rays
+from enfilade.renderer import Bounce, Rays, ShadingPoint
 
 __all__ = ["Path", "begun", "chosen", "scatter_add"]
 
@@ -44,9 +44,9 @@ class Path:
         """Whether it brings anything: those that have ended or only fill up a list do not; Bool."""
         return dr.max(dr.abs(self.throughput)) > 0.0
 
-    def width_at(self, lit: Lit) -> Any:
+    def width_at(self, point: ShadingPoint) -> Any:
         """Of the path where it meets a surface, scene units; Float."""
-        return self.width + self.spread * lit.surfaces.distance * dr.norm(self.rays.direction)
+        return self.width + self.spread * point.surfaces.distance * dr.norm(self.rays.direction)
 
 
 def begun(rays: Rays, rng: Any, spread: float) -> Path:

@@ -16,10 +16,10 @@ from enfilade.kernels.replay import padded, recorded
 from enfilade.methods.decoupled.cache import LightCache
 from enfilade.methods.decoupled.cells import LEVELS, Estimates, cell_key
 from enfilade.methods.decoupled.paths import Path, begun, chosen, scatter_add
-from enfilade.records import LEAST_ALBEDO, SurfaceClass
-from enfilade.renderer import MOST_EDGES, LightRenderer, Lit, Rays, Scattered
+from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
+from enfilade.renderer import MAX_PATH_DEPTH, BsdfSample, LobeRenderer, Rays, ShadingPoint
 
-BOUNCES = MOST_EDGES - 1  # off lobes, from cache to cache; what goes on then is path traced to its end
+BOUNCES = MAX_PATH_DEPTH - 1  # off lobes, from cache to cache; what goes on then is path traced to its end
 BRIGHT = 4.0  # one over the throughput below which a path is faint
 LEAST_CHANCE = 0.05  # of a faint path to go on
 CELL_PX = 2.0  # width of a cell at what is seen sharply, in pixels
@@ -60,7 +60,7 @@ class _Spot:
     Attributes
     ----------
     position, normal : Array3f
-    item : UInt
+    shape_index : UInt
     width : Float
         Of the path there, scene units.
     weight : Array3f
@@ -69,7 +69,7 @@ class _Spot:
 
     position: Any
     normal: Any
-    item: Any
+    shape_index: Any
     width: Any
     weight: Any
 
@@ -92,7 +92,7 @@ class Shader:
     renderer
     """
 
-    def __init__(self, renderer: LightRenderer) -> None:
+    def __init__(self, renderer: LobeRenderer) -> None:
         self._renderer = renderer
 
         def state() -> Any:
@@ -282,55 +282,55 @@ class Shader:
 
     def _met(self, cache: LightCache, path: Path) -> tuple[Any, _Step]:
         """What is emitted where rays meet a surface; and what it scatters, as far as that is known."""
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
-        albedo = lit.surfaces.albedo
-        is_diffuse = lit.surfaces.is_hit & (dr.max(albedo) > LEAST_ALBEDO)
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries)
+        albedo = point.surfaces.albedo
+        is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         spot = _Spot(
-            position=lit.position,
-            normal=lit.surfaces.normal,
-            item=lit.surfaces.item,
-            width=path.width_at(lit),
+            position=point.position,
+            normal=point.surfaces.normal,
+            shape_index=point.surfaces.shape_index,
+            width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
         )
         sent, is_missing = _known(cache, spot)
-        step = _Step(sent, is_missing, Bool(lit.has_lobe), path, spot)
+        step = _Step(sent, is_missing, Bool(point.has_specular), path, spot)
         # Where a lobe sends nothing, its direction is none, and so may be what the environment emits there.
-        return Array3f(dr.select(path.carries, path.throughput * lit.emission, 0.0)), step
+        return Array3f(dr.select(path.carries, path.throughput * point.emission, 0.0)), step
 
     def _go_on_kernel(
         self, cache: LightCache, path: Path, least: Any, square: Any, transmitted_at: Any
     ) -> tuple[Any, _Step]:
         """Scatter off the surface that the rays meet, and meet the next."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
-        scattered = self._renderer.scatter(lit, rng if square is None else Leading(square, rng))
-        throughput = path.throughput * scattered.throughput
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries)
+        sample = self._renderer.sample_specular(point, rng if square is None else Leading(square, rng))
+        throughput = path.throughput * sample.throughput
         chance = dr.clip(BRIGHT * dr.max(dr.abs(throughput)), least, 1.0)
-        is_alive = scattered.is_alive & (rng.next_float32() < chance)
-        blur = dr.select(scattered.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(scattered.bounce.pdf))
+        is_alive = sample.is_alive & (rng.next_float32() < chance)
+        blur = dr.select(sample.bounce.is_delta, 0.0, CELL_BLUR * dr.rsqrt(sample.bounce.pdf))
         ahead = Path(
-            lane=_layered(path, lit, scattered, transmitted_at),
-            rays=scattered.rays,
-            bounce=scattered.bounce,
+            lane=_layered(path, point, sample, transmitted_at),
+            rays=sample.rays,
+            bounce=sample.bounce,
             throughput=Array3f(dr.select(is_alive, throughput / chance, 0.0)),
-            width=path.width_at(lit),
+            width=path.width_at(point),
             spread=dr.maximum(path.spread, blur),
             rng=rng,
         )
         emitted, step = self._met(cache, ahead)
-        return Array3f(path.throughput * scattered.direct), replace(step, sent=emitted + step.sent)
+        return Array3f(path.throughput * sample.direct), replace(step, sent=emitted + step.sent)
 
     def _gather_kernel(self, cache: LightCache, path: Path, square: Any) -> tuple[Any, _Step]:
         """Scatter off the diffuse lobe that the rays meet, and meet the next surface."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
-        lobe = self._renderer.scatter_diffuse(lit, Leading(square, rng))
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries, opaque_only=True)
+        lobe = self._renderer.sample_diffuse(point, Leading(square, rng))
         ahead = Path(
             lane=path.lane,
             rays=lobe.rays,
             bounce=lobe.bounce,
             throughput=Array3f(dr.select(lobe.is_alive, lobe.throughput, 0.0)),
-            width=path.width_at(lit),
+            width=path.width_at(point),
             spread=dr.maximum(path.spread, GATHER_BLUR),
             rng=rng,
         )
@@ -340,19 +340,19 @@ class Shader:
     def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
         """Light where rays meet a surface, by path tracing, with its weight in the image and its cells."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
-        width = path.width_at(lit)
-        direct, indirect = self._renderer.light(lit, rng, edges=2 if path.bounce else 1)
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries)
+        width = path.width_at(point)
+        direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
         light = Array3f(direct + indirect)
-        at = lit.position, lit.surfaces.normal, lit.surfaces.item, width
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
         keys = tuple(cell_key(*at, level) for level in range(LEVELS))
-        return Array3f(path.throughput * lit.surfaces.albedo), light, keys, rng
+        return Array3f(path.throughput * point.surfaces.albedo), light, keys, rng
 
     def _finish_kernel(self, path: Path) -> Any:
         """What the other lobes of the surfaces that rays meet send, by path tracing."""
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries)
-        direct, indirect = self._renderer.rest(lit, rng, edges=MOST_EDGES)
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries)
+        direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
 
 
@@ -362,24 +362,24 @@ def _tell(heard: Callable[[Estimates], None], keys: tuple[Any, ...], light: Any,
         heard(Estimates.of(np.array(key)[:count], values))
 
 
-def _layered(path: Path, lit: Lit, scattered: Scattered, transmitted_at: Any) -> Any:
+def _layered(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:
     """Where the light of paths goes that are scattered on: what comes through clear surfaces, apart; UInt.
 
     What one pane lets through and another reflects, or the other face of the same, is a reflection; total
     reflection inside of glass, where nothing else is possible, is not.
     """
-    normal, bounce = lit.surfaces.normal, scattered.bounce
-    is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, scattered.rays.direction) > 0.0
+    normal, bounce = point.surfaces.normal, sample.bounce
+    is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, sample.rays.direction) > 0.0
     if path.bounce is None:
         return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
-    is_clear = bounce.is_delta & (lit.surfaces.surface == int(SurfaceClass.TRANSPARENT))
+    is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
     is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
     return path.lane - dr.select(is_back, transmitted_at, 0)
 
 
 def _known(cache: LightCache, spot: _Spot) -> tuple[Any, Any]:
     """What diffuse lobes send, and where it is not known."""
-    found, is_known = cache.find(spot.position, spot.normal, spot.item)
+    found, is_known = cache.find(spot.position, spot.normal, spot.shape_index)
     return Array3f(dr.select(is_known, spot.weight * found, 0.0)), Bool(~is_known & spot.counts)
 
 
@@ -391,7 +391,7 @@ def _look_up_kernel(cache: LightCache, spot: _Spot, rng: Any, jitter: Any) -> tu
         rng.state ^= UNRELATED
         moved = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
         moved = 0.5 + jitter * (moved - 0.5)
-        light, is_in_cell = cache.cells.find(spot.position, spot.normal, spot.item, spot.width, moved)
+        light, is_in_cell = cache.cells.find(spot.position, spot.normal, spot.shape_index, spot.width, moved)
         sent = dr.select(is_missing & is_in_cell, spot.weight * light, sent)
         is_missing &= ~is_in_cell
     return sent, is_missing

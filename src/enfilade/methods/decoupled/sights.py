@@ -34,7 +34,7 @@ def smoothed(shown: Sequence[Geometry], scattered: Sequence[Shading], where: Mas
     scattered
         Layers, (H, W).
     where : (H, W) bool
-        Pixels that were asked. Others of the same items have nothing to tell them.
+        Pixels that were asked. Others of the same shapes have nothing to tell them.
 
     Returns
     -------
@@ -50,13 +50,13 @@ def smoothed(shown: Sequence[Geometry], scattered: Sequence[Shading], where: Mas
 
 def _smoothed(geometry: Geometry, shading: Shading, where: Mask, share: Any) -> Shading:
     # Virtual images: their normals are not those of the planes in which they seem to lie.
-    geometry = replace(geometry, depth=np.where(geometry.item < BEHIND, geometry.depth, np.float32(0)))
+    geometry = replace(geometry, depth=np.where(geometry.shape_index < BEHIND, geometry.depth, np.float32(0)))
     noise = EVEN * lanes(shading.variance)
-    groups = np.where(where, geometry.item, np.uint32(0))
+    groups = np.where(where, geometry.shape_index, np.uint32(0))
     light, variance = smooth_along(geometry, groups, share * lanes(shading.color), noise)
     size = shading.variance.shape
     light = with_soft_edges(
-        light, lanes(geometry.item), width=size[1], height=size[0], sigma=GAUSSIAN_SIGMA_PX
+        light, lanes(geometry.shape_index), width=size[1], height=size[0], sigma=GAUSSIAN_SIGMA_PX
     )
     return Shading(image(light, *size), image(variance, *size), shading.dropped)
 
@@ -100,12 +100,14 @@ def over_time(geometry: Geometry, here: Page, others: Sequence[tuple[Page, float
     (color,), (variance,) = here.values, here.variances
     position = points_of(geometry, here.depths)
     # Virtual images face the eye.
-    normal = dr.select(here.items < BEHIND, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
+    normal = dr.select(
+        here.shape_indices < BEHIND, lanes(geometry.normal), vector3(geometry.camera.eye) - position
+    )
     total, weight = Array3f(color), dr.ones(Float, dr.width(color))
     luminance = dr.dot(color, Array3f(*LUMINANCE))
     dr.eval(position, normal, total, weight, luminance)
     for other, share in others:
-        found = lookup(position, normal, here.items, other, plane_tolerance=PLANE_TOLERANCE)
+        found = lookup(position, normal, here.shape_indices, other, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
         apart = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)

@@ -16,11 +16,11 @@ from enfilade.kernels.rays import pinhole_directions
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.paths import Path, begun, chosen
 from enfilade.records import Geometry, SurfaceClass
-from enfilade.renderer import LightRenderer, Rays
+from enfilade.renderer import LobeRenderer, Rays
 
 __all__ = ["BEHIND", "VirtualImages"]
 
-BEHIND = np.uint32(1 << 30)  # added to the number of an item that is seen in a mirror or through glass
+BEHIND = np.uint32(1 << 30)  # added to the number of a shape that is seen in a mirror or through glass
 CLEAR = (SurfaceClass.TRANSPARENT,)
 SHARP = (SurfaceClass.MIRROR, *CLEAR)
 ENDLESS = 1e4  # times as far as a mirror seems what it shows of the sky
@@ -31,7 +31,7 @@ LAYERS = 8  # of mirrors and glass, one behind the other
 class VirtualImages:
     """Finds what is seen in mirrors and through glass."""
 
-    def __init__(self, renderer: LightRenderer) -> None:
+    def __init__(self, renderer: LobeRenderer) -> None:
         self._renderer = renderer
         self._look_on = recorded(self._look_on_kernel, lambda: renderer.state)
 
@@ -39,7 +39,7 @@ class VirtualImages:
         """What mirrors, and panes as far as they are mirrors, show in a frame, where it seems to be.
 
         Item and normal of pixels on a sharp surface become those of the surface at the end of the chain, with
-        :data:`BEHIND` added to the item's number, and the depth that of the
+        :data:`BEHIND` added to the shape's number, and the depth that of the
         virtual image: as far away as the way to it is long, which is exact for plane mirrors. Everything else
         stays.
         """
@@ -53,10 +53,10 @@ class VirtualImages:
         pixels = np.flatnonzero(np.isin(geometry.surface, kinds)).astype(np.uint32)
         if not len(pixels):
             return geometry
-        item, normal = geometry.item.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
+        shape_index, normal = geometry.shape_index.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
         path = begun(*_centre_rays(geometry.camera, pixels), spread=0.0)
         path = chosen(path, path.lane)
-        way = np.ones(len(item), np.float32)  # in lengths of that to the surface itself
+        way = np.ones(len(shape_index), np.float32)  # in lengths of that to the surface itself
         first = geometry.depth.ravel() * _lengths(geometry.camera)
         count = len(pixels)  # of paths; what is added to have enough of them comes after
         for _ in range(LAYERS):
@@ -64,7 +64,8 @@ class VirtualImages:
             choice = THROUGH  # what a mirror shows of a pane is what lies behind that
             shown = np.array(is_image)[:count]  # rough glass shows none: what is seen is its own surface
             lane = pixels[np.array(path.lane)[:count][shown]]
-            item[lane], normal[lane] = np.array(found)[:count][shown] + BEHIND, rows(turned)[:count][shown]
+            shape_index[lane] = np.array(found)[:count][shown] + BEHIND
+            normal[lane] = rows(turned)[:count][shown]
             far = np.array(distance)[:count][shown] / first[lane]
             way[lane] = np.minimum(way[lane] + far, ENDLESS)
             going: Any = dr.compress(is_sharp)
@@ -72,11 +73,11 @@ class VirtualImages:
             if not count:
                 break
             path = chosen(path, going)
-        size = geometry.item.shape
+        size = geometry.shape_index.shape
         return replace(
             geometry,
             depth=geometry.depth * way.reshape(size),
-            item=item.reshape(size),
+            shape_index=shape_index.reshape(size),
             normal=np.ascontiguousarray(normal.reshape(*size, 3)),
         )
 
@@ -87,19 +88,19 @@ class VirtualImages:
         image is of a surface that may make another.
         """
         rng = PCG32(path.rng)
-        lit = self._renderer.lit(path.rays, path.bounce, path.carries, is_whole=True)
-        scattered = self._renderer.scatter(lit, rng, choice)
-        ahead = replace(path, rays=scattered.rays, bounce=scattered.bounce, rng=rng)
-        surfaces = self._renderer.lit(ahead.rays, ahead.bounce).surfaces
+        point = self._renderer.intersect(path.rays, path.bounce, path.carries, opaque_only=True)
+        sample = self._renderer.sample_specular(point, rng, choice)
+        ahead = replace(path, rays=sample.rays, bounce=sample.bounce, rng=rng)
+        surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces
         is_sharp = Bool(False)
         for sharp in SHARP:
             is_sharp |= surfaces.surface == int(sharp)
-        item = dr.select(surfaces.is_hit, surfaces.item, 0)
+        shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)
         # All of the sky has one normal, so that it is smoothed.
         normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
-        is_image = scattered.is_alive & scattered.bounce.is_delta
+        is_image = sample.is_alive & sample.bounce.is_delta
         is_sharp &= surfaces.is_hit & is_image
-        return ahead, item, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
+        return ahead, shape_index, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
 
 
 def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, Any]:

@@ -46,7 +46,7 @@ def composite(
 def agrees(warped: Warped, geometry: Geometry, tolerance: float) -> Mask:
     """Pixels at which a warped keyframe shows the surface that the frame itself sees, (H, W)."""
     difference = np.abs(warped.depth - geometry.depth)
-    is_same = (warped.item == geometry.item) & (difference <= tolerance * geometry.depth)
+    is_same = (warped.shape_index == geometry.shape_index) & (difference <= tolerance * geometry.depth)
     agreed: Mask = ~warped.is_hole & is_same
     return agreed
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from enfilade.records import F32, U8, Geometry, Mask, Source
-from enfilade.renderer import Lamps
+from enfilade.renderer import Emitters
 from enfilade.settings import MaskSettings
 
-JUDGED_SHARE = 0.5  # of an item's pixels: with fewer judged nothing is known of the item
+JUDGED_SHARE = 0.5  # of a shape's pixels: with fewer judged nothing is known of the shape
 HIDDEN = 1.01  # times the farthest depth around: a lamp beyond that is not seen
-PART = 0.05  # of an item's judged pixels: of a smaller region a quarter is no share of the item
+PART = 0.05  # of a shape's judged pixels: of a smaller region a quarter is no share of the shape
 GROUP = 4  # fewest connected pixels that count as a group: less is an outlier, not a feature
 EIGHT_CONNECTED = np.ones((3, 3), bool)
 
@@ -21,12 +21,12 @@ def slow_pixels(speed_deg_s: F32, settings: MaskSettings) -> Mask:
 
 
 def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings) -> frozenset[int]:
-    """Specular items whose reuse is not seen (§4.3 step 4b, thresholds of §6).
+    """Specular shapes whose reuse is not seen (§4.3 step 4b, thresholds of §6).
 
-    Each connected region of a specular item is judged by itself: when a group of its pixels differs
-    by more than 2 JND, or when more than a quarter of them differ by more than 1 JND, its item is
-    seen; the latter not by splinters, of which items have many behind leaves and railings. What can't
-    be judged is taken for seen: an item of which both keyframes show less than half.
+    Each connected region of a specular shape is judged by itself: when a group of its pixels differs
+    by more than 2 JND, or when more than a quarter of them differ by more than 1 JND, its shape is
+    seen; the latter not by splinters, of which shapes have many behind leaves and railings. What can't
+    be judged is taken for seen: a shape of which both keyframes show less than half.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSe
 
     is_candidate = geometry.is_specular & is_judged
     unseen: set[int] = set()
-    for item in np.unique(geometry.item[is_candidate]).tolist():
-        shown = geometry.is_specular & (geometry.item == item)
+    for shape_index in np.unique(geometry.shape_index[is_candidate]).tolist():
+        shown = geometry.is_specular & (geometry.shape_index == shape_index)
         judged = shown & is_judged
         if np.count_nonzero(judged) < JUDGED_SHARE * np.count_nonzero(shown):
             continue
@@ -55,13 +55,13 @@ def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSe
         boxes = enumerate(scipy.ndimage.find_objects(regions), 1)
         part = PART * np.count_nonzero(judged)
         if not any(_is_seen(jnd[box], regions[box] == region, part, settings) for region, box in boxes):
-            unseen.add(int(item))
+            unseen.add(int(shape_index))
     return frozenset(unseen)
 
 
 def specular_pixels(geometry: Geometry, unseen: frozenset[int]) -> Mask:
     """Pixels that must be traced since they shine, (H, W): all but those of `unseen_items`."""
-    must: Mask = geometry.is_specular & ~np.isin(geometry.item, list(unseen))
+    must: Mask = geometry.is_specular & ~np.isin(geometry.shape_index, list(unseen))
     return must
 
 
@@ -80,31 +80,31 @@ def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
     return source
 
 
-def lamp_pixels(lamps: Lamps, geometry: Geometry) -> Mask:
-    """Pixels of lamps that are small in the image, and of the outlines of larger ones, (H, W).
+def emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
+    """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
 
     Parameters
     ----------
-    lamps
+    emitters
     geometry
         Of the frame: what hides a lamp, and where all around is the same lamp.
     """
     import scipy.ndimage
 
     camera = geometry.camera
-    height, width = geometry.item.shape
-    x, y, depth = camera.pixel_from_direction @ (lamps.position - camera.eye).T
+    height, width = geometry.shape_index.shape
+    x, y, depth = camera.pixel_from_direction @ (emitters.position - camera.eye).T
     is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
     row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
-    depth, item = depth[is_inside], lamps.item[is_inside]
+    depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
 
     farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
     farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
     lowest, highest = (
-        extreme(geometry.item, 3, mode="nearest")
+        extreme(geometry.shape_index, 3, mode="nearest")
         for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter)
     )
-    is_amid = (lowest[row, column] == item) & (highest[row, column] == item)
+    is_amid = (lowest[row, column] == shape_index) & (highest[row, column] == shape_index)
     is_seen = (depth < HIDDEN * farthest[row, column]) & ~is_amid
     mask = np.zeros((height, width), bool)
     mask[row[is_seen], column[is_seen]] = True

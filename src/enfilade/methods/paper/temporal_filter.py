@@ -96,7 +96,7 @@ class _Walk:
     x: Any  # Float
     y: Any
     travelled: Any  # Float, pixels
-    item: Any  # UInt
+    shape_index: Any  # UInt
     depth: Any  # Float
     is_open: Any  # Bool
     width: int
@@ -104,14 +104,14 @@ class _Walk:
 
     @staticmethod
     def start(frame: Slice, weights: _Weights) -> _Walk:
-        height, width = frame.geometry.item.shape
+        height, width = frame.geometry.shape_index.shape
         _, column, row = pixel_grid(height, width)
         return _Walk(
             weights=weights,
             x=Float(column) + 0.5,
             y=Float(row) + 0.5,
             travelled=Float(0),
-            item=lanes(frame.geometry.item),
+            shape_index=lanes(frame.geometry.shape_index),
             depth=lanes(frame.geometry.depth),
             is_open=dr.full(Bool, True, width * height),
             width=width,
@@ -149,7 +149,7 @@ class _Walk:
         row = UInt(dr.clip(self.y, 0, self.height - 1))
         lane = row * self.width + column
         depth = dr.gather(Float, lanes(into.geometry.depth), lane)
-        is_same = dr.gather(UInt, lanes(into.geometry.item), lane) == self.item
+        is_same = dr.gather(UInt, lanes(into.geometry.shape_index), lane) == self.shape_index
         is_same &= dr.abs(depth - self.depth) <= SAME_SURFACE * self.depth
         self.is_open &= is_same
         self.depth = depth

@@ -51,19 +51,19 @@ def disparity_gradient(geometry: Geometry) -> F32:
 
     On a plane the disparity is linear in image coordinates, so that one difference to a neighbour
     is exact; of the two neighbours along an axis the one with the smaller change is taken, and
-    none beyond a jump or on another item.
+    none beyond a jump or on another shape.
     """
-    disparity, item = geometry.disparity, geometry.item
+    disparity, shape_index = geometry.disparity, geometry.shape_index
     gradient = np.zeros((*disparity.shape, 2), np.float32)
-    gradient[..., 0] = _smaller_step(disparity, item)
-    gradient[..., 1] = _smaller_step(disparity.T, item.T).T
+    gradient[..., 0] = _smaller_step(disparity, shape_index)
+    gradient[..., 1] = _smaller_step(disparity.T, shape_index.T).T
     return gradient
 
 
-def _smaller_step(disparity: F32, item: U32) -> F32:
+def _smaller_step(disparity: F32, shape_index: U32) -> F32:
     """Change of the disparity to the left or right neighbour, 0 where neither lies on the same surface."""
     step = np.diff(disparity, axis=1)
-    is_same = np.diff(item.astype(np.int64), axis=1) == 0
+    is_same = np.diff(shape_index.astype(np.int64), axis=1) == 0
 
     # A small step, or one of an even slope: towards the horizon of a plane every step is large.
     is_small = np.abs(step) <= CONTINUOUS * np.minimum(disparity[:, 1:], disparity[:, :-1])
@@ -133,10 +133,10 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     at = centre + offset
 
     # Mix the neighbours that lie on the winner's surface.
-    items, colors, variances = (
-        lanes(v) for v in (keyframe.geometry.item, keyframe.shading.color, keyframe.shading.variance)
+    shape_indices, colors, variances = (
+        lanes(v) for v in (keyframe.geometry.shape_index, keyframe.shading.color, keyframe.shading.variance)
     )
-    item = dr.gather(UInt, items, winner, ~is_hole)
+    shape_index = dr.gather(UInt, shape_indices, winner, ~is_hole)
     disparity = dr.gather(Float, landing.disparity, winner, ~is_hole)
     gradient = dr.gather(Array2f, landing.gradient, winner, ~is_hole)
     total, color, variance = Float(0), Array3f(0), Float(0)
@@ -145,7 +145,7 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
         step = Array2f(lane - tap_row * source.width, tap_row) + 0.5 - centre
         expected = disparity + dr.dot(gradient, step)
         jump = dr.abs(dr.gather(Float, landing.disparity, lane) - expected)
-        is_same = (dr.gather(UInt, items, lane) == item) & (jump <= tolerance * disparity)
+        is_same = (dr.gather(UInt, shape_indices, lane) == shape_index) & (jump <= tolerance * disparity)
         weight = dr.select(is_same & ~is_hole, bilinear, 0.0)  # in a hole the position is a NaN
         total += weight
         color += weight * dr.gather(Array3f, colors, lane)
@@ -157,13 +157,13 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     color, variance = color * share, variance * share * dr.maximum(det, 1.0)
     variance = dr.select(is_hole, 0.0, variance)
     depth = dr.select(is_hole | (depth >= INFINITE), 0.0, depth)
-    item = dr.select(is_hole, 0, item)
-    dr.eval(color, variance, depth, item, magnification, is_hole)
+    shape_index = dr.select(is_hole, 0, shape_index)
+    dr.eval(color, variance, depth, shape_index, magnification, is_hole)
     return Warped(
         color=image(color, height, width),
         variance=image(variance, height, width),
         depth=image(depth, height, width),
-        item=image(item, height, width),
+        shape_index=image(shape_index, height, width),
         magnification=image(magnification, height, width),
         is_hole=image(is_hole, height, width),
     )

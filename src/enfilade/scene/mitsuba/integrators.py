@@ -8,7 +8,7 @@ from typing import Any
 import mitsuba as mi
 
 from enfilade.errors import SceneError
-from enfilade.renderer import MOST_EDGES
+from enfilade.renderer import MAX_PATH_DEPTH
 
 PATHS = {  # Mitsuba's classes that follow paths from the camera to their end; their plugins
     "PathIntegrator": "path",
@@ -44,25 +44,25 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
     return _limited(own, max_depth, _limits(own)[1])
 
 
-def shortened(integrator: Any, edges: int) -> Any:
+def shortened(integrator: Any, path_depth: int) -> Any:
     """The integrator for paths that have edges behind them; itself where its paths have no limit."""
     if integrator.class_name() not in PATHS:
         return integrator
     longest, roulette = _limits(integrator)
     if longest >= UNLIMITED:
         return integrator
-    return _limited(integrator, max(longest - edges, 0), max(roulette - edges, 1))
+    return _limited(integrator, max(longest - path_depth, 0), max(roulette - path_depth, 1))
 
 
-def why_undivided(scene: Any, integrator: Any) -> str:
+def why_inseparable(scene: Any, integrator: Any) -> str:
     """Why what an integrator computes is not the light on surfaces, and nothing else; empty where it is."""
     if integrator.class_name() not in PATHS:
         return f"its integrator is {integrator.class_name()}, not a path tracer"
     if integrator.hide_emitters:
         return "its integrator hides the emitters"
     longest, _ = _limits(integrator)
-    if longest < MOST_EDGES:
-        return f"its paths end after {longest} edges, fewer than {MOST_EDGES}"
+    if longest < MAX_PATH_DEPTH:
+        return f"its paths end after {longest} edges, fewer than {MAX_PATH_DEPTH}"
     plugin = PATHS[integrator.class_name()]
     if plugin == "path":
         return ""
@@ -70,7 +70,7 @@ def why_undivided(scene: Any, integrator: Any) -> str:
     if any(isinstance(node, mi.Medium) for node in nodes):
         return "there are media in it"
     if any(isinstance(n, mi.BSDF) and mi.has_flag(n.flags(), mi.BSDFFlags.Null) for n in nodes) and any(
-        mi.has_flag(lamp.flags(), flag) for lamp in scene.emitters() for flag in POINTLIKE
+        mi.has_flag(emitter.flags(), flag) for emitter in scene.emitters() for flag in POINTLIKE
     ):
         return f"its integrator, {plugin}, sees point and distant lights through masks and panes"
     return ""

@@ -35,9 +35,9 @@ class Lobes:
     def __init__(self, scene: Any) -> None:
         flags = mi.BSDFFlags
         self._all = mi.BSDFContext()
-        self._diffuse, self._rest = mi.BSDFContext(), mi.BSDFContext()
+        self._diffuse, self._specular = mi.BSDFContext(), mi.BSDFContext()
         self._diffuse.type_mask = int(flags.Diffuse)
-        self._rest.type_mask = int(flags.All) & ~int(flags.Diffuse)
+        self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
         materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
         numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
         registry = [int(number[0]) for number in numbers]
@@ -62,17 +62,17 @@ class Lobes:
         number: Any = dr.reinterpret_array(UInt, material)
         return dr.gather(Bool, self._is_lambert, number, seen.is_valid())
 
-    def has_rest(self, seen: Any, material: Any) -> Any:
+    def has_specular(self, seen: Any, material: Any) -> Any:
         """Whether these hits have more than a diffuse lobe."""
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
-        has_rest = seen.is_valid() & ((material.flags() & beyond) != 0)
+        has_specular = seen.is_valid() & ((material.flags() & beyond) != 0)
         if not self._has_undivided:
-            return has_rest
+            return has_specular
         is_lambert = self._is_lamberts(seen, material)
-        is_whole = is_lambert & (self._opacity(seen, material, has_rest & is_lambert) >= 1.0)
-        return (has_rest & ~is_whole) | (self.is_undivided(seen, material) & ~is_lambert)
+        is_opaque = is_lambert & (self._opacity(seen, material, has_specular & is_lambert) >= 1.0)
+        return (has_specular & ~is_opaque) | (self.is_undivided(seen, material) & ~is_lambert)
 
-    def has_spread_rest(self, seen: Any, material: Any) -> Any:
+    def has_glossy(self, seen: Any, material: Any) -> Any:
         """Whether what these hits have beyond the diffuse lobe is more than lobes of one direction each."""
         is_glossy = has_lobe(material.flags(), "GlossyReflection", "GlossyTransmission")
         if not self._has_undivided:
@@ -114,14 +114,14 @@ class Lobes:
         pdf = dr.select(undivided, dr.abs(up.z) / dr.pi, own.pdf)
         return wo, pdf, dr.select(undivided, albedo, weight)
 
-    def eval_rest(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        """Everything but the diffuse lobe, times cosine, and the density of :meth:`sample_rest`."""
+    def eval_specular(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """Everything but the diffuse lobe, times cosine, and the density of :meth:`sample_specular`."""
         undivided = self.is_undivided(seen, material)
-        own, own_pdf = material.eval_pdf(self._rest, seen, wo, active & ~undivided)
+        own, own_pdf = material.eval_pdf(self._specular, seen, wo, active & ~undivided)
         beyond, mixed_pdf = self._beyond(seen, material, wo, active & undivided)
         return dr.select(undivided, beyond, own), dr.select(undivided, mixed_pdf, own_pdf)
 
-    def sample_rest(
+    def sample_specular(
         self, seen: Any, material: Any, rng: Any, choice: Any = None
     ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight, and whether the direction is the only one (a delta lobe).
@@ -136,7 +136,7 @@ class Lobes:
         is_turn = has_holes | (rng.next_float32() < 0.5)
         if choice is not None:
             first, is_turn = choice, Bool(True)
-        own, weight = material.sample(self._rest, seen, first, second, ~undivided)
+        own, weight = material.sample(self._specular, seen, first, second, ~undivided)
         whole, whole_weight = material.sample(self._all, seen, first, second, undivided)
         kind = dr.select(undivided, whole.sampled_type, own.sampled_type)
         is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) | mi.has_flag(kind, mi.BSDFFlags.Null)

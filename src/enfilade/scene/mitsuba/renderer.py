@@ -1,4 +1,4 @@
-"""A Mitsuba scene behind the seam of ``renderer.LightRenderer``.
+"""A Mitsuba scene behind the seam of ``renderer.LobeRenderer``.
 
 Its own ``path`` integrator traces our own rays, one list of pixels at a time: the film is never used,
 since changing its size or crop compiles anew and its Gaussian filter adds in no fixed order.
@@ -28,29 +28,31 @@ from enfilade.kernels.estimate import estimate
 from enfilade.kernels.replay import recorded
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import (
-    MOST_EDGES,
+    MAX_PATH_DEPTH,
     Bounce,
-    Lamps,
-    Lit,
+    BsdfSample,
+    Emitters,
     PixelFilter,
     RandomKey,
     Rays,
-    Scattered,
     SceneFacts,
+    ShadingPoint,
     Surfaces,
 )
-from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_undivided
-from enfilade.scene.mitsuba.lamps import find_lamps
-from enfilade.scene.mitsuba.light import Light
+from enfilade.scene.mitsuba.emitters import find_emitters
+from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_inseparable
 from enfilade.scene.mitsuba.lobes import has_lobe
+from enfilade.scene.mitsuba.transport import LightTransport
 from enfilade.scene.scenefile import fingerprint, named_files, why_unreadable
 from enfilade.settings import TraceSettings
 
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
-PASSED_WHOLE = 0.5  # of the light that a surface lets through, above which a G-buffer passes it by
+OPAQUE_ONLY_TRANSMITTANCE = (
+    0.5  # of the light that a surface lets through, above which a G-buffer passes it by
+)
 PASSED = 0.999  # ... above which a path does
 SCARCE = ("out of memory", "bad_alloc")  # Dr.Jit's words for too little memory, and C++'s
-LOOKED_THROUGH = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
+NULL_BSDFS = ("MaskBSDF", "Null")  # Mitsuba's classes; not thin glass, which is seen
 
 
 class MitsubaRenderer:
@@ -76,7 +78,7 @@ class MitsubaRenderer:
         mi.set_variant(self._device.variant)
         mi.set_log_level(mi.LogLevel.Error)
         try:
-            # Unmerged: Mitsuba would join meshes of one material, and items are what the user drew.
+            # Unmerged: Mitsuba would join meshes of one material, and shapes are what the user drew.
             with _threads_to_read(file):
                 scene = mi.load_file(str(file), optimize=False)
         except MemoryError:
@@ -95,12 +97,14 @@ class MitsubaRenderer:
         self._scene = scene
         self._chunk = settings.chunk
         self._integrator = scene_integrator(scene, settings.max_depth)
-        self._onward = [shortened(self._integrator, edges) for edges in range(1, MOST_EDGES + 1)]
+        self._onward = [
+            shortened(self._integrator, path_depth) for path_depth in range(1, MAX_PATH_DEPTH + 1)
+        ]
         # What cameras stand in is said by the scene's own; poses are the path's.
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
-        self._light = Light(scene, self._radiance_onward)
-        self._items = _items(scene)
+        self._transport = LightTransport(scene, self._radiance_onward)
+        self._shapes = _shapes(scene)
         self._file = file
         self._surfaces = recorded(lambda rays: self._find(rays)[0], lambda: self.state)
         # Mitsuba prepares the sampling of a mesh that emits when it is first asked for: now, and not while a
@@ -112,7 +116,7 @@ class MitsubaRenderer:
         return SceneFacts(
             renderer=f"Mitsuba {mi.__version__}",
             variant=self._device.variant,
-            items=self._items.names,
+            shapes=self._shapes.names,
             fingerprint=fingerprint(self._file),
         )
 
@@ -125,58 +129,58 @@ class MitsubaRenderer:
         return found
 
     @property
-    def why_no_light(self) -> str:
-        """See :meth:`enfilade.renderer.LightRenderer.why_no_light`."""
-        return why_undivided(self._scene, self._integrator)
+    def why_inseparable(self) -> str:
+        """See :meth:`enfilade.renderer.LobeRenderer.why_inseparable`."""
+        return why_inseparable(self._scene, self._integrator)
 
     @property
     def state(self) -> Any:
-        """See :meth:`enfilade.renderer.LightRenderer.state`."""
-        items = self._items
-        own = self._scene, self._integrator, self._onward, items.number, items.is_passable, items.materials
-        return own, self._light.state
+        """See :meth:`enfilade.renderer.LobeRenderer.state`."""
+        shapes = self._shapes
+        own = self._scene, self._integrator, self._onward, shapes.number, shapes.is_null, shapes.materials
+        return own, self._transport.state
 
     @cached_property
-    def lamps(self) -> Lamps:
-        """See :meth:`enfilade.renderer.LightRenderer.lamps`."""
-        return find_lamps(self._scene)
+    def emitters(self) -> Emitters:
+        """See :meth:`enfilade.renderer.LobeRenderer.emitters`."""
+        return find_emitters(self._scene)
 
-    def lit(
-        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, is_whole: bool = False
-    ) -> Lit:
+    def intersect(
+        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False
+    ) -> ShadingPoint:
         """Find the first surface along rays, and the light it emits.
 
         Camera rays look through what lets all pass, and, for a G-buffer, through what :meth:`surfaces` looks
         through; scattered ones meet masks as Mitsuba's own paths do.
         """
-        passed = None if bounce is not None else PASSED_WHOLE if is_whole else PASSED
+        passed = None if bounce is not None else OPAQUE_ONLY_TRANSMITTANCE if opaque_only else PASSED
         surfaces, seen = self._find(rays, active, passed)
-        return Lit(
+        return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(seen.p),
-            emission=self._light.emission(seen, bounce),
-            has_lobe=self._light.has_rest(seen),
+            emission=self._transport.emission(seen, bounce),
+            has_specular=self._transport.has_specular(seen),
             native=seen,
         )
 
-    def light(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LightRenderer.light`."""
-        return self._light.light(lit, rng, edges)
+    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
+        return self._transport.estimate_diffuse(point, rng, path_depth)
 
-    def rest(self, lit: Lit, rng: Any, edges: int = 1) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LightRenderer.rest`."""
-        return self._light.rest(lit, rng, edges)
+    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
+        return self._transport.estimate_specular(point, rng, path_depth)
 
-    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
-        """See :meth:`enfilade.renderer.LightRenderer.scatter_diffuse`."""
-        return self._light.scatter_diffuse(lit, rng)
+    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
+        """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
+        return self._transport.sample_diffuse(point, rng)
 
-    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
-        """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
-        return self._light.scatter(lit, rng, choice)
+    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
+        """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
+        return self._transport.sample_specular(point, rng, choice)
 
     def _find(
-        self, rays: Rays, active: Any = True, passed: float | None = PASSED_WHOLE
+        self, rays: Rays, active: Any = True, passed: float | None = OPAQUE_ONLY_TRANSMITTANCE
     ) -> tuple[Surfaces, Any]:
         """The first surfaces, past those that let through more than a share of the light, if any may."""
         direction = mi.Vector3f(rays.direction)
@@ -197,8 +201,8 @@ class MitsubaRenderer:
             is_hit=is_hit,
             distance=distance / length,
             normal=Array3f(normal),
-            albedo=self._light.albedo(seen, material, is_hit),
-            item=dr.gather(UInt, self._items.number, _registry(seen), is_hit),
+            albedo=self._transport.albedo(seen, material, is_hit),
+            shape_index=dr.gather(UInt, self._shapes.number, _registry(seen), is_hit),
             surface=_surface_class(flags, seen.shape.is_emitter(), is_hit),
         )
         return surfaces, seen
@@ -223,9 +227,9 @@ class MitsubaRenderer:
             random=random,
         )
 
-    def _radiance_onward(self, rays: Rays, rng: Any, edges: int, active: Any) -> Any:
-        """Along rays that have edges of their path behind them."""
-        return self._radiance(rays, rng, self._onward[edges - 1], active)
+    def _radiance_onward(self, rays: Rays, rng: Any, path_depth: int, active: Any) -> Any:
+        """Radiance along rays that begin at this path depth."""
+        return self._radiance(rays, rng, self._onward[path_depth - 1], active)
 
     def _radiance(self, rays: Rays, rng: Any, integrator: Any = None, active: Any = True) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
@@ -242,7 +246,7 @@ class MitsubaRenderer:
         """First interaction of camera rays whose surface does not let that share pass, and its distance."""
         seen = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
         distance = Float(seen.t)
-        if not self._items.any_passable:
+        if not self._shapes.any_null:
             return seen, distance
 
         def look_behind(seen: Any, distance: Any, passing: Any, layer: Any) -> tuple[Any, ...]:
@@ -251,23 +255,23 @@ class MitsubaRenderer:
             )
             distance = dr.select(passing, distance + behind.t, distance)
             seen = dr.select(passing, behind, seen)
-            return seen, distance, passing & self._lets_pass(seen, passed), layer + 1
+            return seen, distance, passing & self._is_null_interaction(seen, passed), layer + 1
 
         seen, distance, _, _ = dr.while_loop(
-            (seen, distance, self._lets_pass(seen, passed), UInt(0)),
+            (seen, distance, self._is_null_interaction(seen, passed), UInt(0)),
             lambda _seen, _distance, passing, layer: passing & (layer < LAYERS),
             look_behind,
             labels=("seen", "distance", "passing", "layer"),
         )
         return seen, distance
 
-    def _lets_pass(self, seen: Any, passed: float) -> Any:
+    def _is_null_interaction(self, seen: Any, passed: float) -> Any:
         """Whether a surface is looked through: one that emits never is, its light would be lost."""
         material = seen.bsdf()
         number: Any = dr.reinterpret_array(mi.UInt32, material)
-        is_passable = dr.gather(Bool, self._items.is_passable, number, seen.is_valid())
-        through = material.eval_null_transmission(seen, is_passable)
-        return is_passable & ~seen.shape.is_emitter() & (mi.luminance(through) > passed)
+        is_null = dr.gather(Bool, self._shapes.is_null, number, seen.is_valid())
+        through = material.eval_null_transmission(seen, is_null)
+        return is_null & ~seen.shape.is_emitter() & (mi.luminance(through) > passed)
 
 
 @contextmanager
@@ -289,38 +293,38 @@ def _threads_to_read(scene: Path) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class _Items:
+class _Shapes:
     """What is known of Mitsuba's shapes and materials, by their numbers in Mitsuba's registry."""
 
     number: Any  # UInt, of a shape
-    is_passable: Any  # Bool, of a material
+    is_null: Any  # Bool, of a material
     materials: Any  # BSDFPtr: tells Dr.Jit to look at all materials there are, also those of no shape
-    any_passable: bool
+    any_null: bool
     names: tuple[str, ...]
 
 
-def _items(scene: Any) -> _Items:
+def _shapes(scene: Any) -> _Shapes:
     shapes = scene.shapes()
     numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes]
     registry = [int(number[0]) for number in numbers]
     number = np.zeros(max(registry) + 1, np.uint32)
     names = []
-    for item, (index, shape) in enumerate(zip(registry, shapes, strict=True), start=1):
-        number[index] = item
-        names.append(shape.id() or f"{shape.class_name()} {item}")
-    is_passable = _passable_materials(scene)
+    for shape_index, (index, shape) in enumerate(zip(registry, shapes, strict=True), start=1):
+        number[index] = shape_index
+        names.append(shape.id() or f"{shape.class_name()} {shape_index}")
+    is_null = _null_materials(scene)
     materials = mi.BSDFPtr([shape.bsdf() for shape in shapes])
-    return _Items(UInt(number), Bool(is_passable), materials, bool(is_passable.any()), tuple(names))
+    return _Shapes(UInt(number), Bool(is_null), materials, bool(is_null.any()), tuple(names))
 
 
-def _passable_materials(scene: Any) -> npt.NDArray[np.bool_]:
+def _null_materials(scene: Any) -> npt.NDArray[np.bool_]:
     """Materials that may let a ray pass, those of instanced shapes included."""
     materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
     numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
     registry = [int(number[0]) for number in numbers]
-    is_passable = np.zeros(max(registry, default=0) + 1, bool)
-    is_passable[registry] = [material.class_name() in LOOKED_THROUGH for material in materials]
-    return is_passable
+    is_null = np.zeros(max(registry, default=0) + 1, bool)
+    is_null[registry] = [material.class_name() in NULL_BSDFS for material in materials]
+    return is_null
 
 
 def _registry(seen: Any) -> Any:
@@ -367,5 +371,5 @@ def _reason(error: Exception) -> str:
     """Mitsuba's last sentence and the list below it, without the places in its code where it was raised."""
     lines = [line.strip() for line in str(error).strip().splitlines()]
     first = max((i for i, line in enumerate(lines) if not line.startswith("- ")), default=0)
-    items = ", ".join(line.removeprefix("- ") for line in lines[first + 1 :])
-    return re.sub(r"\[\w+\.(?:cpp|h):\d+\] ", "", f"{lines[first]} {items}").strip()
+    listed = ", ".join(line.removeprefix("- ") for line in lines[first + 1 :])
+    return re.sub(r"\[\w+\.(?:cpp|h):\d+\] ", "", f"{lines[first]} {listed}").strip()

@@ -9,21 +9,21 @@ import numpy as np
 
 from enfilade.arrays import Array3f, lanes, rows
 from enfilade.kernels.random import R2
-from enfilade.renderer import Lamps
+from enfilade.renderer import Emitters
 
 MOST_POINTS = 1 << 17  # on all lamps together
 POINTS = 64, 1024  # fewest and most on one
 
 
-def find_lamps(scene: Any) -> Lamps:
+def find_emitters(scene: Any) -> Emitters:
     """Points all over the surfaces that emit; none of an environment, or of a light without a surface."""
-    shapes = [(item, shape) for item, shape in enumerate(scene.shapes(), start=1) if shape.is_emitter()]
+    shapes = [(index, shape) for index, shape in enumerate(scene.shapes(), start=1) if shape.is_emitter()]
     count = int(np.clip(MOST_POINTS // max(len(shapes), 1), *POINTS))
     square = mi.Point2f(
         *(lanes(np.mod(step / 2**32 * np.arange(count), 1.0).astype(np.float32)) for step in R2)
     )
     points = [rows(Array3f(shape.sample_position(0.0, square).p)) for _, shape in shapes]
-    return Lamps(
+    return Emitters(
         np.concatenate([np.zeros((0, 3), np.float32), *points]),
-        np.repeat(np.array([item for item, _ in shapes], np.uint32), count),
+        np.repeat(np.array([index for index, _ in shapes], np.uint32), count),
     )

@@ -1,4 +1,4 @@
-"""The light apart from the surfaces: what ``renderer.LightRenderer`` asks, answered by Mitsuba."""
+"""The light apart from the surfaces: what ``renderer.LobeRenderer`` asks, answered by Mitsuba."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool
-from enfilade.records import LEAST_ALBEDO
-from enfilade.renderer import Bounce, Lit, Rays, Scattered
+from enfilade.records import MIN_DIFFUSE_ALBEDO
+from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
 
 
-class Light:
+class LightTransport:
     """Emission, light samples and bounces of a Mitsuba scene.
 
     Parameters
     ----------
     scene : mitsuba.Scene
     radiance
-        The path tracer: radiance along rays, given a random number generator for each, how many edges
-        their paths have behind them, and which are to be traced.
+        The path tracer: radiance along rays, given a random number generator for each, the
+        path depth at which they begin, and which of them are traced.
     """
 
     def __init__(self, scene: Any, radiance: Radiance) -> None:
@@ -52,21 +52,21 @@ class Light:
         sampled = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _balance(bounce.pdf, sampled)))
 
-    def has_rest(self, seen: Any) -> Any:
+    def has_specular(self, seen: Any) -> Any:
         """Whether a hit's material is more than a diffuse lobe."""
-        return self._lobes.has_rest(seen, seen.bsdf())
+        return self._lobes.has_specular(seen, seen.bsdf())
 
-    def light(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LightRenderer.light`."""
-        return self._onward(self.scatter_diffuse(lit, rng), rng, edges)
+    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
+        return self._onward(self.sample_diffuse(point, rng), rng, path_depth)
 
-    def rest(self, lit: Lit, rng: Any, edges: int) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LightRenderer.rest`."""
-        return self._onward(self.scatter(lit, rng), rng, edges)
+    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int) -> tuple[Any, Any]:
+        """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
+        return self._onward(self.sample_specular(point, rng), rng, path_depth)
 
-    def _onward(self, lobe: Scattered, rng: Any, edges: int) -> tuple[Any, Any]:
+    def _onward(self, lobe: BsdfSample, rng: Any, path_depth: int) -> tuple[Any, Any]:
         """What a lobe sends: sampled lights, and what the path tracer finds, its first emitter weighted."""
-        found = self._radiance(lobe.rays, rng, edges, lobe.is_alive)
+        found = self._radiance(lobe.rays, rng, path_depth, lobe.is_alive)
         ray = mi.Ray3f(mi.Point3f(lobe.rays.origin), mi.Vector3f(lobe.rays.direction))
         following = self._scene.ray_intersect(ray, lobe.is_alive)
         whole = following.emitter(self._scene).eval(following, lobe.is_alive)
@@ -75,15 +75,15 @@ class Light:
         indirect = dr.select(lobe.is_alive, lobe.throughput * (found - whole), 0.0)
         return Array3f(direct), Array3f(indirect)
 
-    def scatter_diffuse(self, lit: Lit, rng: Any) -> Scattered:
-        """See :meth:`enfilade.renderer.LightRenderer.scatter_diffuse`."""
-        seen, albedo = lit.native, lit.surfaces.albedo
-        active = seen.is_valid() & (dr.max(albedo) > LEAST_ALBEDO)
+    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
+        """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
+        seen, albedo = point.native, point.surfaces.albedo
+        active = seen.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         material = seen.bsdf()
         direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active, albedo)
         wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
         ray = seen.spawn_ray(seen.to_world(wo))
-        return Scattered(
+        return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
             bounce=Bounce(Array3f(seen.p), pdf, Bool(False)),
             throughput=_divided(weight, albedo),
@@ -91,21 +91,21 @@ class Light:
             is_alive=Bool(active & (pdf > 0.0)),
         )
 
-    def scatter(self, lit: Lit, rng: Any, choice: Any = None) -> Scattered:
-        """See :meth:`enfilade.renderer.LightRenderer.scatter`."""
-        seen = lit.native
+    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
+        """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
+        seen = point.native
         material = seen.bsdf()
-        wo, pdf, weight, is_delta = self._lobes.sample_rest(seen, material, rng, choice)
+        wo, pdf, weight, is_delta = self._lobes.sample_specular(seen, material, rng, choice)
         # Mirrors and clear glass send nothing from a point on a light: its shadow ray is spared.
-        is_spread = lit.has_lobe & self._lobes.has_spread_rest(seen, material)
-        direct = self._sampled_lights(seen, material, self._lobes.eval_rest, rng, is_spread)
+        is_spread = point.has_specular & self._lobes.has_glossy(seen, material)
+        direct = self._sampled_lights(seen, material, self._lobes.eval_specular, rng, is_spread)
         ray = seen.spawn_ray(seen.to_world(wo))
-        return Scattered(
+        return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
             bounce=Bounce(Array3f(seen.p), pdf, Bool(is_delta)),
             throughput=Array3f(weight),
             direct=Array3f(direct),
-            is_alive=Bool(lit.has_lobe & (pdf > 0.0)),
+            is_alive=Bool(point.has_specular & (pdf > 0.0)),
         )
 
     def _sampled_lights(
@@ -129,8 +129,13 @@ def _divided(lobe: Any, albedo: Any) -> Any:
     """
     channels = list(zip(Array3f(lobe), Array3f(albedo), strict=True))
     most = dr.max(Array3f(albedo))
-    brightest = dr.select(most > LEAST_ALBEDO, dr.max(Array3f(lobe)) / dr.maximum(most, LEAST_ALBEDO), 0.0)
-    quotients = (dr.select(a > LEAST_ALBEDO, v / dr.maximum(a, LEAST_ALBEDO), brightest) for v, a in channels)
+    brightest = dr.select(
+        most > MIN_DIFFUSE_ALBEDO, dr.max(Array3f(lobe)) / dr.maximum(most, MIN_DIFFUSE_ALBEDO), 0.0
+    )
+    quotients = (
+        dr.select(a > MIN_DIFFUSE_ALBEDO, v / dr.maximum(a, MIN_DIFFUSE_ALBEDO), brightest)
+        for v, a in channels
+    )
     return Array3f(*quotients)
 
 
