@@ -37,14 +37,14 @@ LOBE_LAYERS = ("reflected", "transmitted")  # of what lobes scatter: the latter 
 MIN_DIFFUSE_ALBEDO = 1e-4  # below it a surface counts as having no diffuse lobe
 
 
-class Source(IntEnum):
-    """Why a pixel has its value."""
+class Provenance(IntEnum):
+    """The origin of a pixel's value."""
 
     KEYFRAME = 0
     REUSED = 1
     SLOW = 2
     SPECULAR = 3
-    HOLE = 4
+    DISOCCLUDED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,31 +180,6 @@ class Keyframe:
 
 
 @dataclass(frozen=True, eq=False)
-class LightPage:
-    """The light that falls on what a frame sees.
-
-    Attributes
-    ----------
-    frame : int
-    geometry : Geometry
-    direct, indirect : Shading
-        Radiance that the diffuse lobe would send if the albedo were one, by light straight from emitters and
-        by all other; 0 where it is not known.
-    is_known : (H, W) bool
-        Pixels whose light was estimated.
-    """
-
-    frame: int
-    geometry: Geometry
-    direct: Shading
-    indirect: Shading
-    is_known: Mask
-
-    def __post_init__(self) -> None:
-        _check(self.is_known, self.direct.variance.shape, np.bool_, "is_known")
-
-
-@dataclass(frozen=True, eq=False)
 class Warped:
     """A keyframe, or what remains of it, seen from another camera (§2.2).
 
@@ -241,28 +216,28 @@ class Warped:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A frame on its way to the video: colours, and why each pixel has its own.
+    """The colours of a frame, and the origin of each pixel's value.
 
     Attributes
     ----------
     color : (H, W, 3) float32
         Linear Rec.709 radiance.
-    source : (H, W) uint8
-        :class:`Source`.
+    provenance : (H, W) uint8
+        :class:`Provenance`.
     """
 
     color: F32
-    source: U8
+    provenance: U8
 
     def __post_init__(self) -> None:
-        _check(self.color, (*self.source.shape, 3), np.float32, "color")
-        _check(self.source, self.color.shape[:2], np.uint8, "source")
+        _check(self.color, (*self.provenance.shape, 3), np.float32, "color")
+        _check(self.provenance, self.color.shape[:2], np.uint8, "provenance")
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of pixels by source, by its name in lower case."""
-        counts = np.bincount(self.source.ravel(), minlength=len(Source))
-        return {source.name.lower(): int(counts[source]) for source in Source}
+        """Number of pixels by provenance, by its name in lower case."""
+        counts = np.bincount(self.provenance.ravel(), minlength=len(Provenance))
+        return {of.name.lower(): int(counts[of]) for of in Provenance}
 
 
 def _check(array: npt.NDArray[Any], shape: tuple[int, ...], kind: type, name: str) -> None:

@@ -25,7 +25,7 @@ from enfilade.pipeline.finish import delivered_layers
 from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.survey import initial_segments, survey_path
 from enfilade.pipeline.views import Views
-from enfilade.records import F32, Source
+from enfilade.records import F32, Provenance
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.settings import LAYERS
 from enfilade.store import Run
@@ -122,7 +122,7 @@ class EveryFrame:
             return
         path = self.job.path
         view = Views(renderer, path, self.job.viewing, Costs())[frame]
-        source = np.full(color.shape[:2], Source.KEYFRAME, np.uint8)
+        source = np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8)
         write_result(file, color, delivered_layers(LAYERS, view, source))
 
     def _identity(self, renderer: Renderer) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.errors import SettingsError
-from enfilade.kernels.convolve import SIGMAS
+from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper import spatial_support_px
 from enfilade.methods.paper.masks import slow_pixels
 from enfilade.monitor import Monitor

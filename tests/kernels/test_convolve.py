@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import image, lanes
-from enfilade.kernels.convolve import blur_axis
+from enfilade.methods.paper.convolve import blur_axis
 from enfilade.methods.paper import reconstruct
 from twins.blur import blurred, blurred_rows
 

@@ -5,7 +5,7 @@ import pytest
 
 from enfilade.arrays import Array3f, UInt, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.kernels.lookup import FLOOR, Page, footprint, lookup, packed
+from enfilade.methods.decoupled.lookup import FLOOR, Page, footprint, lookup, packed
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import Array2f, Bool, Float
-from enfilade.kernels.splat import EMPTY, INFINITE, Splats, splat_nearest
+from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
 from twins.splat import nearest
 
 W, H = 24, 17

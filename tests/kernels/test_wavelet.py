@@ -7,7 +7,7 @@ import pytest
 
 from enfilade.arrays import image, lanes, matrix3
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.kernels.wavelet import (
+from enfilade.methods.decoupled.wavelet import (
     Guide,
     share_without_speckles,
     smooth,

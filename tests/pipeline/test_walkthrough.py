@@ -20,7 +20,7 @@ from enfilade.pipeline.job import Job, open_renderer
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.walkthrough import kept, prepare, render
 from enfilade.pipeline.workshop import Workshop
-from enfilade.records import Source, SurfaceClass
+from enfilade.records import Provenance, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
 from enfilade.store import Run

@@ -16,7 +16,7 @@ from enfilade.images import read_exr, write_exr
 from enfilade.images.view import open_view
 from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Silence
-from enfilade.records import Source
+from enfilade.records import Provenance
 from enfilade.report.film import encode_film
 from enfilade.report.layers import SOURCE_COLORS
 from enfilade.report.page import Wishes, write_page
@@ -98,8 +98,8 @@ def test_the_pictures_are_those_of_the_files(runs, page_file):
     shown = picture(data, 3, "result").astype(float)
     assert np.abs(shown - expected).mean() < 6.0  # WebP loses a little, most at edges of colour
     mapped = picture(data, 3, "source")
-    assert set(np.unique(layers["source"])) >= {Source.REUSED, Source.SPECULAR}
-    assert (mapped[layers["source"] == Source.REUSED][:, 3] == 0).all()
+    assert set(np.unique(layers["source"])) >= {Provenance.REUSED, Provenance.SPECULAR}
+    assert (mapped[layers["source"] == Provenance.REUSED][:, 3] == 0).all()
     for source, color in SOURCE_COLORS.items():
         assert (mapped[layers["source"] == source] == [*bytes.fromhex(color[1:]), 255]).all()
 

@@ -1,4 +1,4 @@
-"""Twin of `enfilade.kernels.splat`: every source pixel against every target pixel, float64."""
+"""Twin of `enfilade.methods.paper.splat`: every source pixel against every target pixel, float64."""
 
 import numpy as np
 

@@ -1,7 +1,8 @@
 """The seam between methods and runs: tasks, passes, and what a method is.
 
-A method says how frames come from a scene and a camera path, as passes in order; a pass maps records of earlier
-passes to new records, one task a frame. A method contains no file, ledger, executor or progress bar:
+A method says how frames come from a scene and a camera path, as passes in order; a pass maps records of
+earlier passes to new records, one task a frame. A method contains no file, ledger, executor or progress
+bar:
 :mod:`enfilade.runs` schedules, stores and resumes its tasks, and a test can call it with a few arrays.
 ``reference.py`` is the shortest example.
 """

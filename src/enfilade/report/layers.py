@@ -9,7 +9,7 @@ import numpy as np
 
 from enfilade.images.view import View
 from enfilade.metric.pooling import detection_probability
-from enfilade.records import F32, U8, Source
+from enfilade.records import F32, U8, Provenance
 from enfilade.report import heatmap
 from enfilade.report.against import Beside
 from enfilade.report.scales import DIFFERENCE, VELOCITY, Scale
@@ -19,16 +19,16 @@ from enfilade.viewing import Viewing
 __all__ = ["LAYERS", "SOURCE_COLORS", "Layer", "painted"]
 
 SOURCE_COLORS = {  # Okabe and Ito's, told apart with any of the common colour deficiencies
-    Source.SLOW: "#56B4E9",
-    Source.SPECULAR: "#E69F00",
-    Source.HOLE: "#009E73",
-    Source.KEYFRAME: "#CC79A7",
+    Provenance.SLOW: "#56B4E9",
+    Provenance.SPECULAR: "#E69F00",
+    Provenance.DISOCCLUDED: "#009E73",
+    Provenance.KEYFRAME: "#CC79A7",
 }
 SOURCE_NAMES = {
-    Source.SLOW: "slow",
-    Source.SPECULAR: "specular",
-    Source.HOLE: "hole",
-    Source.KEYFRAME: "keyframe",
+    Provenance.SLOW: "slow",
+    Provenance.SPECULAR: "specular",
+    Provenance.DISOCCLUDED: "hole",
+    Provenance.KEYFRAME: "keyframe",
 }
 QUALITY = 92  # of WebP
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from enfilade.records import Source
+from enfilade.records import Provenance
 from enfilade.report.layers import SOURCE_COLORS
 
 __all__ = ["PURPOSES", "counts_rays", "panels"]
@@ -17,18 +17,18 @@ __all__ = ["PURPOSES", "counts_rays", "panels"]
 Panel = dict[str, Any]
 BLUE, VERMILION, GREEN = "#3D8FC6", "#D55E00", "#009E73"
 REASONS = {  # of a row of the summary: name, colour
-    "slow": ("slow", SOURCE_COLORS[Source.SLOW]),
-    "specular": ("specular", SOURCE_COLORS[Source.SPECULAR]),
-    "hole": ("holes", SOURCE_COLORS[Source.HOLE]),
-    "keyframe": ("keyframes", SOURCE_COLORS[Source.KEYFRAME]),
+    "slow": ("slow", SOURCE_COLORS[Provenance.SLOW]),
+    "specular": ("specular", SOURCE_COLORS[Provenance.SPECULAR]),
+    "hole": ("holes", SOURCE_COLORS[Provenance.DISOCCLUDED]),
+    "keyframe": ("keyframes", SOURCE_COLORS[Provenance.KEYFRAME]),
 }
 
 
 PURPOSES = {  # sent for: name, colour
-    "camera": ("what is seen", SOURCE_COLORS[Source.SLOW]),
-    "lobes": ("mirrors, glass and gloss", SOURCE_COLORS[Source.SPECULAR]),
-    "light": ("light of keyframes", SOURCE_COLORS[Source.KEYFRAME]),
-    "drafts": ("drafts of it", SOURCE_COLORS[Source.HOLE]),
+    "camera": ("what is seen", SOURCE_COLORS[Provenance.SLOW]),
+    "lobes": ("mirrors, glass and gloss", SOURCE_COLORS[Provenance.SPECULAR]),
+    "light": ("light of keyframes", SOURCE_COLORS[Provenance.KEYFRAME]),
+    "drafts": ("drafts of it", SOURCE_COLORS[Provenance.DISOCCLUDED]),
 }
 
 

@@ -35,7 +35,7 @@ class SeenFrame:
     color : (H, W, 3) float32
         Linear Rec.709.
     source : (H, W) uint8 or None
-        :class:`~enfilade.records.Source`; None where the file has no such layer.
+        :class:`~enfilade.records.Provenance`; None where the file has no such layer.
     flow : Flow or None
         Pixels per frame; None where the file has no such layers.
     is_raw : bool

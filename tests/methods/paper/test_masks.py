@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper.masks import emitter_pixels, slow_pixels, sources, specular_pixels, unseen_items
-from enfilade.records import Geometry, Source, SurfaceClass
+from enfilade.records import Geometry, Provenance, SurfaceClass
 from enfilade.renderer import Emitters
 from enfilade.settings import MaskSettings
 
@@ -62,13 +62,13 @@ def test_each_pixel_is_counted_once_in_the_papers_order(is_slow, is_specular, is
     got = sources(is_slow, is_specular, is_hole)
     for index in np.ndindex(got.shape):
         if is_slow[index]:
-            expected = Source.SLOW
+            expected = Provenance.SLOW
         elif is_specular[index]:
-            expected = Source.SPECULAR
+            expected = Provenance.SPECULAR
         elif is_hole[index]:
-            expected = Source.HOLE
+            expected = Provenance.DISOCCLUDED
         else:
-            expected = Source.REUSED
+            expected = Provenance.REUSED
         assert got[index] == expected
     assert got.dtype == np.uint8
     assert np.bincount(got.ravel(), minlength=5).sum() == got.size

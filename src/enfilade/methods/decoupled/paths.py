@@ -1,4 +1,4 @@
-"""Paths on their way through a scene, as lanes: lists of them that grow shorter from bounce to bounce."""
+"""Paths through a scene, as lanes: lists that are compacted from bounce to bounce."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from enfilade.arrays import PCG32, Array3f, Float, UInt
 from enfilade.kernels.replay import padded
 from enfilade.renderer import Bounce, Rays, ShadingPoint
 
-__all__ = ["Path", "begun", "chosen", "scatter_add"]
+__all__ = ["Path", "compact", "scatter_add", "spawn"]
 
 
 @dataclass(frozen=True)
 class Path:
-    """A lane's path so far: a ray on its way to a surface.
+    """The state of a path: a ray on its way to a surface.
 
     Attributes
     ----------
     lane : UInt
-        Where its light goes.
+        Index of the pixel sample that receives its radiance.
     rays : Rays
     bounce : Bounce or None
-        None for camera rays.
+        The last bounce; None for camera rays.
     throughput : Array3f
     width, spread : Float
-        Of the path where the ray begins, scene units, and what it gains by unit of length.
+        Width of the path at the ray's origin, scene units, and its growth by unit of length.
     rng : PCG32
     """
 
@@ -40,17 +40,17 @@ class Path:
     rng: Any
 
     @property
-    def carries(self) -> Any:
-        """Whether it brings anything: those that have ended or only fill up a list do not; Bool."""
+    def is_active(self) -> Any:
+        """Whether the path has any throughput: terminated and padding paths have none; Bool."""
         return dr.max(dr.abs(self.throughput)) > 0.0
 
     def width_at(self, point: ShadingPoint) -> Any:
-        """Of the path where it meets a surface, scene units; Float."""
+        """Width of the path where it meets a surface, scene units; Float."""
         return self.width + self.spread * point.surfaces.distance * dr.norm(self.rays.direction)
 
 
-def begun(rays: Rays, rng: Any, spread: float) -> Path:
-    """Paths from the camera, one a ray."""
+def spawn(rays: Rays, rng: Any, spread: float) -> Path:
+    """Camera paths, one a ray."""
     count = dr.width(rng.state)
     path = Path(
         lane=dr.arange(UInt, count),
@@ -61,13 +61,13 @@ def begun(rays: Rays, rng: Any, spread: float) -> Path:
         spread=dr.opaque(Float, spread, count),
         rng=rng,
     )
-    # Now, and not while a kernel is recorded: then no memory of NumPy's can be let go.
+    # Evaluate now: memory of NumPy's can't be freed while a kernel is recorded.
     dr.eval(path)
     return path
 
 
-def chosen(path: Path, lanes: Any) -> Path:
-    """Paths of some lanes; what is added to have enough of them carries nothing."""
+def compact(path: Path, lanes: Any) -> Path:
+    """The paths of some lanes; paths added as padding are not active."""
     if not dr.width(lanes):
         return Path(UInt(), path.rays, path.bounce, path.throughput, path.width, path.spread, path.rng)
     lanes, is_real = padded(lanes)
@@ -84,9 +84,9 @@ def chosen(path: Path, lanes: Any) -> Path:
     return taken
 
 
-def scatter_add(radiance: Any, sent: Any, lane: Any) -> None:
-    """Add to each lane's radiance. A lane has one path that carries anything."""
-    for target, value in zip(radiance, sent, strict=True):
-        # Told that nothing meets there, Dr.Jit needs neither atomics nor copies, and no kernel for each size.
+def scatter_add(radiance: Any, contribution: Any, lane: Any) -> None:
+    """Add to the radiance of each lane, to which at most one active path contributes."""
+    for target, value in zip(radiance, contribution, strict=True):
+        # Without conflicts Dr.Jit needs neither atomics nor copies, and no kernel for each size.
         dr.scatter_add(target, Float(value), lane, value != 0.0, dr.ReduceMode.NoConflicts)
     dr.eval(radiance)

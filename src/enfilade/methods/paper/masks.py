@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.records import F32, U8, Geometry, Mask, Source
+from enfilade.records import F32, U8, Geometry, Mask, Provenance
 from enfilade.renderer import Emitters
 from enfilade.settings import MaskSettings
 
@@ -20,7 +20,9 @@ def slow_pixels(speed_deg_s: F32, settings: MaskSettings) -> Mask:
     return speed_deg_s < settings.slow_deg_s
 
 
-def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings) -> frozenset[int]:
+def reusable_specular_shapes(
+    jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings
+) -> frozenset[int]:
     """Specular shapes whose reuse is not seen (§4.3 step 4b, thresholds of §6).
 
     Each connected region of a specular shape is judged by itself: when a group of its pixels differs
@@ -60,24 +62,24 @@ def unseen_items(jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSe
 
 
 def specular_pixels(geometry: Geometry, unseen: frozenset[int]) -> Mask:
-    """Pixels that must be traced since they shine, (H, W): all but those of `unseen_items`."""
+    """Pixels that must be traced since they shine, (H, W): all but those of `reusable_specular_shapes`."""
     must: Mask = geometry.is_specular & ~np.isin(geometry.shape_index, list(unseen))
     return must
 
 
-def sources(is_slow: Mask, is_specular: Mask, is_hole: Mask) -> U8:
+def provenance_of(is_slow: Mask, is_specular: Mask, is_disoccluded: Mask) -> U8:
     """Why each pixel of an in-between has its value, each counted once, in the paper's order (§6).
 
     Returns
     -------
     (H, W) uint8
-        ``records.Source``: slow before specular before hole; the rest is reused.
+        ``records.Provenance``: slow before specular before hole; the rest is reused.
     """
-    source = np.full(is_slow.shape, Source.REUSED, np.uint8)
-    source[is_hole] = Source.HOLE
-    source[is_specular] = Source.SPECULAR
-    source[is_slow] = Source.SLOW
-    return source
+    provenance = np.full(is_slow.shape, Provenance.REUSED, np.uint8)
+    provenance[is_disoccluded] = Provenance.DISOCCLUDED
+    provenance[is_specular] = Provenance.SPECULAR
+    provenance[is_slow] = Provenance.SLOW
+    return provenance
 
 
 def emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:

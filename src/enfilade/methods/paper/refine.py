@@ -10,8 +10,8 @@ import numpy as np
 
 from enfilade.camera.path import Segment
 from enfilade.gbuffer import View
-from enfilade.kernels.convolve import SIGMAS
 from enfilade.methods.paper.composite import agrees
+from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.masks import reusable_specular_shapes, slow_pixels, specular_pixels
 from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.support import spatial_support_px
@@ -89,8 +89,8 @@ def leaf_of(results: Sequence[SegmentResult], frame: int) -> SegmentResult:
 class Refinement:
     """Splits segments until the metric sees no difference between what is reused and what would be traced.
 
-    Splitting also ends where it does not help: differences that do not shrink with the segment, such as the aliasing
-    of keyframes sampled at pixel centres, are not differences of reuse.
+    Splitting also ends where it does not help: differences that do not shrink with the segment, such as the
+    aliasing of keyframes sampled at pixel centres, are not differences of reuse.
 
     Parameters
     ----------
@@ -160,7 +160,8 @@ class Refinement:
     def _differences(self, view: View, before: Warped, after: Warped, is_judged: Mask) -> tuple[F32, F32]:
         """JND maps between two warped keyframes, with smooth pursuit and without.
 
-        Both are filtered as the delivered frame will be. A difference that their noise explains does not count.
+        Both are filtered as the delivered frame will be. A difference that their noise explains does not
+        count.
         """
         walk = self._walk
         density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enfilade.arrays import image, lanes
-from enfilade.kernels.convolve import blur_axis
+from enfilade.methods.paper.convolve import blur_axis
 from enfilade.records import F32
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import drjit as dr
 
 from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, opaque, pixel_grid
-from enfilade.kernels.convolve import SIGMAS
 from enfilade.kernels.gather import sample
+from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.support import COVERED_PX, TemporalLimits
 from enfilade.records import F32, Flow, Geometry
 from enfilade.settings import AntialiasSettings

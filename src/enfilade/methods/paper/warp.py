@@ -12,7 +12,7 @@ from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3
 from enfilade.camera.pinhole import Camera, planar_warp
 from enfilade.kernels.gather import bilinear_taps
 from enfilade.kernels.reproject import reproject, warp_jacobian
-from enfilade.kernels.splat import EMPTY, INFINITE, Splats, splat_nearest
+from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
 from enfilade.records import F32, U32, Geometry, Keyframe, Warped
 from enfilade.settings import WarpSettings
 

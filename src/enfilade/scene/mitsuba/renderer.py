@@ -44,7 +44,6 @@ from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_
 from enfilade.scene.mitsuba.lobes import has_lobe
 from enfilade.scene.mitsuba.transport import LightTransport
 from enfilade.scene.scenefile import fingerprint, named_files, why_unreadable
-from enfilade.settings import TraceSettings
 
 LAYERS = 32  # surfaces that let everything pass, looked through before giving up
 OPAQUE_ONLY_TRANSMITTANCE = (
@@ -62,8 +61,10 @@ class MitsubaRenderer:
     ----------
     file
         A scene in Mitsuba's XML format, version 3.
-    settings
-        Longest path, and how many paths may be in flight.
+    max_depth
+        Longest path, in edges; 0: as the scene's integrator has it.
+    chunk
+        Paths in flight at once.
 
     Raises
     ------
@@ -71,7 +72,7 @@ class MitsubaRenderer:
         The file is missing, malformed, or refused by Mitsuba.
     """
 
-    def __init__(self, file: Path, settings: TraceSettings) -> None:
+    def __init__(self, file: Path, *, max_depth: int = 0, chunk: int = 1 << 20) -> None:
         if not file.is_file():
             raise SceneError(f"there is no scene file {file}")
         self._device = active()
@@ -95,8 +96,8 @@ class MitsubaRenderer:
         if not scene.emitters():
             raise SceneError(f"{file} has no light, every frame would be black: add an <emitter>")
         self._scene = scene
-        self._chunk = settings.chunk
-        self._integrator = scene_integrator(scene, settings.max_depth)
+        self._chunk = chunk
+        self._integrator = scene_integrator(scene, max_depth)
         self._onward = [
             shortened(self._integrator, path_depth) for path_depth in range(1, MAX_PATH_DEPTH + 1)
         ]

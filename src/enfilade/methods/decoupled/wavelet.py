@@ -1,4 +1,4 @@
-"""Edge-avoiding wavelets: noise is smoothed along surfaces and not across what is there."""
+"""Edge-avoiding wavelets: noise is smoothed along surfaces, and not across features."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, opaque, pixel_grid
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 TINY = 1e-8
-ALL = 1e12  # deviations: no difference is too much
-# Neighbours of a later level have been averaged over the same pixels: of what independent ones would take off
-# the logarithm of the variance, they take off this part (exact for a flat image), 0.535 from the fifth on.
+ALL = 1e12  # deviations: any difference
+# Neighbours at a later level are averages over common pixels. They reduce the logarithm of the variance by
+# this part of what independent ones would (exact for a flat image), by 0.535 from the fifth level on.
 INDEPENDENT = (1.0, 0.613, 0.552, 0.539)
 
 
@@ -49,7 +49,7 @@ class Guide:
 
 
 def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: float) -> tuple[Any, Any]:
-    """Smooth an image along its surfaces, as far as its noise asks for.
+    """Smooth an image along its surfaces, as far as its noise requires.
 
     Edge-avoiding a-trous wavelets (Dammertz et al. 2010), guided by the variance (Schied et al. 2017).
 
@@ -68,9 +68,9 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
     -------
     color : Array3f
     variance : Float
-        What is left of it.
+        Of the result.
     """
-    related = Float(1)  # variance that is left, by what it would be if all pixels were independent
+    related = Float(1)  # variance of the result over that of independent pixels
     for level in range(levels):
         color, variance, share = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
         part = INDEPENDENT[level] if level < len(INDEPENDENT) else 0.535
@@ -80,7 +80,8 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
 
 
 def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float) -> tuple[Any, Any, Any]:
-    """Colour, variance as if all pixels were independent, and what part of it such a mean leaves."""
+    """One level: colour, its variance as of independent pixels, and that over the variance before."""
+    # Blur the variance, and take luminance as the measure of difference.
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
@@ -88,6 +89,7 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
     dr.eval(spread)
     luminance = dr.dot(color, Array3f(*LUMINANCE))
 
+    # Prepare the distance of a tap from this pixel's tangent plane.
     normal = dr.gather(Array3f, guide.normals, lane)
     depth = dr.gather(Float, guide.depths, lane)
     shape_index = dr.gather(UInt, guide.shape_indices, lane)
@@ -104,10 +106,11 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
             if not across and not down:
                 weight += Float(weight_x * weight_y)
                 continue
+            # Weight the tap by surface, then by luminance in units of the noise, the same seen from both
+            # sides.
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.shape_indices, tap) == shape_index)
             other = dr.gather(Array3f, color, tap)
-            # By the deviation of the difference: the same seen from both sides.
             deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
             difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) / deviation
             beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
@@ -122,8 +125,8 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
             squares += share * share
             weight += surface
             taken += share
-    # What differs too much is not left out of a mean, which would lose the light that few pixels have found:
-    # both keep what they have.
+    # Replace the weight of taps that differ too much by the pixel itself: leaving them out of the mean
+    # would lose light that few pixels have found.
     own = weight - taken
     total += own * color
     total_variance += own * own * variance
@@ -132,10 +135,10 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
     return total / weight, total_variance / whole, squares / whole
 
 
-def with_spread_speckles(
+def spread_fireflies(
     color: Any, variance: Any, guide: Guide, *, times: float, levels: int
 ) -> tuple[Any, Any]:
-    """An image whose speckles are spread along their surfaces: no light is lost.
+    """Spread the fireflies of an image along their surfaces; the total energy stays.
 
     Parameters
     ----------
@@ -144,7 +147,7 @@ def with_spread_speckles(
         Of the luminance.
     guide
     times
-        The second brightest neighbour's luminance, since speckles come in pairs, too: where more is spread.
+        Limit, in units of the second brightest neighbour's luminance, as fireflies come in pairs, too.
     levels
         Of the wavelet that spreads it, as of :func:`smooth`.
 
@@ -153,7 +156,7 @@ def with_spread_speckles(
     color : Array3f
     variance : Float
     """
-    kept = share_without_speckles(color, width=guide.width, height=guide.height, times=times, rank=2)
+    kept = firefly_weights(color, width=guide.width, height=guide.height, times=times, rank=2)
     beyond = 1.0 - kept
     spread, spread_variance = smooth(
         beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
@@ -161,11 +164,8 @@ def with_spread_speckles(
     return kept * color + spread, kept * kept * variance + spread_variance
 
 
-def share_without_speckles(color: Any, *, width: int, height: int, times: float, rank: int = 1) -> Any:
-    """What part of each pixel of an image does not outshine all its neighbours; Float.
-
-    A rare path that finds much light makes one pixel glare. No smoothing spreads so much over so few pixels:
-    it becomes a blot. Where it is cut, a little light is lost.
+def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: int = 1) -> Any:
+    """Factors that clamp the fireflies of an image to a multiple of their neighbours; Float.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def share_without_speckles(color: Any, *, width: int, height: int, times: float,
         Image, width * height lanes.
     width, height
     times
-        The brightest neighbour's luminance: what is beyond that is cut.
+        Limit, in units of a neighbour's luminance.
     rank
         1 for the brightest neighbour, 2 for the second brightest.
     """
@@ -194,10 +194,10 @@ def share_without_speckles(color: Any, *, width: int, height: int, times: float,
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
 
-def with_soft_edges(color: Any, shape_indices: Any, *, width: int, height: int, sigma: float) -> Any:
-    """An image whose edges between shapes are as soft as a Gaussian pixel filter makes them; Array3f.
+def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sigma: float) -> Any:
+    """Antialias the edges between shapes as a Gaussian pixel filter does; Array3f.
 
-    Smoothing takes each pixel for the shape at its centre: edges become stairs.
+    Smoothing treats each pixel as the shape at its centre, which leaves stairs.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def with_soft_edges(color: Any, shape_indices: Any, *, width: int, height: int, 
 
 
 def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
-    """Variance over 3x3 pixels: that of a single one is noise itself."""
+    """Variance averaged over 3x3 pixels, since that of a single one is noisy."""
     spread = Float(0)
     for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
         for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):

@@ -1,4 +1,4 @@
-"""Reverse lookup: what a keyframe knows of a point on a surface."""
+"""Lookup of images at points in the world, by reverse reprojection."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import drjit as dr
 from enfilade.arrays import Array3f, Float, Int, UInt
 
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
-FLOOR = 1e-3  # weight that each agreeing tap has at least: a lone one at the border still counts
+MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
 
 
 @dataclass(frozen=True)
-class Page:
-    """A keyframe as lanes and matrices.
+class UploadedImage:
+    """Values at the surfaces that a camera sees, on the device.
 
     Attributes
     ----------
     depths : Float
     shape_indices : UInt
-        Images, width * height lanes; where a pixel is not known, its depth is 0.
+        Images, width * height lanes; the depth of unknown pixels is 0.
     normals : UInt or None
-        The same, of :func:`packed`. None for surfaces whose normals say nothing.
+        Of :func:`packed`; None where normals are not compared, as those of virtual images.
     values : tuple of Array3f
     variances : tuple of Float
-        The same, one a layer.
+        One a layer.
     eye : Array3f
     direction_from_pixel, pixel_from_direction : Matrix3f
         Of the camera.
@@ -47,7 +47,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Found:
-    """What a page knows of points, as lanes.
+    """Values found at points, as lanes.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Found:
     variances : tuple of Float
         Weighted sums of the variances.
     weight : Float
-        Sum of the weights; 0 where the page does not know the surface, at most about one.
+        Sum of the weights; 0 where the surface is not in the image, at most about one.
     """
 
     totals: tuple[Any, ...]
@@ -64,20 +64,22 @@ class Found:
     weight: Any
 
 
-def lookup(position: Any, normal: Any, shape_index: Any, page: Page, *, plane_tolerance: float) -> Found:
-    """Interpolate a keyframe's values at points in the world.
+def lookup(
+    position: Any, normal: Any, shape_index: Any, image: UploadedImage, *, plane_tolerance: float
+) -> Found:
+    """Interpolate an image at points in the world.
 
-    Of the four pixels around a point's projection those count that see the same shape, within a
-    tolerance of the point's own tangent plane: surfaces that hide it, or that meet it at an edge,
-    do not. Those whose normals differ count less, by the cosine: the light on them differs, too. A page
-    that looked at the other side of the surface knows nothing.
+    Of the four pixels around a point's projection those are valid that show the same shape, within a
+    tolerance of the point's tangent plane: pixels of surfaces that occlude it, or meet it at an edge, are
+    not. Pixels are weighted by the cosine between the normals, as the light differs, too. Images of the
+    other side of a surface are not used.
 
     Parameters
     ----------
     position, normal : Array3f
-        Points in the world, and the normals of their surfaces on the side that is asked about, of any length.
+        Points in the world, and surface normals on the side that is shaded, of any length.
     shape_index : UInt
-    page
+    image
     plane_tolerance
         Distance from the tangent plane, by depth, up to which a pixel is of the same surface.
 
@@ -85,37 +87,38 @@ def lookup(position: Any, normal: Any, shape_index: Any, page: Page, *, plane_to
     -------
     Found
     """
-    # Where the keyframe would see the point.
-    seen = page.pixel_from_direction @ (position - page.eye)
+    # Project the points.
+    seen = image.pixel_from_direction @ (position - image.eye)
     is_ahead = seen.z > 0.0
     x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
-    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < page.width - 0.5) & (y < page.height - 0.5)
+    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < image.width - 0.5) & (y < image.height - 0.5)
     left, top = dr.floor(x), dr.floor(y)
     across, down = x - left, y - top
 
-    # Distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
+    # Prepare the distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
     scale = dr.rcp(dr.norm(normal))
-    offset = dr.dot(normal, page.eye - position) * scale
-    slope = (page.direction_from_pixel.T @ normal) * scale
+    offset = dr.dot(normal, image.eye - position) * scale
+    slope = (image.direction_from_pixel.T @ normal) * scale
     tolerance = plane_tolerance * seen.z
-    is_inside &= offset > 0.0  # the page saw the same side
+    is_inside &= offset > 0.0  # the image shows the same side
 
-    totals, variances = [Array3f(0) for _ in page.values], [Float(0) for _ in page.values]
+    # Weight the four neighbouring pixels, and sum them up.
+    totals, variances = [Array3f(0) for _ in image.values], [Float(0) for _ in image.values]
     weight = Float(0)
     for row, weight_y in ((0, 1.0 - down), (1, down)):
         for column, weight_x in ((0, 1.0 - across), (1, across)):
-            i = dr.clip(Int(left) + column, 0, page.width - 1)
-            j = dr.clip(Int(top) + row, 0, page.height - 1)
-            lane = UInt(j * page.width + i)
-            depth = dr.gather(Float, page.depths, lane, is_inside)
+            i = dr.clip(Int(left) + column, 0, image.width - 1)
+            j = dr.clip(Int(top) + row, 0, image.height - 1)
+            lane = UInt(j * image.width + i)
+            depth = dr.gather(Float, image.depths, lane, is_inside)
             distance = offset + depth * dr.dot(slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1))
-            is_same = is_inside & (dr.gather(UInt, page.shape_indices, lane, is_inside) == shape_index)
+            is_same = is_inside & (dr.gather(UInt, image.shape_indices, lane, is_inside) == shape_index)
             is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
-            share = dr.select(is_same, weight_x * weight_y + FLOOR, 0.0)
-            if page.normals is not None:
-                turned = dr.dot(normal, _unpacked(dr.gather(UInt, page.normals, lane, is_inside))) * scale
+            share = dr.select(is_same, weight_x * weight_y + MIN_TAP_WEIGHT, 0.0)
+            if image.normals is not None:
+                turned = dr.dot(normal, _unpacked(dr.gather(UInt, image.normals, lane, is_inside))) * scale
                 share *= dr.maximum(turned, 0.0)
-            for layer, (value, variance) in enumerate(zip(page.values, page.variances, strict=True)):
+            for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
                 totals[layer] += share * dr.gather(Array3f, value, lane, is_same)
                 variances[layer] += share * dr.gather(Float, variance, lane, is_same)
             weight += share

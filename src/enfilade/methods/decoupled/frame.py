@@ -1,0 +1,189 @@
+"""A frame: camera rays, specular rays, and the accumulation of specular AOVs over time."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import halves, widened
+from enfilade.cache import LruCache
+from enfilade.camera.path import CameraPath
+from enfilade.kernels.estimate import LUMINANCE, Estimate
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
+from enfilade.methods.decoupled.sample_counts import (
+    EDGE_CONTRAST,
+    edge_spp,
+    small_emitter_pixels,
+    specular_spp,
+)
+from enfilade.methods.decoupled.shot import Shot
+from enfilade.methods.decoupled.specular import accumulate_temporally, filter_spatially, upload_aov
+from enfilade.records import U8, Frame, Geometry, Mask, Provenance
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import LimitSettings
+
+REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
+
+
+class Frames:
+    """Shades frames, and accumulates their specular AOVs over time.
+
+    The AOVs of the frames that the accumulation spans are kept on the device.
+    """
+
+    def __init__(self) -> None:
+        self._virtual: LruCache[int, list[Geometry]] = LruCache(2)
+        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 2)
+        self._last: LruCache[int, Frame] = LruCache(1)
+
+    def shade(self, shot: Shot, frame: int) -> Output:
+        """Shade a frame: everything but the accumulation over time."""
+        geometry = shot.walk.view(frame).geometry
+        view, cache = shot.caches(frame)
+        diffuse = _shade_diffuse(shot, frame, view, cache)
+        where = _dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
+        aovs, specular = self._shade_specular(shot, frame, cache, where)
+        is_keyframe = frame in shot.keyframes
+        provenance = _provenance(geometry, view, diffuse.is_marked, is_keyframe=is_keyframe)
+        color = diffuse.shading.color.reshape(*where.shape, 3)
+        transmission = aovs[1] if len(aovs) > 1 else None
+        shaded = ShadedFrame(halves(color), aovs[0], transmission, provenance)
+        rays = {"camera": diffuse.paths, "specular": 0 if specular is None else specular.paths}
+        dropped = diffuse.shading.dropped + (0 if specular is None else specular.shading.dropped)
+        return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
+
+    def finish(self, shot: Shot, frame: int) -> Output:
+        """Deliver a frame, once the frames around it are shaded; repeated poses are copies."""
+        static = shot.walk.path.static_frame(frame)
+        made = self._last.get(static, lambda: self._accumulated(shot, static))
+        if frame != static:
+            made = Frame(made.color, np.full_like(made.provenance, Provenance.REUSED))
+        return Output({frame: made})
+
+    def _accumulated(self, shot: Shot, frame: int) -> Frame:
+        path, shaded = shot.walk.path, self._record(shot, frame)
+        color = widened(shaded.diffuse)
+        if np.any(shaded.provenance == Provenance.SPECULAR):
+            others = [f for f in window(path, path.shots()[shot.number], frame) if f != frame]
+            weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
+            for k, here in enumerate(self._aovs(shot, frame)):
+                neighbours = [(aovs[k], weights[f]) for f in others if k < len(aovs := self._aovs(shot, f))]
+                geometry = shot.walk.view(frame).geometry
+                color = color + accumulate_temporally(geometry, here, neighbours)
+        # Samples of a lobe that is a difference may be negative; the sum is not.
+        return Frame(np.maximum(color, 0.0), shaded.provenance)
+
+    def _aovs(self, shot: Shot, frame: int) -> list[UploadedImage]:
+        """Specular AOVs of a shaded frame, on the device."""
+
+        def make() -> list[UploadedImage]:
+            shaded = self._record(shot, frame)
+            where = _dilated(shaded.provenance == Provenance.SPECULAR)
+            virtual = self._virtual_geometry(shot, frame, len(shaded.specular))
+            return [upload_aov(g, aov, where) for g, aov in zip(virtual, shaded.specular, strict=True)]
+
+        return self._uploaded.get(frame, make)
+
+    @staticmethod
+    def _record(shot: Shot, frame: int) -> ShadedFrame:
+        record: ShadedFrame = shot.inputs.record("shading", frame)
+        return record
+
+    def _shade_specular(
+        self, shot: Shot, frame: int, cache: IrradianceCache, where: Mask
+    ) -> tuple[list[SpecularAov], Estimate | None]:
+        """Specular AOVs that are not empty, filtered spatially, and their estimate, if any.
+
+        All pixels take as many rays: a second pass for those with remaining noise would cost as much as
+        half as many again for all.
+        """
+        if not where.any():
+            return [
+                SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
+            ], None
+        walk = shot.walk
+        camera = walk.path.cameras[frame]
+        estimate = Estimate(
+            camera,
+            np.flatnonzero(where).astype(np.uint32),
+            lambda rays, rng, square: shot.integrator.specular_radiance(
+                cache, rays, rng, square, pixel_angle=camera.pixel_angle
+            ),
+            chunk=walk.settings[LimitSettings].paths_in_flight,
+            pixel_filter=PixelFilter.GAUSSIAN,
+            random=walk.random(frame, Purpose.SPECULAR),
+            layers=SPECULAR_AOVS,
+            is_stratified=True,
+        )
+        estimate.add(specular_spp(shot.settings))
+        reflection, *more = (shading.spread(where) for shading in estimate.shadings)
+        aovs = [reflection, *(aov for aov in more if aov.color.any())]
+        virtual = self._virtual_geometry(shot, frame, len(aovs))
+        return filter_spatially(virtual, aovs, where), estimate
+
+    def _virtual_geometry(self, shot: Shot, frame: int, count: int) -> list[Geometry]:
+        """G-buffers of a frame with the virtual images of its first AOVs."""
+
+        def make() -> list[Geometry]:
+            geometry = shot.walk.view(frame).geometry
+            images = shot.virtual_images
+            return [image(geometry) for image in (images.reflected, images.transmitted)[:count]]
+
+        found = self._virtual.get(frame, make)
+        return found[:count]
+
+
+def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: IrradianceCache) -> Estimate:
+    """Emission and diffuse reflection; edges and fine textures take more camera rays."""
+    walk, settings = shot.walk, shot.settings
+    camera = walk.path.cameras[frame]
+    estimate = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng: shot.integrator.diffuse_radiance(
+            view, cache, rays, rng, pixel_angle=camera.pixel_angle
+        ),
+        chunk=walk.settings[LimitSettings].paths_in_flight,
+        pixel_filter=PixelFilter.GAUSSIAN,
+        random=walk.random(frame, Purpose.DIFFUSE),
+    )
+    estimate.add(settings.min_spp)
+    more = edge_spp(settings) - settings.min_spp
+    if more > 0:
+        shading = estimate.shading
+        luminance: npt.NDArray[np.float32] = shading.color @ np.array(LUMINANCE, np.float32)
+        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * settings.quality * luminance
+        is_edge = is_edge.reshape(camera.height, camera.width)
+        is_edge |= small_emitter_pixels(shot.renderer.emitters, walk.view(frame).geometry)
+        estimate.add(more, _dilated(is_edge).ravel())
+    return estimate
+
+
+def _provenance(
+    geometry: Geometry, view: IrradianceCache, is_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
+) -> U8:
+    """Provenance of the pixels of a shaded frame, (H, W)."""
+    is_known = np.array(view.images[0].shape_indices) > 0
+    base = Provenance.KEYFRAME if is_keyframe else Provenance.REUSED
+    provenance = np.full(is_specular.shape, base, np.uint8)
+    provenance[geometry.has_diffuse.ravel() & ~is_known] = Provenance.DISOCCLUDED
+    provenance[is_specular] = Provenance.SPECULAR
+    return provenance.reshape(geometry.shape_index.shape)
+
+
+def window(path: CameraPath, shot: range, frame: int) -> list[int]:
+    """Distinct frames of a shot over which the AOVs of a frame are accumulated: itself, and some to each side."""
+    first, here, last = (path.distance(f) for f in (shot.start, frame, shot.stop - 1))
+    return list(path.distinct_frames[max(here - REACH, first) : min(here + REACH, last) + 1])
+
+
+def _dilated(mask: Mask) -> Mask:
+    """A mask grown by one pixel in all eight directions."""
+    padded = np.pad(mask, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    grown: Mask = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+    return grown

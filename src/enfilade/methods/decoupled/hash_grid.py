@@ -1,0 +1,179 @@
+"""A world-space hash grid of irradiance, for surfaces that no keyframe shows.
+
+Paths off specular and diffuse surfaces land in the same unseen places again and again. Their estimates are
+summed in entries whose keys are made of the quantized position and normal (Binder et al. 2018) and of the
+width of the path (Bekaert et al. 2003): entries are larger the less sharply they are seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaque
+
+LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
+MIN_SAMPLES = 4  # of an entry that is used
+SEARCH_STEPS = 22
+MAX_ENTRIES = 1 << SEARCH_STEPS  # that are uploaded; of more, those with the most samples
+COORDINATE_BITS = 14
+LEVEL_BITS = 6
+SHAPE_BITS = 13
+QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
+
+
+@dataclass(frozen=True)
+class HashGrid:
+    """Irradiance by entry, on the device.
+
+    Attributes
+    ----------
+    keys : UInt64
+        Rising.
+    light : Array3f
+        Irradiance over pi.
+    last : UInt
+        Lane of the last key.
+    """
+
+    keys: Any
+    light: Any
+    last: Any
+
+    def lookup(
+        self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any
+    ) -> tuple[Any, Any]:
+        """Irradiance over pi at points, from the smallest entry that there is.
+
+        Parameters
+        ----------
+        position, normal : Array3f
+        shape_index : UInt
+        width : Float
+            Of the path there, scene units.
+        offset : Array3f
+            In [0, 1): moves the point by up to half an entry, so that many lookups interpolate. Where there
+            is no entry at the moved point, that of the point itself is used.
+
+        Returns
+        -------
+        light : Array3f
+        is_found : Bool
+        """
+        light, is_found = Array3f(0), Bool(False)
+        for level in range(LEVELS):
+            for moved in (offset, 0.5):
+                key = entry_key(position, normal, shape_index, width, level, moved)
+                lane = self._search(key)
+                is_here = dr.gather(UInt64, self.keys, lane) == key
+                light = dr.select(is_here & ~is_found, dr.gather(Array3f, self.light, lane), light)
+                is_found |= is_here
+        return light, is_found
+
+    def _search(self, key: Any) -> Any:
+        """Lane of the first key that is not less, or the last one, by binary search."""
+        low, high = UInt(0), UInt(self.last)
+        for _ in range(SEARCH_STEPS):
+            middle = (low + high) >> 1
+            is_less = dr.gather(UInt64, self.keys, middle) < key
+            low = dr.select(is_less, dr.minimum(middle + 1, self.last), low)
+            high = dr.select(is_less, high, middle)
+        return low
+
+
+def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: int, offset: Any = 0.5) -> Any:
+    """Key of the entry of a point; UInt64.
+
+    Parameters
+    ----------
+    position, normal : Array3f
+    shape_index : UInt
+        Two shapes never share an entry.
+    width : Float
+        Of the path, scene units: the entry is as wide, rounded down to a power of two.
+    level
+        Doublings of that width.
+    offset : Array3f
+        In [0, 1): see :meth:`HashGrid.lookup`.
+    """
+    # Quantize the position.
+    exponent = Int(dr.floor(dr.log2(dr.maximum(width, 1e-9)))) + level
+    size = dr.exp2(Float(exponent))
+    cell = Array3f(position) / size + (offset - 0.5)
+
+    # Pack shape, size, position and direction of the normal.
+    key = UInt64(shape_index & ((1 << SHAPE_BITS) - 1))
+    key = (key << LEVEL_BITS) | UInt64(UInt(exponent + (1 << (LEVEL_BITS - 1))) & ((1 << LEVEL_BITS) - 1))
+    for coordinate in cell:
+        at = UInt(Int(dr.floor(coordinate))) & ((1 << COORDINATE_BITS) - 1)
+        key = (key << COORDINATE_BITS) | UInt64(at)
+    return (key << 3) | UInt64(_nearest_axis(normal))
+
+
+def _nearest_axis(normal: Any) -> Any:
+    """Which of the six directions of the axes a normal is nearest to, 0..5; UInt."""
+    x, y, z = (dr.abs(component) for component in normal)
+    along_x, along_y = (x >= y) & (x >= z), y >= z
+    axis = dr.select(along_x, 0, dr.select(along_y, 1, 2))
+    value = dr.select(along_x, normal.x, dr.select(along_y, normal.y, normal.z))
+    return UInt(2 * axis + dr.select(value < 0.0, 1, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Sums of estimates of irradiance over pi, by entry.
+
+    Attributes
+    ----------
+    keys : (N,) uint64
+        Rising, each once.
+    sums : (N, 3) float64
+    counts : (N,) int64
+    """
+
+    keys: npt.NDArray[np.uint64]
+    sums: npt.NDArray[np.float64]
+    counts: npt.NDArray[np.int64]
+
+    @staticmethod
+    def of(keys: npt.NDArray[np.uint64], light: npt.NDArray[np.floating[Any]]) -> Entries:
+        """Sum up estimates; those that are not finite are left out.
+
+        They are rounded to :data:`QUANTUM`, so that sums are exact, and do not depend on the order.
+        """
+        is_finite = np.isfinite(light).all(axis=1)
+        rounded = np.rint(light[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
+        return Entries._summed(keys[is_finite], rounded, np.ones(int(is_finite.sum()), np.int64))
+
+    @staticmethod
+    def joined(parts: Sequence[Entries]) -> Entries:
+        """Sum up several lists of entries; of none, the empty list."""
+        parts = [Entries(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros(0, np.int64)), *parts]
+        return Entries._summed(
+            np.concatenate([part.keys for part in parts]),
+            np.concatenate([part.sums for part in parts]),
+            np.concatenate([part.counts for part in parts]),
+        )
+
+    @staticmethod
+    def _summed(keys: Any, sums: Any, counts: Any) -> Entries:
+        unique, place = np.unique(keys, return_inverse=True)
+        total: Any = np.stack([np.bincount(place, s, len(unique)) for s in sums.T], axis=1)
+        return Entries(unique, total, np.bincount(place, counts, len(unique)).astype(np.int64))
+
+    def upload(self) -> HashGrid | None:
+        """The entries with enough samples, on the device; None if there are none."""
+        chosen = np.flatnonzero(self.counts >= MIN_SAMPLES)
+        if not len(chosen):
+            return None
+        if len(chosen) > MAX_ENTRIES:
+            chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
+        light = (self.sums[chosen] / self.counts[chosen, None]).astype(np.float32)
+        grid = HashGrid(lanes(self.keys[chosen]), lanes(light[None]), opaque(len(chosen) - 1, UInt))
+        dr.eval(grid)
+        return grid

@@ -1,0 +1,57 @@
+"""Filling the hash grid: irradiance where paths land on surfaces that no prepass image shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from enfilade.kernels.estimate import Estimate
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.shot import Shot
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import LimitSettings
+
+SPECULAR_SPP = 4  # rays of a frame's pixel off specular surfaces
+GATHER_SPP = 4  # bounces of a prepass pixel off its diffuse surface
+
+
+def fill_hash_grid(shot: Shot, frame: int) -> Output:
+    """Estimate irradiance where paths off a keyframe's surfaces land and no prepass image shows the surface."""
+    parts: list[Entries] = []
+    cache, walk = shot.prepass_cache(frame), shot.walk
+    camera, geometry = walk.path.cameras[frame], shot.prepass_geometry(frame)
+    chunk = walk.settings[LimitSettings].paths_in_flight
+
+    # Follow specular lobes from all pixels of the frame.
+    specular = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, rng, square: shot.integrator.specular_radiance(
+            cache, rays, rng, square, parts.append, pixel_angle=camera.pixel_angle
+        ),
+        chunk=chunk,
+        pixel_filter=PixelFilter.BOX,
+        random=walk.random(frame, Purpose.HASH_GRID),
+        layers=SPECULAR_AOVS,
+        is_stratified=True,
+    )
+    specular.add(SPECULAR_SPP)
+
+    # Gather at the diffuse pixels of the prepass image.
+    gathered = Estimate(
+        geometry.camera,
+        np.flatnonzero(geometry.has_diffuse).astype(np.uint32),
+        lambda rays, rng, square: shot.integrator.final_gather(
+            cache, rays, rng, square, parts.append, pixel_angle=camera.pixel_angle
+        ),
+        chunk=chunk,
+        pixel_filter=PixelFilter.CENTRE,
+        random=walk.random(frame, Purpose.PREPASS_HASH_GRID),
+        layers=2,
+        is_stratified=True,
+    )
+    gathered.add(GATHER_SPP)
+    entries = Entries.joined(parts)
+    rays = specular.paths + gathered.paths
+    return Output({frame: entries}, {"rays": {"prepass": rays}, "entries": len(entries.keys)})

@@ -1,0 +1,449 @@
+"""The integrator: radiance along camera rays, with exact surfaces and specular lobes, and cached irradiance.
+
+Where a ray meets a diffuse lobe, the irradiance is looked up; where the cache misses, it is path traced for
+that lookup alone. Specular lobes extend the path by one bounce, and the same happens at the next surface.
+With an empty cache, diffuse plus specular radiance converges to that of a path tracer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
+from enfilade.kernels.estimate import Samples
+from enfilade.kernels.random import Leading
+from enfilade.kernels.replay import padded, recorded
+from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.paths import Path, compact, scatter_add, spawn
+from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
+from enfilade.renderer import MAX_PATH_DEPTH, BsdfSample, LobeRenderer, Rays, ShadingPoint
+
+MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
+ROULETTE_GAIN = 4.0  # Russian roulette: a path survives with this times its throughput, if that is below one
+SPECULAR_AOVS = 2  # reflection, transmission
+MIN_SURVIVAL = 0.05  # least probability of survival
+# Width of a hash grid entry: in pixels where a surface is seen sharply; as a part of the lobe's width where
+# it is seen through a lobe; as a part of the distance where it lights a diffuse surface.
+ENTRY_PX = 2.0
+ENTRY_LOBE_WIDTH = 0.25
+ENTRY_GATHER_WIDTH = 0.2
+STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
+
+OnMiss = Callable[[Entries], None]
+
+
+@dataclass(frozen=True)
+class CacheQuery:
+    """A point whose irradiance is looked up, as lanes.
+
+    Attributes
+    ----------
+    position, normal : Array3f
+    shape_index : UInt
+    width : Float
+        Of the path there, scene units.
+    weight : Array3f
+        Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
+    """
+
+    position: Any
+    normal: Any
+    shape_index: Any
+    width: Any
+    weight: Any
+
+    @property
+    def is_needed(self) -> Any:
+        """Whether irradiance contributes at all; Bool."""
+        return dr.max(dr.abs(self.weight)) > 0.0
+
+
+@dataclass(frozen=True)
+class _Vertex:
+    """A vertex of paths, as lanes.
+
+    Attributes
+    ----------
+    radiance : Array3f
+        Contribution to the pixel sample: emitted, and reflected by the diffuse lobe as far as it is cached.
+    is_miss : Bool
+        Where irradiance is needed and was not found.
+    has_specular : Bool
+        Where there are other lobes.
+    path : Path
+        On its way to the vertex.
+    query : CacheQuery
+    """
+
+    radiance: Any
+    is_miss: Any
+    has_specular: Any
+    path: Path
+    query: CacheQuery
+
+
+class Integrator:
+    """Estimates radiance with cached irradiance. Its kernels are recorded once and replayed for every frame.
+
+    Parameters
+    ----------
+    renderer
+    """
+
+    def __init__(self, renderer: LobeRenderer) -> None:
+        self._renderer = renderer
+
+        def state() -> Any:
+            return renderer.state
+
+        self._see = recorded(self._see_kernel, state)
+        self._query_further = recorded(_query_kernel, lambda: None)
+        self._extend = recorded(self._extend_kernel, state)
+        self._gather = recorded(self._gather_kernel, state)
+        self._estimate = recorded(self._estimate_kernel, state)
+        self._terminate = recorded(self._terminate_kernel, state)
+
+    def diffuse_radiance(
+        self, view: IrradianceCache, cache: IrradianceCache, rays: Rays, rng: Any, *, pixel_angle: float
+    ) -> Samples:
+        """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
+
+        Parameters
+        ----------
+        view
+            Queried first: irradiance accumulated for this very view.
+        cache
+            Queried where `view` misses.
+        rays
+            From the camera, one a lane.
+        rng : PCG32
+            One generator a lane.
+        pixel_angle
+            Of the camera, radians.
+
+        Returns
+        -------
+        Samples
+            Marked where the surface has specular lobes, for :meth:`specular_radiance`.
+        """
+        vertex = self._see(view, spawn(rays, rng, ENTRY_PX * pixel_angle))
+        radiance = Array3f(vertex.radiance)
+        self._add_missed(radiance, cache, vertex, jitter=1.0, is_queried=False)
+        return Samples((radiance,), vertex.has_specular)
+
+    def specular_radiance(
+        self,
+        cache: IrradianceCache,
+        rays: Rays,
+        rng: Any,
+        square: Any,
+        on_miss: OnMiss | None = None,
+        *,
+        pixel_angle: float,
+    ) -> Samples:
+        """Radiance that visible surfaces reflect and transmit by their specular lobes.
+
+        Parameters
+        ----------
+        cache
+        rays
+            From the camera, one a lane.
+        rng : PCG32
+            One generator a lane.
+        square : Array4f
+            In [0, 1): chooses the first lobe and its direction.
+        on_miss
+            Receives the irradiance that was not cached and had to be estimated.
+        pixel_angle
+            Of the camera, radians.
+
+        Returns
+        -------
+        Samples
+            Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
+            surfaces), and transmission straight through clear surfaces.
+        """
+        count = dr.width(rng.state)
+        radiance = dr.zeros(Array3f, SPECULAR_AOVS * count)  # one AOV after the other
+        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
+        self._trace_specular(radiance, cache, path, 0, on_miss, square, transmitted_at=count)
+        lane = dr.arange(UInt, count)
+        return Samples(
+            tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
+        )
+
+    def final_gather(
+        self,
+        cache: IrradianceCache,
+        rays: Rays,
+        rng: Any,
+        square: Any,
+        on_miss: OnMiss | None = None,
+        *,
+        pixel_angle: float,
+    ) -> Samples:
+        """Irradiance over pi at visible surfaces, by next-event estimation and one bounce into the cache.
+
+        Parameters
+        ----------
+        cache, rays, rng, on_miss, pixel_angle
+            As of :meth:`specular_radiance`.
+        square : Array4f
+            In [0, 1): chooses the point on an emitter, and the direction of the bounce.
+
+        Returns
+        -------
+        Samples
+            Two layers: by light straight from emitters, and by all other.
+        """
+        dr.eval(square)  # see `spawn`
+        direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), square)
+        indirect = Array3f(vertex.radiance)
+        self._add_missed(indirect, cache, vertex, on_miss=on_miss)
+        onward = compact(vertex.path, dr.compress(vertex.has_specular))
+        self._trace_specular(indirect, cache, onward, 1, on_miss)
+        return Samples((direct, indirect))
+
+    def _trace_specular(
+        self,
+        radiance: Any,
+        cache: IrradianceCache,
+        path: Path,
+        bounces: int,
+        on_miss: OnMiss | None,
+        square: Any = None,
+        transmitted_at: int = 0,
+    ) -> None:
+        """Add the contributions of paths from specular lobe to specular lobe.
+
+        Parameters
+        ----------
+        radiance
+        cache
+        path
+        bounces
+            Made so far.
+        on_miss
+        square
+            Random numbers of the first bounce, by lane.
+        transmitted_at
+            Offset of the lanes that receive transmission through clear surfaces.
+        """
+        # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
+        jitter = 1.0 if bounces == 0 else 0.0
+        while bounces < MAX_BOUNCES and dr.width(path.lane):
+            # The first bounce off the visible surface always survives; Russian roulette begins with the
+            # second.
+            survival = 1.0 if bounces == 0 else MIN_SURVIVAL
+            first = None if square is None else dr.gather(Array4f, square, path.lane)
+            dr.eval(first)
+            square = None
+
+            # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
+            direct, vertex = self._extend(cache, path, opaque(survival), first, opaque(transmitted_at))
+            scatter_add(radiance, direct, path.lane)
+            scatter_add(radiance, vertex.radiance, vertex.path.lane)
+            self._add_missed(radiance, cache, vertex, jitter=jitter, on_miss=on_miss)
+
+            # Keep the paths that meet another specular lobe.
+            path = compact(vertex.path, dr.compress(vertex.has_specular))
+            bounces += 1
+        if dr.width(path.lane):
+            scatter_add(radiance, self._terminate(path), path.lane)
+
+    def _add_missed(
+        self,
+        radiance: Any,
+        cache: IrradianceCache,
+        vertex: _Vertex,
+        *,
+        jitter: float = 0.0,
+        is_queried: bool = True,
+        on_miss: OnMiss | None = None,
+    ) -> None:
+        """Add the diffuse reflection at vertices whose irradiance was not found: look further, or estimate it.
+
+        Parameters
+        ----------
+        radiance
+        cache
+        vertex
+        jitter
+            Of lookups in the hash grid, in widths of an entry.
+        is_queried
+            Whether the images of the cache were queried already.
+        on_miss
+        """
+        path = vertex.path
+        missing: Any = dr.compress(vertex.is_miss)
+
+        # Query the rest of the cache.
+        further = IrradianceCache(hash_grid=cache.hash_grid) if is_queried else cache
+        if (further.images or further.hash_grid) and dr.width(missing):
+            lanes, is_real = padded(missing)
+            query, rng = dr.gather(CacheQuery, vertex.query, lanes), dr.gather(PCG32, path.rng, lanes)
+            dr.eval(query, rng)
+            found, is_miss = self._query_further(further, query, rng, opaque(jitter))
+            scatter_add(radiance, dr.select(is_real, found, 0.0), dr.gather(UInt, path.lane, lanes))
+            still: Any = dr.compress(is_miss & is_real)
+            missing = dr.gather(UInt, lanes, still)
+        if not dr.width(missing):
+            return
+
+        # Path trace what is still missing.
+        unknown = compact(path, missing)
+        weight, light, keys, rng = self._estimate(unknown)
+        scatter_add(radiance, weight * light, unknown.lane)
+        if on_miss:
+            _report(on_miss, keys, light, dr.width(missing))
+
+        # Advance the generators of these paths, whose numbers the estimates have used.
+        lanes, is_real = padded(missing)
+        dr.scatter(path.rng.state, rng.state, lanes, is_real)
+
+    def _see_kernel(self, cache: IrradianceCache, path: Path) -> _Vertex:
+        """Camera rays: intersect, and query the cache."""
+        emitted, vertex = self._intersect(cache, path)
+        return replace(vertex, radiance=emitted + vertex.radiance)
+
+    def _intersect(self, cache: IrradianceCache, path: Path) -> tuple[Any, _Vertex]:
+        """Emission at the next surface, and the vertex there, with its cached diffuse reflection."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        albedo = point.surfaces.albedo
+        is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        query = CacheQuery(
+            position=point.position,
+            normal=point.surfaces.normal,
+            shape_index=point.surfaces.shape_index,
+            width=path.width_at(point),
+            weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
+        )
+        reflected, is_miss = _query(cache, query)
+        vertex = _Vertex(reflected, is_miss, Bool(point.has_specular), path, query)
+        # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
+        emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)
+        return Array3f(emitted), vertex
+
+    def _extend_kernel(
+        self, cache: IrradianceCache, path: Path, min_survival: Any, square: Any, transmitted_at: Any
+    ) -> tuple[Any, _Vertex]:
+        """Scatter off a specular lobe at the next surface, and intersect the one after."""
+        rng = PCG32(path.rng)
+
+        # Intersect, and sample a specular lobe.
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        sample = self._renderer.sample_specular(point, rng if square is None else Leading(square, rng))
+
+        # Play Russian roulette.
+        throughput = path.throughput * sample.throughput
+        survival = dr.clip(ROULETTE_GAIN * dr.max(dr.abs(throughput)), min_survival, 1.0)
+        is_alive = sample.is_alive & (rng.next_float32() < survival)
+
+        # Extend the path; a broad lobe widens it.
+        lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
+        extended = Path(
+            lane=_aov_lane(path, point, sample, transmitted_at),
+            rays=sample.rays,
+            bounce=sample.bounce,
+            throughput=Array3f(dr.select(is_alive, throughput / survival, 0.0)),
+            width=path.width_at(point),
+            spread=dr.maximum(path.spread, lobe_width),
+            rng=rng,
+        )
+
+        # Query the cache at the next vertex.
+        emitted, vertex = self._intersect(cache, extended)
+        return Array3f(path.throughput * sample.direct), replace(vertex, radiance=emitted + vertex.radiance)
+
+    def _gather_kernel(self, cache: IrradianceCache, path: Path, square: Any) -> tuple[Any, _Vertex]:
+        """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""
+        rng = PCG32(path.rng)
+
+        # Intersect, and sample the diffuse lobe.
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
+        sample = self._renderer.sample_diffuse(point, Leading(square, rng))
+
+        # Extend the path.
+        extended = Path(
+            lane=path.lane,
+            rays=sample.rays,
+            bounce=sample.bounce,
+            throughput=Array3f(dr.select(sample.is_alive, sample.throughput, 0.0)),
+            width=path.width_at(point),
+            spread=dr.maximum(path.spread, ENTRY_GATHER_WIDTH),
+            rng=rng,
+        )
+
+        # Query the cache at the next vertex.
+        emitted, vertex = self._intersect(cache, extended)
+        return Array3f(sample.direct + emitted), vertex
+
+    def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
+        """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid."""
+        rng = PCG32(path.rng)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        width = path.width_at(point)
+        direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
+        light = Array3f(direct + indirect)
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
+        keys = tuple(entry_key(*at, level) for level in range(LEVELS))
+        return Array3f(path.throughput * point.surfaces.albedo), light, keys, rng
+
+    def _terminate_kernel(self, path: Path) -> Any:
+        """Path trace the specular lobes at the next surface to their end."""
+        rng = PCG32(path.rng)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
+        return Array3f(path.throughput * (direct + indirect))
+
+
+def _report(on_miss: OnMiss, keys: tuple[Any, ...], light: Any, count: int) -> None:
+    values = rows(light)[:count]
+    for key in keys:
+        on_miss(Entries.of(np.array(key)[:count], values))
+
+
+def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:
+    """Lanes that receive the radiance of scattered paths: transmission has its own; UInt.
+
+    Light that passes one pane and is reflected by another, or by the other face of the same, is a
+    reflection; total internal reflection, to which there is no alternative, is not.
+    """
+    normal, bounce = point.surfaces.normal, sample.bounce
+    is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, sample.rays.direction) > 0.0
+    if path.bounce is None:
+        return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
+    is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
+    is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
+    return path.lane - dr.select(is_back, transmitted_at, 0)
+
+
+def _query(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
+    """Diffuse reflection of cached irradiance, and where the images of the cache miss."""
+    found, is_known = cache.lookup(query.position, query.normal, query.shape_index)
+    return Array3f(dr.select(is_known, query.weight * found, 0.0)), Bool(~is_known & query.is_needed)
+
+
+def _query_kernel(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:
+    """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
+    reflected, is_miss = _query(cache, query)
+    if cache.hash_grid:
+        # Jitter the position by up to half an entry, so that many lookups interpolate.
+        rng = PCG32(rng)
+        rng.state ^= STREAM_SALT
+        offset = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+        offset = 0.5 + jitter * (offset - 0.5)
+
+        # Look up where the images miss.
+        light, is_found = cache.hash_grid.lookup(
+            query.position, query.normal, query.shape_index, query.width, offset
+        )
+        reflected = dr.select(is_miss & is_found, query.weight * light, reflected)
+        is_miss &= ~is_found
+    return reflected, is_miss

@@ -1,0 +1,94 @@
+"""Irradiance images of keyframes, by final gathering, and disocclusion images of the frames between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from enfilade.camera.path import Segment
+from enfilade.kernels.estimate import Estimate
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.irradiance_cache import upload
+from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.methods.decoupled.shot import Shot, either_side
+from enfilade.records import Mask
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import LimitSettings
+
+NOISE_SHARE = 0.25  # of the spread of low-discrepancy samples; images differ by 0.3 to 0.6 of it
+MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer are left to the frames themselves
+
+
+def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> tuple[IrradianceImage, int]:
+    """Gather the irradiance of some pixels of a frame, at their centres.
+
+    Parameters
+    ----------
+    shot
+    frame
+    where : (H, W) bool
+    spp
+        Paths a pixel.
+    purpose
+        Of the random numbers.
+
+    Returns
+    -------
+    image : IrradianceImage
+        With the variance between images of independent random numbers.
+    paths : int
+    """
+    walk, cache = shot.walk, shot.rough_cache(frame)
+    camera = walk.path.cameras[frame]
+    estimate = Estimate(
+        camera,
+        np.flatnonzero(where).astype(np.uint32),
+        lambda rays, rng, square: shot.integrator.final_gather(
+            cache, rays, rng, square, pixel_angle=camera.pixel_angle
+        ),
+        chunk=walk.settings[LimitSettings].paths_in_flight,
+        pixel_filter=PixelFilter.CENTRE,
+        random=walk.random(frame, purpose),
+        layers=2,
+        is_stratified=True,
+    )
+    estimate.add(spp)
+    spread = [shading.spread(where) for shading in estimate.shadings]
+    direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in spread)
+    return IrradianceImage(direct, indirect, where), estimate.paths
+
+
+def gather_keyframe(shot: Shot, frame: int, spp: int) -> Output:
+    """The irradiance image of a keyframe."""
+    where = shot.walk.view(frame).geometry.has_diffuse
+    image, paths = gather(shot, frame, where, spp, Purpose.IRRADIANCE)
+    return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
+
+
+def fill_disocclusions(shot: Shot, segment: Segment, spp: int) -> Output:
+    """Images of the surfaces between two keyframes that no keyframe shows.
+
+    The segment is halved until no new surface comes into view. An image contains everything that the
+    keyframes do not show, so that each frame finds it in the images before and after.
+    """
+    images: dict[int, IrradianceImage] = {}
+    uploaded: dict[int, UploadedImage] = {}
+    paths = 0
+    pending = [(segment.first, segment.last)]
+    while pending:
+        first, last = pending.pop()
+        middle = shot.walk.path.middle(Segment(first, last))
+        if middle is None:
+            continue
+        neighbours = {f: uploaded[f] for f in either_side(sorted(uploaded), middle)}
+        if shot.uncovered(middle, neighbours).mean() < MIN_DISOCCLUSION:
+            continue
+        image, count = gather(shot, middle, shot.uncovered(middle, {}), spp, Purpose.IRRADIANCE)
+        images[middle], uploaded[middle] = image, upload(shot.walk.view(middle).geometry, image)
+        paths += count
+        pending += [(middle, last), (first, middle)]
+    numbers = [shot.walk.path.numbers[frame] for frame in sorted(images)]
+    dropped = sum(image.direct.dropped for image in images.values())
+    return Output(images, {"images": numbers, "rays": {"irradiance": paths}, "dropped": dropped})

@@ -1,0 +1,265 @@
+"""The irradiance cache: images of keyframes, filtered, accumulated, and looked up from anywhere a path goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
+from enfilade.kernels.rays import pinhole_directions
+from enfilade.methods.decoupled.hash_grid import HashGrid
+from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
+from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.methods.decoupled.wavelet import Guide, smooth, spread_fireflies
+from enfilade.records import F32, U32, Geometry, Mask
+
+PLANE_TOLERANCE = 0.01  # of the depth
+MIN_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
+FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are fireflies
+FIREFLY_LEVELS = 5  # of the wavelet that spreads them
+SMOOTHING_LEVELS = 4
+SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
+NORMAL_EXPONENT = 64.0  # surfaces turned by 12 degrees mix by a quarter
+
+Layer = tuple[Any, Any]  # Array3f: light, Float: variance of its luminance
+
+
+@dataclass(frozen=True)
+class IrradianceCache:
+    """Several images, and a hash grid for surfaces that none of them shows. Empty, every lookup is a miss.
+
+    Attributes
+    ----------
+    images : tuple of UploadedImage
+    weights : tuple of Float
+        One an image, where several show a surface.
+    hash_grid : HashGrid or None
+    """
+
+    images: tuple[UploadedImage, ...] = ()
+    weights: tuple[Any, ...] = ()
+    hash_grid: HashGrid | None = None
+
+    @staticmethod
+    def of(
+        images: Sequence[UploadedImage], weights: Sequence[float], hash_grid: HashGrid | None = None
+    ) -> IrradianceCache:
+        """A cache of some images with their weights."""
+        return IrradianceCache(tuple(images), tuple(opaque(float(weight)) for weight in weights), hash_grid)
+
+    def lookup(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
+        """Irradiance over pi at points, from the images.
+
+        Parameters
+        ----------
+        position, normal : Array3f
+        shape_index : UInt
+
+        Returns
+        -------
+        light : Array3f
+            0 where it is not found.
+        is_found : Bool
+        """
+        total, weight = Array3f(0), Float(0)
+        valid = Float(0)
+        for one, share in zip(self.images, self.weights, strict=True):
+            found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
+            total += share * sum(found.totals, Array3f(0))
+            weight += share * found.weight
+            valid += dr.select(share > 0.0, found.weight, 0.0)
+        is_found = valid > MIN_WEIGHT
+        return dr.select(is_found, total / weight, 0.0), is_found
+
+
+def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
+    """An irradiance image on the device, its fireflies spread; layers direct and indirect.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the image's camera.
+    irradiance
+    """
+    guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
+    indirect = lanes(irradiance.indirect.color), lanes(irradiance.indirect.variance)
+    indirect = spread_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
+    direct = lanes(irradiance.direct.color), lanes(irradiance.direct.variance)
+    return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
+
+
+def upload_layers(
+    geometry: Geometry, is_known: Any, layers: Sequence[Layer], *, has_normals: bool = True
+) -> UploadedImage:
+    """Layers of an image on the device, in memory of Dr.Jit's own.
+
+    Memory shared with NumPy can't be freed while a kernel is recorded.
+
+    Parameters
+    ----------
+    geometry
+    is_known : Bool
+        Pixels that have values, width * height lanes.
+    layers
+        Values (Array3f) and variances of their luminance (Float), the same.
+    has_normals
+        Whether normals are compared in lookups.
+    """
+    camera = geometry.camera
+    uploaded = UploadedImage(
+        depths=dr.select(is_known, lanes(geometry.depth), 0.0),
+        shape_indices=dr.select(is_known, lanes(geometry.shape_index), 0),
+        normals=packed(lanes(geometry.normal)) if has_normals else None,
+        values=tuple(dr.select(is_known, light, 0.0) for light, _ in layers),
+        variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
+        eye=vector3(camera.eye),
+        direction_from_pixel=matrix3(camera.direction_from_pixel),
+        pixel_from_direction=matrix3(camera.pixel_from_direction),
+        width=camera.width,
+        height=camera.height,
+    )
+    dr.eval(uploaded.depths, uploaded.shape_indices, uploaded.normals, uploaded.values, uploaded.variances)
+    return uploaded
+
+
+def accumulate(
+    geometry: Geometry,
+    is_known: Mask,
+    images: Sequence[UploadedImage],
+    denoise: Callable[[F32], F32] | None = None,
+) -> UploadedImage:
+    """Irradiance of one image, averaged with that of others and smoothed along its surfaces.
+
+    Irradiance does not depend on the viewer: each image that shows a point has an estimate of its own.
+    Images of coarser resolution weigh less. Direct light, which has edges, is smoothed apart from indirect
+    light, which has more noise.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the image.
+    is_known : (H, W) bool
+        Pixels for which it is known.
+    images
+        The image itself among them.
+    denoise
+        Maps an image of light, (H, W, 3), to one without noise; None: the wavelet filter.
+
+    Returns
+    -------
+    UploadedImage
+        Of one layer.
+    """
+    layers, _ = _averaged(geometry, images, [1.0] * len(images))
+    if denoise is None:
+        groups = np.where(is_known, geometry.shape_index, np.uint32(0))
+        smoothed = [smooth_along(geometry, groups, light, variance) for light, variance in layers]
+    else:
+        smoothed = [(lanes(denoise(image(light, *is_known.shape))), variance) for light, variance in layers]
+    light = sum((light for light, _ in smoothed), Array3f(0))
+    variance = sum((variance for _, variance in smoothed), Float(0))
+    return upload_layers(geometry, lanes(is_known), [(light, variance)])
+
+
+def reproject_to(
+    geometry: Geometry, images: Sequence[UploadedImage], weights: Sequence[float]
+) -> UploadedImage:
+    """Irradiance of several images at the surfaces of a view, as an image of its own, for its camera rays."""
+    layers, is_known = _averaged(geometry, images, weights)
+    return upload_layers(geometry, is_known, layers)
+
+
+def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
+    """Pixels of a view whose surfaces some image shows, (H, W)."""
+    _, is_known = _averaged(geometry, images, [1.0] * len(images))
+    return image(is_known, *geometry.shape_index.shape)
+
+
+def light_of(uploaded: UploadedImage) -> F32:
+    """The sum of all layers, (H, W, 3); 0 where it is not known."""
+    return image(sum(uploaded.values, Array3f(0)), uploaded.height, uploaded.width)
+
+
+def smooth_along(geometry: Geometry, groups: U32, light: Any, variance: Any) -> Layer:
+    """Smooth light along surfaces, as far as its noise requires.
+
+    Parameters
+    ----------
+    geometry
+    groups : (H, W) uint32
+        Only pixels of the same number mix.
+    light : Array3f
+        Image, width * height lanes.
+    variance : Float
+        Of its luminance.
+
+    Returns
+    -------
+    light : Array3f
+    variance : Float
+        Of the result.
+    """
+    guide = guide_of(geometry, groups)
+    return smooth(light, variance, guide, levels=SMOOTHING_LEVELS, deviations=SMOOTHING_DEVIATIONS)
+
+
+def guide_of(geometry: Geometry, groups: U32) -> Guide:
+    """Guide of the wavelet filter; pixels of different groups, (H, W) uint32, never mix."""
+    return Guide(
+        depths=lanes(geometry.depth),
+        normals=lanes(geometry.normal),
+        shape_indices=lanes(groups),
+        direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
+        width=geometry.camera.width,
+        height=geometry.camera.height,
+        plane_tolerance=PLANE_TOLERANCE,
+        normal_exponent=NORMAL_EXPONENT,
+    )
+
+
+def points_of(geometry: Geometry, depths: Any) -> Any:
+    """Points at some depths along the rays through the pixels' centres, in the world; Array3f."""
+    camera = geometry.camera
+    _, column, row = pixel_grid(camera.height, camera.width)
+    direction = pinhole_directions(
+        Float(column) + 0.5, Float(row) + 0.5, direction_from_pixel=matrix3(camera.direction_from_pixel)
+    )
+    return vector3(camera.eye) + depths * direction
+
+
+def _averaged(
+    geometry: Geometry, images: Sequence[UploadedImage], weights: Sequence[float]
+) -> tuple[list[Layer], Any]:
+    """Layers of several images at the surfaces of a view, averaged; and where they are known, Bool."""
+    camera = geometry.camera
+    normal, shape_index = lanes(geometry.normal), lanes(geometry.shape_index)
+    position = points_of(geometry, lanes(geometry.depth))
+    own = footprint(position, normal, vector3(camera.eye), matrix3(camera.direction_from_pixel))
+    layers = range(len(images[0].values))
+    totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
+    weight, valid = Float(0), Float(0)
+    dr.eval(position, own)
+    for one, share in zip(images, weights, strict=True):
+        # Look the image up; one with larger pixels weighs less.
+        found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
+        its = footprint(position, normal, one.eye, one.direction_from_pixel)
+        counts = opaque(float(share)) * dr.minimum(own / its, 1.0)
+
+        # Add it.
+        for layer in layers:
+            totals[layer] += counts * found.totals[layer]
+            variances[layer] += counts * counts * found.variances[layer] * found.weight
+        weight += counts * found.weight
+        valid += found.weight
+        dr.eval(totals, variances, weight, valid)  # so that one kernel serves any number of images
+
+    # Normalize.
+    is_known = valid > MIN_WEIGHT
+    light = [dr.select(is_known, total / weight, 0.0) for total in totals]
+    variance = [dr.select(is_known, v / (weight * weight), 0.0) for v in variances]
+    dr.eval(light, variance, is_known)
+    return list(zip(light, variance, strict=True)), is_known

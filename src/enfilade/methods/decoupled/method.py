@@ -1,0 +1,146 @@
+"""The passes of the decoupled method: what is shared between frames, and what each frame has of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from enfilade.errors import SettingsError
+from enfilade.methods.analysis import Analysis, keyframes_of
+from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
+from enfilade.methods.decoupled.frame import Frames, window
+from enfilade.methods.decoupled.hash_grid import Entries
+from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
+from enfilade.methods.decoupled.integrator import Integrator
+from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
+from enfilade.methods.decoupled.prepass import trace_prepass
+from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
+from enfilade.methods.decoupled.sample_counts import run_pilot
+from enfilade.methods.decoupled.shot import Shot
+from enfilade.methods.decoupled.virtual_images import VirtualImages
+from enfilade.methods.denoise import why_no_denoiser
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Frame
+from enfilade.renderer import LobeRenderer, Renderer
+from enfilade.settings import (
+    DecoupledSettings,
+    KeyframeSettings,
+    Settings,
+    TraceSettings,
+    ViewingSettings,
+)
+
+
+class Decoupled(Method):
+    """Irradiance cached at keyframes; visibility, texture, edges and specular lobes afresh in every frame."""
+
+    name = "decoupled"
+    settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
+    passes = (
+        Pass("prepass", IrradianceImage),
+        Pass("hash_grid", Entries, reads=("prepass",), is_barrier=True),
+        Pass("pilot", reads=("prepass", "hash_grid"), is_barrier=True, is_shared=False),
+        Pass("irradiance", IrradianceImage, reads=("prepass", "hash_grid", "pilot"), is_barrier=True),
+        Pass(
+            "disocclusion",
+            IrradianceImage,
+            reads=("prepass", "hash_grid", "pilot", "irradiance"),
+            is_barrier=True,
+        ),
+        Pass("shading", ShadedFrame, reads=("hash_grid", "irradiance", "disocclusion"), is_barrier=True),
+        Pass(FRAMES, Frame, reads=("shading",)),
+    )
+
+    def __init__(self) -> None:
+        self._integrator: Integrator | None = None
+        self._virtual_images: VirtualImages | None = None
+        self._shot: Shot | None = None
+        self._frames = Frames()
+
+    def check(self, settings: Settings) -> None:
+        """Refuse a denoiser that is not installed.
+
+        Raises
+        ------
+        SettingsError
+        """
+        if settings[DecoupledSettings].denoiser != "none" and (why := why_no_denoiser()):
+            raise SettingsError(why)
+
+    def check_scene(self, renderer: Renderer) -> None:
+        """Refuse scenes whose diffuse lobes can't be separated.
+
+        Raises
+        ------
+        SettingsError
+        """
+        name = renderer.describe().renderer
+        reason = (
+            renderer.why_inseparable
+            if isinstance(renderer, LobeRenderer)
+            else f"{name} can't separate the diffuse lobe"
+        )
+        if reason:
+            raise SettingsError(
+                f"--method decoupled can't render the scene: {reason}; take --method paper or --method reference"
+            )
+
+    def keyframes(self, analysis: Analysis) -> list[int]:
+        """Keyframes, of which irradiance images are made."""
+        spacing = analysis.settings[DecoupledSettings].spacing
+        return [frame for segments in analysis.segments(spacing) for frame in keyframes_of(segments)]
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """Tasks at keyframes, between them, and in all frames."""
+        path, settings = analysis.path, analysis.settings[DecoupledSettings]
+        shots = zip(path.shots(), analysis.segments(settings.spacing), strict=True)
+        for number, (shot, segments) in enumerate(shots):
+            keyframes = keyframes_of(segments)
+            for pass_name in ("prepass", "hash_grid", "irradiance"):
+                for frame in keyframes:
+                    yield Task(pass_name, frame, number)
+            if not settings.irradiance_spp:
+                yield Task("pilot", keyframes[0], number)
+            for segment in segments:
+                yield Task("disocclusion", segment.first, number)
+            for frame in shot:
+                if path.static_frame(frame) == frame:
+                    yield Task("shading", frame, number)
+                needs = tuple(TaskId("shading", f) for f in window(path, shot, frame))
+                yield Task(FRAMES, frame, number, needs)
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Do a task."""
+        shot, frame = self._shot_of(task, inputs, walk), task.frame
+        match task.pass_name:
+            case "prepass":
+                return trace_prepass(walk, shot.renderer, frame)
+            case "hash_grid":
+                return fill_hash_grid(shot, frame)
+            case "pilot":
+                return run_pilot(shot)
+            case "irradiance":
+                return gather_keyframe(shot, frame, self._spp(shot))
+            case "disocclusion":
+                segment = next(s for s in shot.segments if s.first == frame)
+                return fill_disocclusions(shot, segment, self._spp(shot))
+            case "shading":
+                return self._frames.shade(shot, frame)
+            case _:
+                return self._frames.finish(shot, frame)
+
+    @staticmethod
+    def _spp(shot: Shot) -> int:
+        """Paths a pixel of irradiance images: as set, or as the pilot has chosen."""
+        chosen = shot.settings.irradiance_spp
+        return chosen or int(shot.inputs.facts("pilot", shot.keyframes[0])["spp"])
+
+    def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
+        if self._integrator is None or self._virtual_images is None:
+            assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`check_scene`)
+            self._integrator = Integrator(walk.renderer)
+            self._virtual_images = VirtualImages(walk.renderer)
+        if self._shot is None or self._shot.number != task.shot:
+            self._shot = None  # first, so that there is never memory for two
+            segments = inputs.analysis.segments(walk.settings[DecoupledSettings].spacing)[task.shot]
+            self._shot = Shot(task.shot, segments, inputs, walk, self._integrator, self._virtual_images)
+        return self._shot

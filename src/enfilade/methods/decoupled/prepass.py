@@ -1,0 +1,55 @@
+"""The irradiance prepass: a rough estimate at half resolution, which final gathering looks up.
+
+A gathered bounce lands at many places, so that the irradiance there may be rough (Ward and Heckbert 1992;
+Jensen 1996).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from enfilade.gbuffer import find_geometry
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Geometry
+from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
+from enfilade.settings import LimitSettings
+
+REDUCTION = 2  # of width and height
+SPP = 4
+
+
+def prepass_geometry(walk: Walkthrough, frame: int) -> Geometry:
+    """G-buffer of a prepass image."""
+    camera = walk.path.cameras[frame]
+    width, height = (max(size // REDUCTION, 1) for size in (camera.width, camera.height))
+    return find_geometry(walk.renderer, replace(camera, width=width, height=height))
+
+
+def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Output:
+    """Path trace the prepass image of a keyframe."""
+    geometry = prepass_geometry(walk, frame)
+    where = geometry.has_diffuse
+    estimate = Estimate(
+        geometry.camera,
+        np.flatnonzero(where).astype(np.uint32),
+        lambda rays, rng: Samples(
+            renderer.estimate_diffuse(renderer.intersect(rays, opaque_only=True), rng, path_depth=2)
+        ),
+        chunk=walk.settings[LimitSettings].paths_in_flight,
+        pixel_filter=PixelFilter.CENTRE,
+        random=walk.random(frame, Purpose.PREPASS),
+        layers=2,
+    )
+    estimate.add(SPP)
+    direct, indirect = (shading.spread(where) for shading in estimate.shadings)
+    facts = {
+        "rays": {"prepass": estimate.paths},
+        "diffuse_pixels": int(where.sum()),
+        "dropped": direct.dropped,
+    }
+    return Output({frame: IrradianceImage(direct, indirect, where)}, facts)

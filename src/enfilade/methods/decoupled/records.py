@@ -1,0 +1,75 @@
+"""Records of the decoupled method: irradiance images of keyframes, and shaded frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.records import U8, Mask, Shading
+
+F16 = npt.NDArray[np.float16]
+
+
+@dataclass(frozen=True, eq=False)
+class IrradianceImage:
+    """Light that arrives at the surfaces that a keyframe shows.
+
+    Attributes
+    ----------
+    direct, indirect : Shading
+        Of shape (H, W): radiance that the diffuse lobe would reflect if the albedo were one, that is
+        irradiance over pi, by light straight from emitters and by all other; 0 where it is not known.
+    is_known : (H, W) bool
+        Pixels whose irradiance was estimated.
+    """
+
+    direct: Shading
+    indirect: Shading
+    is_known: Mask
+
+    def __post_init__(self) -> None:
+        if self.is_known.shape != self.direct.variance.shape:
+            raise ValueError(f"is_known is {self.is_known.shape}, expected {self.direct.variance.shape}")
+
+
+@dataclass(frozen=True, eq=False)
+class SpecularAov:
+    """Radiance reflected or transmitted by specular lobes, before temporal accumulation.
+
+    Attributes
+    ----------
+    color : (H, W, 3) float16
+    deviation : (H, W) float16
+        Standard deviation of the luminance.
+    """
+
+    color: F16
+    deviation: F16
+
+
+@dataclass(frozen=True, eq=False)
+class ShadedFrame:
+    """A frame before temporal accumulation.
+
+    Attributes
+    ----------
+    diffuse : (H, W, 3) float16
+        Radiance emitted, and reflected by diffuse lobes.
+    reflection : SpecularAov
+    transmission : SpecularAov or None
+        Straight through clear surfaces; None where the frame shows none.
+    provenance : (H, W) uint8
+        :class:`enfilade.records.Provenance`.
+    """
+
+    diffuse: F16
+    reflection: SpecularAov
+    transmission: SpecularAov | None
+    provenance: U8
+
+    @property
+    def specular(self) -> list[SpecularAov]:
+        """The specular AOVs that there are."""
+        return [aov for aov in (self.reflection, self.transmission) if aov is not None]

@@ -1,0 +1,126 @@
+"""Numbers of samples that follow from the quality: a pilot pass for irradiance, edges, specular lobes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.irradiance import gather
+from enfilade.methods.decoupled.irradiance_cache import accumulate, light_of, upload
+from enfilade.methods.decoupled.shot import ACCUMULATED, Shot
+from enfilade.metric import Aqm, MetricOptions
+from enfilade.records import Geometry, Mask
+from enfilade.renderer import Emitters, Purpose
+from enfilade.settings import DecoupledSettings
+
+PILOT_SPP = 4  # of each of the two images that the pilot compares
+IRRADIANCE_SPP = 4, 256  # fewest and most
+MIN_DIFFUSE = 0.5  # of the most diffuse pixels of any keyframe: the pilot uses no keyframe with fewer
+EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel takes more camera rays
+EDGE_SPP = 256.0, 8, 64  # of a pixel at an edge, at a quality of one JND; fewest and most
+SPECULAR_SPP = 34.0, 2, 34  # of a pixel with specular lobes, likewise, by the root of the quality
+OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
+FFT_THREADS = 2
+
+
+def run_pilot(shot: Shot) -> Output:
+    """Choose the paths a pixel of irradiance images: measure the visible difference of two rough images."""
+    settings = shot.settings
+    frame = _pilot_frame(shot)
+    where = shot.walk.view(frame).geometry.has_diffuse
+    jnd = _pilot_jnd(shot, frame, where) if where.any() else 0.0
+    spp = irradiance_spp(jnd, settings.quality, len(shot.keyframes))
+    rays = 2 * PILOT_SPP * int(where.sum())
+    return Output(facts={"jnd": jnd, "spp": spp, "rays": {"prepass": rays}})
+
+
+def irradiance_spp(jnd: float, quality: float, keyframes: int) -> int:
+    """Paths a pixel of an irradiance image.
+
+    Parameters
+    ----------
+    jnd
+        Visible difference between two images of :data:`PILOT_SPP` paths.
+    quality
+        JND.
+    keyframes
+        Of the shot.
+    """
+    # Either image has half of the squared difference; accumulation shares the rest among the images.
+    images = max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
+    spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * images)
+    return int(np.clip(4 * math.ceil(spp / 4), *IRRADIANCE_SPP))
+
+
+def edge_spp(settings: DecoupledSettings) -> int:
+    """Camera rays of a pixel at an edge."""
+    return settings.edge_spp or _by_quality(EDGE_SPP, settings.quality)
+
+
+def specular_spp(settings: DecoupledSettings) -> int:
+    """Rays of a pixel with specular lobes."""
+    return settings.specular_spp or _by_quality(SPECULAR_SPP, math.sqrt(settings.quality))
+
+
+def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
+    """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
+
+    The first camera rays may miss them, and few hits among many rays would lose most of their light.
+
+    Parameters
+    ----------
+    emitters
+        Points on them.
+    geometry
+        G-buffer of the frame.
+    """
+    import scipy.ndimage
+
+    # Project the points.
+    camera = geometry.camera
+    height, width = geometry.shape_index.shape
+    x, y, depth = camera.pixel_from_direction @ (emitters.position - camera.eye).T
+    is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
+    row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
+    depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
+
+    # Leave out occluded ones, and pixels that have the same emitter all around.
+    farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
+    farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
+    lowest, highest = (
+        extreme(geometry.shape_index, 3, mode="nearest")
+        for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter)
+    )
+    is_interior = (lowest[row, column] == shape_index) & (highest[row, column] == shape_index)
+    is_visible = (depth < OCCLUDED * farthest[row, column]) & ~is_interior
+    mask = np.zeros((height, width), bool)
+    mask[row[is_visible], column[is_visible]] = True
+    return mask
+
+
+def _pilot_frame(shot: Shot) -> int:
+    """The middle keyframe, or the one with most diffuse pixels where the middle one has few."""
+    counts = {k: shot.inputs.facts("prepass", k)["diffuse_pixels"] for k in shot.keyframes}
+    middle = shot.keyframes[len(shot.keyframes) // 2]
+    most = max(shot.keyframes, key=lambda k: counts[k])
+    return most if counts[middle] < MIN_DIFFUSE * counts[most] else middle
+
+
+def _pilot_jnd(shot: Shot, frame: int, where: Mask) -> float:
+    """Visible difference between two irradiance images of a keyframe, as its surfaces show them."""
+    walk = shot.walk
+    geometry = walk.view(frame).geometry
+    shown = []
+    for purpose in (Purpose.PILOT, Purpose.IRRADIANCE):
+        image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
+        light = light_of(accumulate(geometry, where, [upload(geometry, image)]))
+        shown.append(walk.display_luminance(geometry.albedo * light))
+    metric = Aqm(walk.viewing, options=MetricOptions.modern(), workers=FFT_THREADS)
+    return metric.compare(shown[0], shown[1], valid=where).score
+
+
+def _by_quality(samples: tuple[float, int, int], quality: float) -> int:
+    at_one, least, most = samples
+    return min(max(round(at_one / quality), least), most)

@@ -1,0 +1,228 @@
+"""The irradiance of a shot: its keyframes, their images on the device, and their weights at a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from enfilade.cache import LruCache
+from enfilade.camera.path import CameraPath, Segment
+from enfilade.methods.analysis import keyframes_of
+from enfilade.methods.base import Inputs
+from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
+from enfilade.methods.decoupled.integrator import Integrator
+from enfilade.methods.decoupled.irradiance_cache import (
+    IrradianceCache,
+    accumulate,
+    is_covered,
+    reproject_to,
+    upload,
+)
+from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.prepass import prepass_geometry
+from enfilade.methods.decoupled.virtual_images import VirtualImages
+from enfilade.methods.denoise import denoise
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import F32, Geometry, Mask
+from enfilade.renderer import LobeRenderer
+from enfilade.settings import DecoupledSettings
+
+ACCUMULATED = 4  # keyframes to each side that are averaged with one
+PREPASS_IMAGES = 4  # nearest ones in which a point is looked up
+HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries a frame uses
+DISOCCLUSION_IMAGES = 2  # in which a frame looks: the ones before and after it
+MIN_WEIGHT = 1e-3  # of an image: it counts where no other shows the surface
+
+
+class Shot:
+    """The irradiance of a shot, on the device.
+
+    Parameters
+    ----------
+    number
+        Of the shot.
+    segments
+        Between its keyframes.
+    inputs
+        Results of earlier passes.
+    walk
+    integrator, virtual_images
+        Shared by all shots, as are their kernels.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        segments: list[Segment],
+        inputs: Inputs,
+        walk: Walkthrough,
+        integrator: Integrator,
+        virtual_images: VirtualImages,
+    ) -> None:
+        self.number = number
+        self.segments = segments
+        self.keyframes = keyframes_of(segments)
+        self.inputs = inputs
+        self.walk = walk
+        self.integrator = integrator
+        self.virtual_images = virtual_images
+        self.settings = walk.settings[DecoupledSettings]
+        # Sizes such that a walk along the path uploads and accumulates each image once.
+        self._prepass: LruCache[int, UploadedImage] = LruCache(2 * ACCUMULATED + 1 + PREPASS_IMAGES)
+        self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
+        self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
+        self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
+        self._irradiance: LruCache[int, UploadedImage] = LruCache(2 * (2 * ACCUMULATED + 1))
+        size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
+        self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
+        self._disocclusions: dict[int, list[int]] | None = None
+
+    @property
+    def renderer(self) -> LobeRenderer:
+        """The renderer."""
+        assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.check_scene`)
+        return self.walk.renderer
+
+    def prepass_cache(self, frame: int) -> IrradianceCache:
+        """The prepass images near a frame, accumulated; always as many, so that one kernel serves all."""
+        near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
+        images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
+        missing = PREPASS_IMAGES - len(images)
+        weights = [*[1.0] * len(images), *[0.0] * missing]
+        return IrradianceCache.of([*images, *[images[0]] * missing], weights)
+
+    def rough_cache(self, frame: int) -> IrradianceCache:
+        """Prepass images and hash grid near a frame, for final gathering."""
+        cache = self.prepass_cache(frame)
+        return IrradianceCache(cache.images, cache.weights, self.hash_grid(frame))
+
+    def hash_grid(self, frame: int) -> HashGrid | None:
+        """The hash grid near a frame."""
+        near = sorted(nearest(self.walk.path, self.keyframes, frame, HASH_GRID_KEYFRAMES))
+        if self._hash_grid[0] != near:
+            parts = [self._entries.get(k, lambda k=k: self.inputs.record("hash_grid", k)) for k in near]  # type: ignore[misc]
+            self._hash_grid = near, Entries.joined(parts).upload()
+        return self._hash_grid[1]
+
+    def caches(self, frame: int) -> tuple[IrradianceCache, IrradianceCache]:
+        """Irradiance reprojected to the very view of a frame, and the images near it.
+
+        Weights are such that no image comes or goes abruptly.
+        """
+        weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
+        images, shares = [self._accumulated_image(f) for f in weights], list(weights.values())
+        view = reproject_to(self.walk.view(frame).geometry, images, shares)
+        # Always as many images, so that one kernel serves all frames.
+        missing = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES - len(images)
+        images, shares = [*images, *[images[0]] * missing], [*shares, *[0.0] * missing]
+        return IrradianceCache.of([view], [1.0]), IrradianceCache.of(images, shares, self.hash_grid(frame))
+
+    def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
+        """Diffuse pixels of a frame that neither the keyframes nor some other images show, (H, W)."""
+        geometry = self.walk.view(frame).geometry
+        near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)
+        return geometry.has_diffuse & ~is_covered(geometry, [*map(self.image, near), *others.values()])
+
+    def image(self, frame: int) -> UploadedImage:
+        """The irradiance image of a keyframe, or a disocclusion image."""
+        pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
+        return self._irradiance.get(
+            frame, lambda: upload(self.walk.view(frame).geometry, self.inputs.record(pass_name, frame))
+        )
+
+    def prepass_geometry(self, frame: int) -> Geometry:
+        """G-buffer of a prepass image."""
+        return prepass_geometry(self.walk, frame)
+
+    def _prepass_image(self, frame: int) -> UploadedImage:
+        return self._prepass.get(
+            frame, lambda: upload(self.prepass_geometry(frame), self.inputs.record("prepass", frame))
+        )
+
+    def _accumulated_prepass_image(self, frame: int) -> UploadedImage:
+        def make() -> UploadedImage:
+            around = sorted(nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1))
+            own = self.inputs.record("prepass", frame)
+            images = [self._prepass_image(keyframe) for keyframe in around]
+            return accumulate(self.prepass_geometry(frame), own.is_known, images)
+
+        return self._accumulated_prepass.get(frame, make)
+
+    def _accumulated_image(self, frame: int) -> UploadedImage:
+        """An irradiance image, averaged with all images around it."""
+
+        def make() -> UploadedImage:
+            around = nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1)
+            disocclusions = sorted({f for frames in self.disocclusions().values() for f in frames})
+            around += nearest(self.walk.path, disocclusions, frame, 2 * ACCUMULATED + 1)
+            images = [self.image(f) for f in sorted({*around, frame})]
+            is_keyframe = frame in self.keyframes
+            own = self.inputs.record("irradiance" if is_keyframe else "disocclusion", frame)
+            geometry = self.walk.view(frame).geometry
+            # A disocclusion image shows too little for a denoiser.
+            has_denoiser = self.settings.denoiser != "none" and is_keyframe
+            denoiser = partial(self._denoised, geometry) if has_denoiser else None
+            return accumulate(geometry, own.is_known, images, denoiser)
+
+        return self._accumulated.get(frame, make)
+
+    def _denoised(self, geometry: Geometry, light: F32) -> F32:
+        has_diffuse = geometry.has_diffuse[..., None].astype(np.float32)
+        white = np.broadcast_to(has_diffuse, light.shape)  # irradiance has no albedo in it
+        return denoise(light, white, geometry.normal, quality=self.settings.denoiser)
+
+    def _keyframe_weights(self, frame: int) -> dict[int, float]:
+        """Weights of the nearest keyframes, which fall to nothing where another one takes over."""
+        count = self.settings.lookup_keyframes
+        *near, beyond = nearest(self.walk.path, self.keyframes, frame, count + 1)
+        reach = float(self._distance(frame, beyond))
+        if len(near) < count:
+            near, reach = [*near, beyond], 2.0 * max(reach, 1.0)
+        return {f: max(1.0 - self._distance(frame, f) / reach, MIN_WEIGHT) for f in near}
+
+    def _disocclusion_weights(self, frame: int) -> dict[int, float]:
+        """Weights of the disocclusion images before and after a frame, which blend into each other.
+
+        The outermost ones of a segment fall to nothing at its ends, where those of the next segment take
+        over.
+        """
+        segment = self._segment(frame)
+        pair = either_side(self.disocclusions()[segment.first], frame)
+        weights = {}
+        for one in pair:
+            ends = [f for f in (*pair, segment.first, segment.last) if (f - one) * (frame - one) > 0]
+            reach = min((self._distance(one, end) for end in ends), default=0)
+            weights[one] = max(1.0 - self._distance(frame, one) / reach, MIN_WEIGHT) if reach else 1.0
+        return weights
+
+    def _distance(self, one: int, other: int) -> int:
+        return abs(self.walk.path.distance(one) - self.walk.path.distance(other))
+
+    def _segment(self, frame: int) -> Segment:
+        """The segment of a frame, whose disocclusion images it uses."""
+        # The last segment ends where the camera stops: all frames after it show the same.
+        return next((s for s in self.segments if frame <= s.last), self.segments[-1])
+
+    def disocclusions(self) -> dict[int, list[int]]:
+        """Frames of the disocclusion images of each segment, by its first frame."""
+        if self._disocclusions is None:
+            places = {number: index for index, number in enumerate(self.walk.path.numbers)}
+            self._disocclusions = {
+                s.first: [places[n] for n in self.inputs.facts("disocclusion", s.first)["images"]]
+                for s in self.segments
+            }
+        return self._disocclusions
+
+
+def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list[int]:
+    """The frames of a list that are nearest on the path, nearest first; repeated poses are no distance."""
+    here = path.distance(frame)
+    return sorted(frames, key=lambda k: (abs(path.distance(k) - here), k))[:count]
+
+
+def either_side(frames: list[int], frame: int) -> list[int]:
+    """The last frame of a list that is not after one, and the first one that is not before."""
+    before, after = [f for f in frames if f <= frame], [f for f in frames if f >= frame]
+    return sorted({*before[-1:], *after[:1]})
