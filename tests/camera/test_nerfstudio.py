@@ -31,6 +31,7 @@ def test_poses_are_read_bit_by_bit(write, shape):
 
 
 def test_another_frame_rate_keeps_the_frames(write):
+    assert load_path(write(document(fps=None, seconds=2.5))).fps == 2.0
     path = load_path(write(document(fps=None)), fps=60.0)
     assert (path.fps, len(path)) == (60.0, 5)
 
@@ -69,6 +70,8 @@ def test_malformed_matrices(write, value):
         (document(camera_path=[{"camera_to_world": np.eye(4).tolist()}]), "frame 1: fov is missing"),
         (document(2.0 * POSES), "frame 1: the last row of a pose"),
         (document(POSES * (2, 1, 1, 1)), "frame 1: the pose is not rigid"),
+        (document(camera_path=[{"camera_type": "fisheye"}]), "frame 1: camera_type is 'fisheye'"),
+        (document(fps=None, seconds=1e-4), "seconds is 0.0001; expected a number from 0.0005 to 500"),
         (document(fps=None), "fps is missing; expected a number"),
         (document(render_width=100_000), "render_width is 100000; expected a whole number from 1 to 16384"),
         (document(render_width=640.5), "render_width is 640.5"),

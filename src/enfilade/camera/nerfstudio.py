@@ -20,10 +20,14 @@ from enfilade.errors import CameraPathError
 
 def read_nerfstudio(document: JsonObject, size: tuple[int, int], fps: float | None = None) -> CameraPath:
     """Cameras of all frames, with detected cuts; `fps` replaces the file's frame rate."""
-    kind = document.values.get("camera_type", "perspective")
-    if kind != "perspective":
-        raise document.error(f"camera_type is {shorten(kind)}; only perspective cameras are supported")
-    cameras = tuple(_camera(frame, size) for frame in document.objects("camera_path", "frame"))
+    frames = document.objects("camera_path", "frame")
+    for entry in (document, *frames):
+        kind = entry.values.get("camera_type", "perspective")
+        if kind != "perspective":
+            raise entry.error(f"camera_type is {shorten(kind)}; only perspective cameras are supported")
+    if fps is None and "seconds" in document and "fps" not in document:
+        fps = len(frames) / document.number("seconds", (len(frames) / FPS[1], len(frames) / FPS[0]))
+    cameras = tuple(_camera(frame, size) for frame in frames)
     cuts = find_cuts(np.stack([camera.world_from_camera for camera in cameras]))
     numbers = tuple(range(1, len(cameras) + 1))
     return CameraPath(cameras, numbers, fps or document.number("fps", FPS), cuts)
