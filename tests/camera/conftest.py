@@ -1,19 +1,13 @@
 import json
-from pathlib import Path
-from typing import Any, Protocol
 
 import pytest
 
 
-class Write(Protocol):
-    def __call__(self, content: Any) -> Path: ...
-
-
 @pytest.fixture
-def write(tmp_path: Path) -> Write:
+def write(tmp_path):
     """Write a camera path's JSON, or text as it is."""
 
-    def write_file(content: Any) -> Path:
+    def write_file(content):
         file = tmp_path / "walk.json"
         file.write_text(content if isinstance(content, str) else json.dumps(content))
         return file

@@ -4,71 +4,48 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from enfilade.camera.cuts import find_jumps
+from enfilade.camera.cuts import find_cuts
 from enfilade.camera.pinhole import look_at
 
 
-def poses(eyes, yaw_deg=None):
-    result = np.tile(np.eye(4), (len(eyes), 1, 1))
-    result[:, :3, 3] = eyes
+def along_x(x, yaw_deg=None):
+    """Poses at (x, 1.6, 0), turned about y."""
+    poses = np.tile(np.eye(4), (len(x), 1, 1))
+    poses[:, 0, 3], poses[:, 1, 3] = x, 1.6
     if yaw_deg is not None:
-        result[:, :3, :3] = Rotation.from_rotvec(np.radians(np.outer(yaw_deg, (0, 1, 0)))).as_matrix()
-    return result
+        poses[:, :3, :3] = Rotation.from_rotvec(np.radians(np.outer(yaw_deg, (0, 1, 0)))).as_matrix()
+    return poses
 
 
-def along_x(x):
-    return np.stack([x, np.full_like(x, 1.6), np.zeros_like(x)], axis=1)
-
-
-def test_a_jump_of_place_and_a_jump_of_direction_are_found():
-    x = np.arange(40) * 0.05
+def test_jumps_of_position_and_of_direction_are_cuts():
+    x, yaw = np.arange(40) * 0.05, np.arange(40) * 1.5
     x[17:] += 6.0
-    yaw = np.arange(40) * 1.5
     yaw[30:] += 90.0
-    assert find_jumps(poses(along_x(x), yaw)) == {17, 30}
+    assert find_cuts(along_x(x, yaw)) == {17, 30}
 
 
-def test_a_cut_between_two_shots_at_rest_is_found():
-    x = np.zeros(20)
-    x[10:] = 3.0
-    assert find_jumps(poses(along_x(x))) == {10}
+@given(st.integers(4, 35), st.floats(1e-3, 1e3), st.sampled_from([0.0, 0.04]))
+def test_a_cut_is_found_at_any_frame_and_scale(frame, scale, speed):
+    x = np.arange(40) * speed * scale
+    x[frame:] += 2.0 * scale
+    assert find_cuts(along_x(x)) == {frame}
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_few_frames_have_no_cut(count):
-    assert find_jumps(poses(along_x(np.arange(count) * 10.0))) == frozenset()
+def test_few_frames_rests_and_stops_are_no_cuts():
+    steps = np.concatenate([np.zeros(15), np.arange(1, 11) * 2.0, np.full(15, 20.0)])
+    rounding_errors = 2.5 + np.random.default_rng(1).normal(0.0, 1e-7, 50)
+    for x in (np.zeros(1), np.arange(2) * 10.0, np.arange(3) * 10.0, steps, rounding_errors):
+        assert find_cuts(along_x(x)) == frozenset()
 
 
 @pytest.mark.parametrize("sigma", [0.8, 1.5, 4.0])
-def test_a_whip_pan_of_some_frames_is_no_cut(sigma):
-    # the angle is a smooth step of 170 degrees: its speed a bell of `sigma` frames
-    t = np.arange(60) - 30.2
-    yaw = 85.0 * np.tanh(t / (1.5 * sigma))
-    assert find_jumps(poses(along_x(np.zeros(60)), yaw)) == frozenset()
+def test_a_whip_pan_of_a_few_frames_is_not_a_cut(sigma):
+    yaw = 85.0 * np.tanh((np.arange(60) - 30.2) / (1.5 * sigma))  # the speed is a bell of `sigma` frames
+    assert find_cuts(along_x(np.zeros(60), yaw)) == frozenset()
 
 
-def test_motion_from_a_stop_is_no_cut():
-    x = np.concatenate([np.zeros(15), np.arange(1, 11) * 2.0, np.full(15, 20.0)])
-    assert find_jumps(poses(along_x(x))) == frozenset()
-
-
-def test_rest_with_rounding_is_no_cut():
-    rng = np.random.default_rng(1)
-    eyes = np.full((50, 3), 2.5).round(3) + rng.normal(0.0, 1e-7, (50, 3))
-    assert find_jumps(poses(eyes)) == frozenset()
-
-
-@given(
-    st.floats(0.1, 20.0), st.floats(0.0, 6.0), st.floats(0.2, 3.0), st.integers(8, 200), st.floats(1e-3, 1e3)
-)
-def test_smooth_orbits_have_no_cuts(radius, phase, turns, count, scale):
+@given(st.floats(0.0, 6.0), st.floats(0.2, 3.0), st.integers(8, 200), st.floats(1e-3, 1e3))
+def test_smooth_orbits_have_no_cuts(phase, turns, count, radius):
     angle = phase + np.linspace(0.0, 1.0, count) ** 2 * 2.0 * np.pi * turns * min(count / 40.0, 1.0)
-    eyes = scale * radius * np.stack([np.cos(angle), 0.3 + 0.1 * np.sin(2.0 * angle), np.sin(angle)], axis=1)
-    assert find_jumps(np.stack([look_at(eye, (0.0, 0.0, 0.0)) for eye in eyes])) == frozenset()
-
-
-@given(st.integers(4, 35), st.floats(1e-3, 1e3))
-def test_a_cut_anywhere_is_found_at_any_scale(frame, scale):
-    x = np.arange(40) * 0.04 * scale
-    x[frame:] += 2.0 * scale
-    assert find_jumps(poses(along_x(x))) == {frame}
+    eyes = radius * np.stack([np.cos(angle), 0.3 + 0.1 * np.sin(2.0 * angle), np.sin(angle)], axis=1)
+    assert find_cuts(look_at(eyes, (0.0, 0.0, 0.0))) == frozenset()

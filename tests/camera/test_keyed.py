@@ -8,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from enfilade.camera.fields import Table
-from enfilade.camera.interpolate import interpolate_rotations
-from enfilade.camera.keyed import read_keyed
-from enfilade.camera.pinhole import check_rigid
+from enfilade.camera.fields import JsonObject
+from enfilade.camera.keyed import interpolate_rotations, read_keyed
 from enfilade.errors import CameraPathError
 
 DOCS = Path(__file__).parents[2] / "docs" / "camera-paths.md"
@@ -23,183 +21,148 @@ def key(time, eye=(0, 1, 5), **more):
 
 
 def read(keys, *, at=None, **more):
-    return read_keyed(
-        Table({"format": "enfilade-path", "fps": 10, "keys": keys, **more}, "walk.json"), fps=at
-    )
+    values = {"format": "enfilade-path", "fps": 10, "keys": keys, **more}
+    return read_keyed(JsonObject(values, "walk.json"), (640, 480), fps=at)
 
 
-def eyes(shots):
-    return shots.poses[:, :3, 3]
+def poses(path):
+    return np.stack([camera.world_from_camera for camera in path.cameras])
 
 
-def test_two_keys_move_uniformly_and_show_both_ends():
-    shots = read([key(0), key(2, (4, 1, 5))])
-    np.testing.assert_allclose(eyes(shots)[:, 0], np.linspace(0, 4, 21), atol=1e-12)
-    assert shots.cuts == frozenset()
+def x_of(path):
+    return poses(path)[:, 0, 3]
 
 
-def test_frame_rate_of_the_caller_samples_the_same_motion():
-    coarse, fine = (
-        read([key(0), key(1, (4, 2, 5)), key(3)]),
-        read([key(0), key(1, (4, 2, 5)), key(3)], at=20.0),
-    )
-    np.testing.assert_allclose(fine.poses[::2], coarse.poses, atol=1e-12)
-    assert fine.fps == 20.0
+def test_two_keys_give_uniform_motion_that_includes_both():
+    path = read([key(0), key(2, (4, 1, 5))])
+    np.testing.assert_allclose(x_of(path), np.linspace(0, 4, 21), atol=1e-12)
+    assert (path.numbers, path.cuts, path.fps) == (tuple(range(1, 22)), frozenset(), 10.0)
 
 
 @pytest.mark.parametrize(("rate", "count"), [(20.0, 40), (5.0, 10), (10.0, 20), (12.5, 25)])
-def test_frames_of_the_file_last_as_long_at_another_rate(rate, count):
-    keys = [key(0), key(2, (4, 2, 5))]
-    coarse, other = read(keys, frames=20), read(keys, frames=20, at=rate)
-    assert len(other.poses) == count
-    at = np.arange(count) / rate
-    np.testing.assert_allclose(eyes(other)[:, 0], 2.0 * at, atol=1e-12)
-    np.testing.assert_allclose(other.poses[0], coarse.poses[0], atol=1e-12)
-    with pytest.raises(CameraPathError, match="20000000 frames are too many"):
-        read(keys, frames=20, at=1e7)
+def test_another_frame_rate_samples_the_same_motion(rate, count):
+    path = read([key(0), key(2, (4, 2, 5))], frames=20, at=rate)
+    assert (len(path), path.fps) == (count, rate)
+    np.testing.assert_allclose(x_of(path), 2.0 * np.arange(count) / rate, atol=1e-12)
 
 
-def test_without_a_rate_in_the_file_its_frames_are_those_of_the_caller():
-    assert len(read([key(0), key(1)], fps=None, frames=7, at=24.0).poses) == 7
+@pytest.mark.parametrize(
+    ("keys", "more", "count"),
+    [
+        ([key(0), key(1)], {}, 11),
+        ([key(4)], {"frames": 7}, 7),
+        ([key(4)], {"seconds": 1.5}, 15),
+        ([key(4)], {"seconds": 0.01}, 1),
+        ([key(4, hold=1)], {}, 11),
+        ([key(0), key(1)], {"seconds": 1}, 10),
+        ([key(0), key(1)], {"frames": 20}, 20),
+        ([key(0), key(1)], {"fps": None, "frames": 7, "at": 24.0}, 7),
+    ],
+)
+def test_lengths(keys, more, count):
+    path = read(keys, **more)
+    assert len(path) == count
+    assert path.distinct_frames == (0,)
 
 
-def test_a_hold_is_a_real_stop():
-    shots = read([key(0), key(1, (2, 1, 5), hold=1.0), key(3, (6, 1, 5))])
-    x = eyes(shots)[:, 0]
-    assert (x[10:21] == 2.0).all()
-    assert (shots.poses[10:21] == shots.poses[10]).all()
-    speed = np.diff(x)
+@pytest.mark.parametrize("pose", [{}, {"rotation": [0.8, 0.6, 0, 0]}])
+def test_holds_and_the_last_pose_are_real_stops(pose):
+    path = read([key(0), key(1, (2, 1, 5), hold=1.0, **pose), key(3, (6, 1, 5))], frames=40)
+    assert path.distinct_frames == (*range(11), *range(21, 31))
+    speed = np.diff(x_of(path))
     assert (speed >= 0).all()
-    assert speed[9] < 0.3 * speed[0]  # it arrives gently
+    assert speed[9] < 0.3 * speed[0]  # gentle arrival
 
 
-def test_targets_are_kept_in_the_middle_of_the_image():
-    shots = read([key(0), key(1, (3, 2, 1)), key(2, (5, 0, -2))])
-    for pose in shots.poses:
-        aim = np.linalg.inv(pose) @ (0, 1, 0, 1)
+def test_targets_stay_in_the_middle_of_the_image():
+    for camera in read([key(0), key(1, (3, 2, 1)), key(2, (5, 0, -2))]).cameras:
+        aim = np.linalg.inv(camera.world_from_camera) @ (0, 1, 0, 1)
         assert np.abs(aim[:2]).max() < 1e-9
         assert aim[2] < 0
 
 
-def test_a_cut_interpolates_nothing_across():
-    shots = read([key(0), key(1, (1, 1, 5)), key(2, (100, 1, 5), cut=True), key(3, (101, 1, 5))])
-    x = eyes(shots)[:, 0]
-    assert shots.cuts == {20}
-    assert (x[10:20] == 1.0).all()  # the shot before rests until the cut
-    assert x[20] == 100.0
-
-
-def test_a_cut_between_two_frames_begins_with_the_next():
-    shots = read([key(0), key(1.05, (9, 1, 5), cut=True), key(2, (9, 2, 5))])
-    assert shots.cuts == {11}
-    assert eyes(shots)[10, 0] == 0.0
-    assert eyes(shots)[11, 0] == 9.0
-
-
-@pytest.mark.parametrize("is_held", [True, False])
-def test_a_cut_may_come_when_a_rest_ends(is_held):
-    first = key(1, (1, 1, 5), hold=0.2 if is_held else 0.0)
-    cut = 1.2 if is_held else 1.0
-    shots = read([key(0), first, key(cut, (100, 1, 5), cut=True), key(3, (101, 1, 5))])
-    x, begin = eyes(shots)[:, 0], round(10 * cut)
-    assert shots.cuts == {begin}
-    assert (x[10:begin] == 1.0).all()
-    assert x[begin] == 100.0
-
-
-def test_a_cut_at_the_end_of_a_rest_is_found_in_decimals():  # in floats 0.1 + 0.2 is beyond 0.3
-    shots = read([key(0.1, hold=0.2), key(0.3, (100, 1, 5), cut=True), key(1)])
-    assert shots.cuts == {2}
-
-
-def test_a_shot_too_short_for_a_frame_vanishes():
-    shots = read([key(0), key(1.01, cut=True), key(1.02, (7, 1, 5), cut=True), key(2, (8, 1, 5))])
-    assert shots.cuts == {11}
-
-
 @pytest.mark.parametrize(
-    ("more", "count"), [({"frames": 7}, 7), ({"seconds": 1.5}, 15), ({"seconds": 0.01}, 1)]
+    ("times", "hold", "begin"),
+    [
+        ([0, 1, 2], 0, 20),
+        ([0, 1, 1.05], 0, 11),
+        ([0, 1, 1], 0, 10),
+        ([0, 1, 1.2], 0.2, 12),
+        ([0, 0.1, 0.3], 0.2, 3),
+        ([0, 1, 1.01, 1.02], 0, 11),
+    ],
 )
-def test_one_key_is_a_camera_at_rest(more, count):
-    shots = read([key(4)], **more)
-    assert len(shots.poses) == count
-    assert (shots.poses == shots.poses[0]).all()
-    assert len(read([key(4, hold=1)]).poses) == 11
-
-
-def test_a_length_beyond_the_keys_holds_the_last_pose():
-    shots = read([key(0), key(1, (1, 1, 5))], frames=20)
-    assert (eyes(shots)[10:, 0] == 1.0).all()
-    assert len(read([key(0), key(1)], seconds=1).poses) == 10
+def test_the_camera_rests_until_a_cut(times, hold, begin):
+    first, last, *cuts = times
+    shots = [key(t, (3 + n, 1, 5), cut=True) for n, t in enumerate(cuts)]
+    path = read([key(first), key(last, (1, 1, 5), hold=hold), *shots], seconds=3)
+    x, rest = x_of(path), round(10 * last)
+    assert path.cuts == {begin}
+    assert (x[:rest] < 1).all()
+    np.testing.assert_allclose(x[rest:begin], 1, atol=1e-12)
+    assert (x[begin:] == shots[-1]["eye"][0]).all()
 
 
 def test_zoom_and_inherited_field_of_view():
-    shots = read([key(0, fov=90), key(1, fov=20), {**key(2), "fov": None}])
-    assert shots.fov_deg[[0, 10, 20]] == pytest.approx([90, 20, 20])
-    assert (np.diff(shots.fov_deg) <= 1e-9).all()
+    path = read([key(0, fov=90), key(1, fov=20), {**key(2), "fov": None}])
+    fov_deg = np.array([camera.fov_deg for camera in path.cameras])
+    assert fov_deg[[0, 10, 20]] == pytest.approx([90, 20, 20])
+    assert (np.diff(fov_deg) <= 1e-9).all()
 
 
 def test_quaternions_are_w_first():
     quarter = [0.5**0.5, 0, 0.5**0.5, 0]  # a quarter turn to the left, about +y
-    shots = read([key(0, rotation=quarter)], frames=1)
-    np.testing.assert_allclose(shots.poses[0, :3, 2], (1, 0, 0), atol=1e-12)  # looks along -x
+    (camera,) = read([key(0, rotation=quarter)], frames=1).cameras
+    np.testing.assert_allclose(camera.world_from_camera[:3, 2], (1, 0, 0), atol=1e-12)  # looks along -x
 
 
 def test_targets_and_rotations_mix():
-    shots = read([key(0), key(1, (0, 1, 5), rotation=[1, 0, 0, 0])])
-    np.testing.assert_allclose(shots.poses[:, :3, :3], np.tile(np.eye(3), (11, 1, 1)), atol=1e-12)
+    path = read([key(0), key(1, (0, 1, 5), rotation=[1, 0, 0, 0])])
+    np.testing.assert_allclose(poses(path)[:, :3, :3], np.tile(np.eye(3), (11, 1, 1)), atol=1e-12)
 
 
-def rotations(seed, count, spread_deg):
+def test_two_rotations_give_a_uniform_turn():
+    keys = Rotation.from_euler("xyz", [(10, 20, 30), (60, 140, -10)], degrees=True)
+    steps = interpolate_rotations(np.array([1.0, 3.0]), keys, np.linspace(1, 3, 9))
+    speeds = (steps[:-1].inv() * steps[1:]).as_rotvec()
+    np.testing.assert_allclose(speeds, np.tile((keys[0].inv() * keys[1]).as_rotvec() / 8, (8, 1)), atol=1e-12)
+
+
+@given(st.integers(0, 1000), st.integers(1, 5), st.floats(0.02, 2.6))
+def test_rotations_meet_their_keys_with_continuous_velocity(seed, count, spread):
     turns = Rotation.random(count, rng=seed).as_rotvec()
-    turns *= np.radians(spread_deg) / np.linalg.norm(turns, axis=1, keepdims=True)
-    result = [Rotation.identity()]
+    turns *= spread / np.linalg.norm(turns, axis=1, keepdims=True)  # radians between keys
+    keys = [Rotation.identity()]
     for turn in turns:
-        result.append(result[-1] * Rotation.from_rotvec(turn))
-    return Rotation.concatenate(result).as_matrix()
-
-
-@given(st.integers(0, 1000), st.integers(1, 5), st.floats(1.0, 150.0))
-def test_rotations_meet_their_keys_with_continuous_rate(seed, count, spread_deg):
-    keys = rotations(seed, count, spread_deg)
+        keys.append(keys[-1] * Rotation.from_rotvec(turn))
     knots = np.cumsum(np.random.default_rng(seed).uniform(0.5, 2.0, count + 1))
-    np.testing.assert_allclose(interpolate_rotations(knots, keys, knots), keys, atol=1e-9)
-    for knot in knots[1:-1]:
-        h = 1e-5
-        before, at, after = Rotation.from_matrix(
-            interpolate_rotations(knots, keys, knot + h * np.array([-1, 0, 1]))
-        )
-        left, right = (before.inv() * at).as_rotvec() / h, (at.inv() * after).as_rotvec() / h
-        # one-sided differences are off by h times the angular acceleration, below 1e3 rad/s2 here
-        np.testing.assert_allclose(left, right, atol=1e-2)
+    h = 1e-5
+    around = np.clip(knots[:, None] + h * np.array([-1, 0, 1]), knots[0], knots[-1])
+    found = interpolate_rotations(knots, Rotation.concatenate(keys), around.ravel())
+    before, at, after = found[::3], found[1::3], found[2::3]
+    np.testing.assert_allclose((at.inv() * Rotation.concatenate(keys)).magnitude(), 0, atol=1e-9)
+    left, right = (before.inv() * at).as_rotvec() / h, (at.inv() * after).as_rotvec() / h
+    # one-sided differences are off by h times the angular acceleration, below 1e3 rad/s2 here
+    np.testing.assert_allclose(left[1:-1], right[1:-1], atol=1e-2)
 
 
-def test_equal_rotations_stay_equal():
-    keys = rotations(3, 1, 80.0)[[0, 1, 1, 0]]
-    between = interpolate_rotations(np.arange(4.0), keys, np.linspace(1, 2, 9))
-    np.testing.assert_allclose(between, np.tile(keys[1], (9, 1, 1)), atol=1e-12)
+row = st.tuples(*[st.integers(-50, 50)] * 3, st.floats(5, 120), st.floats(0.1, 5.0), st.booleans())
 
 
-@given(
-    st.lists(
-        st.tuples(*[st.floats(-50, 50)] * 3, st.floats(0.1, 5.0), st.floats(5, 120), st.booleans()),
-        min_size=2,
-        max_size=8,
+@given(st.lists(row, min_size=2, max_size=8))
+def test_values_stay_within_those_of_the_keys(rows):
+    *eye, fov, step, cut = zip(*rows, strict=True)
+    times, eyes = np.cumsum(step), np.transpose(eye)
+    path = read(
+        [
+            key(t, e, fov=f, cut=c, rotation=[1, 0, 0, 0])
+            for t, e, f, c in zip(times, eyes.tolist(), fov, cut, strict=True)
+        ]
     )
-)
-def test_any_keys_give_rigid_poses_within_their_hull(rows):
-    time, keys = 0.0, []
-    for x, y, z, pause, fov, is_cut in rows:
-        time += pause
-        keys.append(key(time, (x, y, z), fov=fov, rotation=[1, 0, 0, 0], cut=is_cut))
-    shots = read(keys)
-    for pose in shots.poses:
-        check_rigid(pose)
-    place = np.array([row[:3] for row in rows])
-    assert (eyes(shots) >= place.min(axis=0) - 1e-9).all()
-    assert (eyes(shots) <= place.max(axis=0) + 1e-9).all()
-    assert shots.fov_deg.min() >= min(row[4] for row in rows) - 1e-6
-    assert shots.fov_deg.max() <= max(row[4] for row in rows) + 1e-6
+    found = np.array([(*camera.eye, camera.fov_deg) for camera in path.cameras])
+    keys = np.column_stack([eyes, fov])
+    assert (found >= keys.min(axis=0) - 1e-6).all()
+    assert (found <= keys.max(axis=0) + 1e-6).all()
 
 
 @pytest.mark.parametrize(
@@ -207,44 +170,35 @@ def test_any_keys_give_rigid_poses_within_their_hull(rows):
     [
         ([key(0), key(1)], {"fsp": 3}, "unknown key 'fsp'; known are: format, fps"),
         ([key(0, ease=1)], {}, "key 1: unknown key 'ease'; known are: time"),
-        ([key(0)], {}, "one key is a camera at rest"),
+        ([key(0)], {}, "a single key has no duration"),
         ([key(0)], {"frames": 3, "seconds": 2}, "not both"),
-        ([key(0)], {"frames": 0}, "frames is 0"),
-        ([key(0)], {"frames": 2.5}, "frames is 2.5"),
+        ([key(0)], {"frames": 0}, r"frames is 0; expected a whole number from 1 to 1e\+06"),
         ([key(0)], {"seconds": -1}, "seconds is -1"),
-        ([key(0), key(1e9)], {}, "too many"),
+        ([key(0), key(1e9)], {}, "frames are too many"),
+        ([key(0), key(2)], {"frames": 20, "at": 1e7}, "20000000 frames are too many"),
         ([], {}, "at least one key"),
-        ([key(0), key(0)], {}, "key 2: time 0 does not follow 0"),
-        ([key(0, hold=2), key(1)], {}, "key 2: time 1 does not follow 2"),
-        ([key(0, hold=2), key(2)], {}, "key 2: time 2 does not follow 2"),
-        ([key(0, hold=2), key(1, cut=True)], {}, "key 2: time 1 does not follow 2"),
+        ([key(0), key(0)], {}, "key 2: time 0 must follow 0"),
+        ([key(0, hold=2), key(2)], {}, "key 2: time 2 must follow 2"),
+        ([key(0, hold=2), key(1, cut=True)], {}, "key 2: time 1 must follow 2"),
         ([key(0, hold=-1)], {}, "key 1: hold is -1"),
-        ([key(0, cut=1)], {}, "key 1: cut is 1; it must be true or false"),
+        ([key(0, cut=1)], {}, "key 1: cut is 1; expected true or false"),
         ([key(0, target=[0, 1, 5])], {"frames": 1}, "key 1: .* can't look at"),
         ([key(0, up=[0, 0, 1])], {"frames": 1}, "key 1: .* up"),
         ([key(0, rotation=[1, 0, 0, 0], target=[0, 0, 0])], {}, "key 1: give either"),
         ([{"time": 0, "eye": [0, 0, 0], "fov": 3}], {}, "key 1: give either"),
-        ([key(0, rotation=[2, 0, 0, 0])], {}, "key 1: .* length 2"),
+        ([key(0, rotation=[2, 0, 0, 0])], {}, "key 1: rotation has length 2"),
         ([key(0, fov=None)], {}, "key 1: fov is missing"),
-        ([key(0, fov=0)], {}, "key 1: fov is 0"),
-        ([key(0, eye=[0, float("nan"), 0])], {}, "key 1: eye holds a NaN"),
         ([key(0, eye=[0, 1])], {}, "key 1: eye .* list of 3"),
-        ([key("0")], {}, "key 1: time holds '0'"),
-        ([key(0), key(1)], {"size": [640]}, "list of 2"),
-        ([key(0), key(1)], {"size": [640, 20000]}, "size is 640x20000"),
-        ([key(0), key(1)], {"fps": 0}, "fps is 0"),
-        ([key(0), key(1)], {"fps": 0.009}, "fps is 0.009; it must be from 0.01 to 10000"),
-        ([key(0), key(1)], {"fps": 10001}, "fps is 10001; it must be from"),
         ([key(0), key(1, (0, 1, -5))], {}, "between two keys .* can't look at"),
     ],
 )
-def test_wrong_input_is_named(keys, more, problem):
+def test_malformed_files(keys, more, problem):
     with pytest.raises(CameraPathError, match=f"walk.json.*{problem}"):
         read(keys, **more)
 
 
-def test_the_example_of_the_docs_is_read():
+def test_the_example_of_the_docs():
     example = json.loads(re.search(r"```json\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)[1])
-    shots = read_keyed(Table(example, "docs"))
-    assert (len(shots.poses), shots.size, shots.cuts) == (301, (640, 480), {240})
-    assert (shots.poses[90:151] == shots.poses[90]).all()
+    path = read_keyed(JsonObject(example, "docs"), (640, 480))
+    assert (len(path), path.cuts) == (301, {240})
+    assert {path.static_frame(frame) for frame in range(90, 151)} == {90}

@@ -1,5 +1,3 @@
-"""Intrinsics, poses, and the matrices of the warp."""
-
 import math
 
 import numpy as np
@@ -8,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from enfilade.camera.pinhole import Camera, check_rigid, look_at
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import CameraPathError
 
 coordinates = st.tuples(*[st.floats(-100, 100)] * 3)
@@ -18,24 +16,12 @@ def a_camera(width=640, height=480, fov_deg=50.0, pose=None):
     return Camera(look_at((1, 2, 3), (0, 1, 0)) if pose is None else pose, fov_deg, width, height)
 
 
-def test_the_centre_of_the_image_looks_along_minus_z():
-    camera = a_camera(pose=np.eye(4))
-    np.testing.assert_allclose(camera.direction_from_pixel @ (320, 240, 1), (0, 0, -1), atol=1e-12)
-
-
-def test_x_goes_right_and_y_goes_down():
-    camera = a_camera(pose=np.eye(4))
-    right, down = (camera.direction_from_pixel @ p for p in ((640, 240, 1), (320, 480, 1)))
-    assert right[0] > 0
-    assert down[1] < 0
-
-
-def test_the_field_of_view_is_vertical():
+def test_axes_and_vertical_field_of_view():
     camera = a_camera(fov_deg=90, pose=np.eye(4))
     assert camera.focal_px == pytest.approx(240)
-    top, bottom = (camera.direction_from_pixel @ (320, y, 1) for y in (0, 480))
-    angle = math.degrees(math.acos(top @ bottom / (np.linalg.norm(top) * np.linalg.norm(bottom))))
-    assert angle == pytest.approx(90)
+    pixels = [(320, 240, 1), (640, 240, 1), (320, 480, 1)]  # centre, right edge, bottom edge
+    rays = np.array(pixels) @ camera.direction_from_pixel.T
+    np.testing.assert_allclose(rays, [(0, 0, -1), (4 / 3, 0, -1), (0, -1, -1)], atol=1e-12)
 
 
 @given(coordinates, coordinates, st.floats(1, 170), st.floats(0, 1), st.floats(0, 1), st.floats(0.01, 1000))
@@ -55,24 +41,20 @@ def test_pixel_to_point_and_back(eye, target, fov_deg, across, down, depth):
 def test_look_at_is_rigid_and_aims(eye, target):
     away = np.subtract(target, eye)
     assume(np.linalg.norm(np.cross(away, (0, 1, 0))) > 1e-6)
-    pose = look_at(eye, target)
-    check_rigid(pose)
+    pose = a_camera(
+        pose=look_at(eye, target)
+    ).world_from_camera  # the camera refuses poses that are not rigid
     np.testing.assert_allclose(-pose[:3, 2], away / np.linalg.norm(away), atol=1e-9)
     np.testing.assert_array_equal(pose[:3, 3], eye)
     assert pose[1, 1] >= 0  # up is up
 
 
 @pytest.mark.parametrize(
-    ("eye", "target", "up"),
-    [
-        ((0, 0, 0), (0, 0, 0), (0, 1, 0)),
-        ((0, 5, 0), (0, 0, 0), (0, 1, 0)),
-        ((0, 0, 1), (0, 0, 0), (0, 0, 0)),
-    ],
+    ("eye", "up"), [((0, 0, 0), (0, 1, 0)), ((0, 5, 0), (0, 1, 0)), ((0, 0, 1), (0, 0, 0))]
 )
-def test_look_at_refuses_what_has_no_answer(eye, target, up):
+def test_look_at_without_a_solution(eye, up):
     with pytest.raises(CameraPathError, match="can't look at"):
-        look_at(eye, target, up)
+        look_at(eye, (0, 0, 0), up)
 
 
 def changed(row, column, value):
@@ -85,37 +67,38 @@ def changed(row, column, value):
     ("matrix", "problem"),
     [
         (np.eye(3), "4x4"),
-        (changed(0, 3, np.nan), "NaN"),
-        (changed(1, 3, np.inf), "infinity"),
+        (changed(0, 3, np.nan), "finite"),
+        (changed(1, 3, np.inf), "finite"),
         (changed(3, 0, 0.5), "last row"),
         (changed(0, 0, 1.01), "not rigid: .* 0.0201"),
-        (changed(0, 1, 0.01), "not rigid"),
-        (np.zeros((4, 4)), "last row"),
-        (changed(0, 0, -1.0), "mirror image"),
+        (changed(0, 0, -1.0), "reflection"),
     ],
 )
-def test_poses_that_are_not_rigid_are_refused(matrix, problem):
+def test_poses_that_are_not_rigid(matrix, problem):
     with pytest.raises(CameraPathError, match=problem):
-        Camera(matrix, 50.0, 64, 48)
+        a_camera(pose=matrix)
 
 
-def test_poses_of_few_digits_are_taken():
+def test_poses_of_four_digits_are_rigid():
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_euler("xyz", (10, 20, 30), degrees=True).as_matrix().round(4)
-    check_rigid(pose)
+    a_camera(pose=pose)
 
 
 @pytest.mark.parametrize(
     ("fov_deg", "size"), [(0, (4, 4)), (180, (4, 4)), (math.nan, (4, 4)), (50, (0, 4)), (50, (4, -1))]
 )
-def test_numbers_out_of_range_are_refused(fov_deg, size):
+def test_numbers_out_of_range(fov_deg, size):
     with pytest.raises(CameraPathError):
         a_camera(*size, fov_deg=fov_deg)
 
 
-def test_views_are_the_same_only_when_all_is():
+def test_same_views():
     camera = a_camera()
     assert camera.is_same_view(a_camera())
-    assert not camera.is_same_view(a_camera(fov_deg=51))
-    assert not camera.is_same_view(a_camera(width=641))
-    assert not camera.is_same_view(a_camera(pose=look_at((1, 2, 3.0001), (0, 1, 0))))
+    for other in (
+        a_camera(fov_deg=51),
+        a_camera(width=641),
+        a_camera(pose=look_at((1, 2, 3.0001), (0, 1, 0))),
+    ):
+        assert not camera.is_same_view(other)

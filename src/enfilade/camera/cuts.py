@@ -1,30 +1,30 @@
-"""Sudden cuts in a path that does not mark them: a jump of the pose out of all proportion to its neighbours.
+"""Cuts of a path whose format does not mark them: steps far larger than the steps around them.
 
-The step into a frame is a cut when its rotation, or its translation,
+The step into a frame is a cut if its rotation or its translation
 
-* is more than ``RATIO`` times the largest step of the ``NEIGHBOURS`` before and of as many after it, and
+* exceeds ``RATIO`` times the largest of the ``NEIGHBOURS`` steps before and after it, and
 * exceeds a floor: ``LEAST_TURN_DEG``, or ``LEAST_MOVE`` of the extent of the whole path.
 
-A smooth passage, however fast, has steps like its own on at least one side, and so has motion that
-begins or ends at a stop. The first and the last step have neighbours on one side alone and are never
-cuts; nor are two jumps within ``NEIGHBOURS`` frames, which can't be told from a short fast motion. A cut
-that is missed costs time, not quality: what no keyframe sees is traced.
+Fast smooth motion, and motion that starts or ends at rest, has steps of similar size on at least one side.
+The first and the last step are never cuts, and neither are two jumps within ``NEIGHBOURS`` frames. A missed
+cut costs time, not quality: disoccluded pixels are traced.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from enfilade.camera.pinhole import Matrix
 
-RATIO = 6.0  # smooth paths of some frames keep below 3; cuts of real walkthroughs lie above 10
-NEIGHBOURS = 3  # steps looked at on each side
+RATIO = 6.0  # smooth paths of a few frames stay below 3; cuts of real walkthroughs exceed 10
+NEIGHBOURS = 3  # steps on each side
 LEAST_TURN_DEG = 5.0
-LEAST_MOVE = 0.01  # of the diagonal of the box around all eyes
+LEAST_MOVE = 0.01  # of the diagonal of the bounding box of all eyes
 
 
-def find_jumps(poses: Matrix) -> frozenset[int]:
+def find_cuts(poses: Matrix) -> frozenset[int]:
     """Indices of frames that begin a new shot.
 
     Parameters
@@ -34,28 +34,20 @@ def find_jumps(poses: Matrix) -> frozenset[int]:
     """
     if len(poses) < 4:
         return frozenset()
-    eyes = poses[:, :3, 3]
+    eyes, rotations = poses[:, :3, 3], poses[:, :3, :3]
     move = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
-    turn = _turns_deg(poses[:, :3, :3])
-    extent = float(np.linalg.norm(np.ptp(eyes, axis=0)))
-    is_jump = _stands_out(turn, LEAST_TURN_DEG) | _stands_out(move, LEAST_MOVE * extent)
-    return frozenset(int(i) + 1 for i in np.flatnonzero(is_jump))
-
-
-def _turns_deg(rotations: Matrix) -> Matrix:
-    """Angle from each rotation to the next, (N-1,) degrees."""
-    # |A - B| of two rotations is sqrt(8) sin(angle / 2): exact at small angles, where arccos is not
+    # |A - B| of two rotations is sqrt(8) sin(angle / 2): exact at small angles, unlike arccos
     chord = np.linalg.norm(np.diff(rotations, axis=0), axis=(1, 2))
-    angles: Matrix = np.degrees(2.0 * np.arcsin(np.clip(chord / np.sqrt(8.0), 0.0, 1.0)))
-    return angles
+    turn_deg = np.degrees(2.0 * np.arcsin(np.clip(chord / np.sqrt(8.0), 0.0, 1.0)))
+    extent = float(np.linalg.norm(np.ptp(eyes, axis=0)))
+    is_cut = _stands_out(turn_deg, LEAST_TURN_DEG) | _stands_out(move, LEAST_MOVE * extent)
+    return frozenset(int(i) + 1 for i in np.flatnonzero(is_cut))
 
 
 def _stands_out(steps: Matrix, floor: float) -> npt.NDArray[np.bool_]:
     """Steps far larger than all their neighbours, (N,) bool."""
-    largest = np.zeros_like(steps)
-    for offset in range(1, NEIGHBOURS + 1):
-        largest[offset:] = np.maximum(largest[offset:], steps[:-offset])
-        largest[:-offset] = np.maximum(largest[:-offset], steps[offset:])
-    result = (steps > floor) & (steps > RATIO * largest)
-    result[[0, -1]] = False
+    windows = sliding_window_view(np.pad(steps, NEIGHBOURS), 2 * NEIGHBOURS + 1)
+    largest = np.delete(windows, NEIGHBOURS, axis=1).max(axis=1)
+    is_interior = np.pad(np.ones(len(steps) - 2, np.bool_), 1)
+    result: npt.NDArray[np.bool_] = is_interior & (steps > floor) & (steps > RATIO * largest)
     return result

@@ -1,218 +1,184 @@
-"""Keyed poses: a short JSON format of times, eyes, targets or rotations (docs/camera-paths.md).
+"""Keyed poses: a short JSON format of times, eyes, and targets or rotations (docs/camera-paths.md).
 
-Between keys everything is interpolated with continuous velocity and without overshoot (interpolate.py).
-A key that is held rests for so long, a key with ``cut`` begins a new shot.
+Values are interpolated by PCHIP (Fritsch and Butland 1984): the velocity is continuous, no coordinate leaves
+the range of the two keys around it, and the camera is at rest between two equal keys. Rotations follow the
+cumulative cubic Bézier curve of Kim, Kim and Shin, "A General Construction Scheme for Unit Quaternion Curves
+with Simple High Order Derivatives", SIGGRAPH 1995, with the angular velocities of PCHIP at the keys.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
 
-from enfilade.camera.fields import LARGEST_SIZE, Table
+from enfilade.camera.fields import ANY, FOV_DEG, FPS, JsonObject
 from enfilade.camera.frames import MOST_FRAMES
-from enfilade.camera.interpolate import interpolate_aims, interpolate_rotations, interpolate_values
-from enfilade.camera.pinhole import Matrix, look_at
-from enfilade.camera.rotation import from_quaternion
-from enfilade.camera.shots import Shots
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera, Matrix, look_at
 from enfilade.errors import CameraPathError
 
-FORMAT = "enfilade-path"
-CLOCK_TOLERANCE = 1e-6  # of a frame: times are written in decimals, frames fall at n / fps
-SUM_TOLERANCE = 1e-9  # of seconds, and relative: 0.1 s and a hold of 0.2 s end at 0.3 s
-
-_FILE_KEYS = ("format", "fps", "size", "up", "seconds", "frames", "keys")
-_KEYS = ("time", "eye", "target", "rotation", "up", "fov", "hold", "cut")
+CLOCK_TOLERANCE = 1e-6  # of a frame: times are decimal, frames fall at n / fps
+DECIMALS = 9  # of a time in seconds: 0.1 s and a hold of 0.2 s end at 0.3 s
+UNIT_TOLERANCE = 0.01  # of a quaternion's length
 
 
 @dataclass(frozen=True, eq=False)
 class Key:
-    """A pose at a time.
-
-    Attributes
-    ----------
-    time_s : float
-        Seconds.
-    eye, up : (3,) float64
-    target : (3,) float64, optional
-    rotation : (3, 3) float64
-        World from camera; looks at the target where there is one.
-    fov_deg : float
-        Vertical.
-    is_cut : bool
-        Whether a new shot begins here.
-    """
+    """A pose at a time."""
 
     time_s: float
-    eye: Matrix
-    up: Matrix
-    target: Matrix | None
-    rotation: Matrix
-    fov_deg: float
-    is_cut: bool
+    eye: Matrix  # (3,)
+    up: Matrix  # (3,)
+    target: Matrix | None  # (3,)
+    rotation: Rotation  # world from camera; towards the target, if there is one
+    fov_deg: float  # vertical
+    is_cut: bool  # a new shot begins here
 
 
-def read_keyed(table: Table, *, fps: float | None = None) -> Shots:
-    """Read the keys and sample them at every frame's time.
+def read_keyed(document: JsonObject, size: tuple[int, int], fps: float | None = None) -> CameraPath:
+    """Cameras at the time of every frame; `fps` replaces the file's frame rate, not its duration."""
+    document.allow_only("format", "fps", "size", "up", "seconds", "frames", "keys")
+    own_fps = document.number("fps", FPS, default=fps)
+    fps = fps or own_fps
+    keys = _read_keys(document)
+    count = _frame_count(document, keys, own_fps, fps)
+    times = keys[0].time_s + np.arange(count) / fps
 
-    Parameters
-    ----------
-    table
-        The whole file.
-    fps
-        Replaces the file's frame rate: the same motion, sampled more or less often, for as long as the
-        frames last that the file asks for.
-
-    Raises
-    ------
-    CameraPathError
-        Something is missing, malformed, unknown or contradictory.
-    """
-    table.allow_only(*_FILE_KEYS)
-    own = table.fps() if "fps" in table or fps is None else fps
-    rate = own if fps is None else fps
-    keys = _read_keys(table)
-    count = _frame_count(table, keys, own, rate)
-    times = keys[0].time_s + np.arange(count) / rate
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    fov_deg = np.empty(count)
-    slack = CLOCK_TOLERANCE / rate
-    shots = _split(keys)
-    starts = [int(np.searchsorted(times, shot[0].time_s - slack)) for shot in shots]
-    for shot, a, b in zip(shots, starts, [*starts[1:], count], strict=True):
-        if a < b:
-            try:
-                eye, rotation, fov_deg[a:b] = _sample(shot, times[a:b])
-            except CameraPathError as error:
-                raise table.fail(f"between two keys {error}; add a key there or move the target") from error
-            poses[a:b, :3, 3], poses[a:b, :3, :3] = eye, rotation
-    size = _size(table)
-    return Shots(
-        poses=poses,
-        fov_deg=fov_deg,
-        fps=rate,
-        size=size,
-        aspect=size[0] / size[1] if size else None,
-        cuts=frozenset(a for a in starts if 0 < a < count),
-    )
+    cut_keys = [k for k, key in enumerate(keys) if k > 0 and key.is_cut]
+    shots = [keys[a:b] for a, b in pairwise([0, *cut_keys, len(keys)])]
+    begins = np.array([shot[0].time_s for shot in shots]) - CLOCK_TOLERANCE / fps
+    starts = np.searchsorted(times, begins)  # equal for a shot too short for a frame
+    cameras: list[Camera] = []
+    for shot, now in zip(shots, np.split(times, starts[1:]), strict=True):
+        try:
+            cameras += _sample(shot, now, size)
+        except CameraPathError as error:
+            raise document.error(f"between two keys {error}; add a key there or move the target") from error
+    cuts = frozenset(int(start) for start in starts if 0 < start < count)
+    return CameraPath(tuple(cameras), tuple(range(1, count + 1)), fps, cuts)
 
 
-def _read_keys(table: Table) -> list[Key]:
-    upward = table.vector("up", 3) if "up" in table else np.array([0.0, 1.0, 0.0])
+def _read_keys(document: JsonObject) -> list[Key]:
+    """Keys in order of time; a hold adds a copy at its end."""
+    up = document.array("up", (3,), default=(0.0, 1.0, 0.0))
     keys: list[Key] = []
-    for row in table.tables("keys", "key"):
-        row.allow_only(*_KEYS)
-        key = _read_key(row, upward, keys[-1].fov_deg if keys else None)
-        if keys and not _follows(key, keys[-1]):
-            raise row.fail(
-                f"time {key.time_s:g} does not follow {keys[-1].time_s:g}, the end of the key before"
+    for entry in document.objects("keys", "key"):
+        key = _read_key(entry, up, keys[-1].fov_deg if keys else None)
+        if keys and (key.time_s < keys[-1].time_s or (key.time_s == keys[-1].time_s and not key.is_cut)):
+            raise entry.error(
+                f"time {key.time_s:g} must follow {keys[-1].time_s:g}, the end of the previous key"
             )
         keys.append(key)
-        hold = row.number("hold", 0.0)
-        if hold < 0.0:
-            raise row.fail(f"hold is {hold:g}; it must be 0 s or more")
-        if hold > 0.0:
-            keys.append(replace(key, time_s=key.time_s + hold, is_cut=False))
+        end_s = round(key.time_s + entry.number("hold", (0.0, ANY[1]), default=0.0), DECIMALS)
+        if end_s > key.time_s:
+            keys.append(replace(key, time_s=end_s, is_cut=False))
     return keys
 
 
-def _follows(key: Key, before: Key) -> bool:
-    if key.is_cut and math.isclose(key.time_s, before.time_s, rel_tol=SUM_TOLERANCE, abs_tol=SUM_TOLERANCE):
-        return True  # the shot before rests until the cut
-    return key.time_s > before.time_s
-
-
-def _read_key(row: Table, upward: Matrix, last_fov_deg: float | None) -> Key:
-    eye = row.vector("eye", 3)
-    up = row.vector("up", 3) if "up" in row else upward
-    if ("target" in row) == ("rotation" in row):
-        raise row.fail("give either a target or a rotation")
-    if "target" in row:
-        target = row.vector("target", 3)
-        rotation = _aim(row, eye, target, up)
+def _read_key(entry: JsonObject, up: Matrix, last_fov_deg: float | None) -> Key:
+    entry.allow_only("time", "eye", "target", "rotation", "up", "fov", "hold", "cut")
+    eye, up, target = entry.array("eye", (3,)), entry.array("up", (3,), default=up), None
+    if ("target" in entry) == ("rotation" in entry):
+        raise entry.error("give either a target or a rotation")
+    if "target" in entry:
+        target = entry.array("target", (3,))
+        try:
+            rotation = Rotation.from_matrix(look_at(eye, target, up)[:3, :3])
+        except CameraPathError as error:
+            raise entry.error(str(error)) from error
     else:
-        target = None
-        rotation = _rotation(row)
-    fov_deg = row.fov() if "fov" in row else last_fov_deg
-    if fov_deg is None:
-        raise row.fail("fov is missing; the first key must give the vertical field of view in degrees")
-    return Key(
-        time_s=row.number("time"),
-        eye=eye,
-        up=up,
-        target=target,
-        rotation=rotation,
-        fov_deg=fov_deg,
-        is_cut=row.flag("cut"),
-    )
+        quaternion = entry.array("rotation", (4,))
+        if abs(length := np.linalg.norm(quaternion) - 1.0) > UNIT_TOLERANCE:
+            raise entry.error(f"rotation has length {1.0 + length:.4g}; expected a unit quaternion w x y z")
+        rotation = Rotation.from_quat(quaternion, scalar_first=True)
+    time_s = round(entry.number("time"), DECIMALS)
+    fov_deg = entry.number("fov", FOV_DEG, default=last_fov_deg)
+    return Key(time_s, eye, up, target, rotation, fov_deg, entry.flag("cut"))
 
 
-def _aim(row: Table, eye: Matrix, target: Matrix, up: Matrix) -> Matrix:
-    try:
-        return look_at(eye, target, up)[:3, :3]
-    except CameraPathError as error:
-        raise row.fail(str(error)) from error
-
-
-def _rotation(row: Table) -> Matrix:
-    quaternion = row.vector("rotation", 4)
-    length = float(np.linalg.norm(quaternion))
-    if abs(length - 1.0) > 0.01:
-        raise row.fail(f"rotation is a unit quaternion w x y z; this one has length {length:.4g}")
-    return from_quaternion(quaternion)
-
-
-def _frame_count(table: Table, keys: list[Key], own_fps: float, fps: float) -> int:
-    """Frames at a rate; how long so many frames last that a file asks for, its own rate says."""
-    if "seconds" in table and "frames" in table:
-        raise table.fail("give seconds or frames, not both")
-    span = keys[-1].time_s - keys[0].time_s
-    if "frames" in table:
-        exact = table.integer("frames", least=1, most=MOST_FRAMES) * (fps / own_fps)
-    elif "seconds" in table:
-        exact = table.positive("seconds") * fps
-    elif span == 0.0:
-        raise table.fail("one key is a camera at rest; say how long by seconds, frames or the key's hold")
+def _frame_count(document: JsonObject, keys: list[Key], own_fps: float, fps: float) -> int:
+    """Number of frames at a rate; `frames` counts frames at the file's own rate."""
+    span_s = keys[-1].time_s - keys[0].time_s
+    if "seconds" in document and "frames" in document:
+        raise document.error("give seconds or frames, not both")
+    if "frames" in document:
+        count = document.number("frames", (1.0, MOST_FRAMES), whole=True) * (fps / own_fps)
+    elif "seconds" in document:
+        count = document.number("seconds", (0.0, ANY[1])) * fps
+    elif span_s > 0.0:
+        count = span_s * fps + 1.0  # the last key is shown
     else:
-        exact = span * fps + 1.0  # the last key is shown
-    if exact > MOST_FRAMES:
-        raise table.fail(f"{exact:.0f} frames are too many; at most {MOST_FRAMES} can be rendered")
-    return max(math.floor(exact + CLOCK_TOLERANCE), 1)
+        raise document.error("a single key has no duration; give seconds, frames or the key's hold")
+    if count > MOST_FRAMES:
+        raise document.error(f"{count:.0f} frames are too many; at most {MOST_FRAMES} can be rendered")
+    return max(math.floor(count + CLOCK_TOLERANCE), 1)
 
 
-def _size(table: Table) -> tuple[int, int] | None:
-    if "size" not in table:
-        return None
-    width, height = table.vector("size", 2)
-    if not all(v.is_integer() and 1 <= v <= LARGEST_SIZE for v in (width, height)):
-        raise table.fail(f"size is {width:g}x{height:g}; each side must be 1 to {LARGEST_SIZE} whole pixels")
-    return int(width), int(height)
-
-
-def _split(keys: list[Key]) -> list[list[Key]]:
-    shots: list[list[Key]] = []
-    for key in keys:
-        if not shots or key.is_cut:
-            shots.append([])
-        shots[-1].append(key)
-    return shots
-
-
-def _sample(shot: list[Key], times: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Eyes (N, 3), rotations (N, 3, 3) and fields of view (N,) at the times, in one shot."""
+def _sample(shot: list[Key], times: Matrix, size: tuple[int, int]) -> list[Camera]:
+    """Cameras of one shot at the times (N,); at rest before a cut and after the last key."""
+    if len(times) == 0:
+        return []
+    if len(shot) == 1:
+        shot = [*shot, replace(shot[0], time_s=shot[0].time_s + 1.0)]
     knots = np.array([key.time_s for key in shot])
-    now = np.clip(times, knots[0], knots[-1])  # before a cut, and after the last key, the camera rests
-    eyes = np.stack([key.eye for key in shot])
-    eye = interpolate_values(knots, eyes, now)
+    times = np.clip(times, knots[0], knots[-1])
+
+    def smooth(values: Sequence[Matrix | float]) -> Matrix:
+        return PchipInterpolator(knots, np.array(values))(times)
+
+    eye = smooth([key.eye for key in shot])
     targets = [key.target for key in shot if key.target is not None]
     if len(targets) == len(shot):
-        ups = np.stack([key.up for key in shot])
-        rotation = interpolate_aims(knots, np.stack(targets), ups, now, eye)
+        poses = look_at(eye, smooth(targets), smooth([key.up for key in shot]))
     else:
-        rotation = interpolate_rotations(knots, np.stack([key.rotation for key in shot]), now)
-    # the tangent of half the angle is the image's size: a zoom of even steps looks even
-    scale = np.log(np.tan(np.radians(0.5 * np.array([[key.fov_deg] for key in shot]))))
-    fov_deg = 2.0 * np.degrees(np.arctan(np.exp(interpolate_values(knots, scale, now)[:, 0])))
-    return eye, rotation, fov_deg
+        poses = np.tile(np.eye(4), (len(times), 1, 1))
+        rotations = Rotation.concatenate([key.rotation for key in shot])
+        poses[:, :3, :3] = interpolate_rotations(knots, rotations, times).as_matrix()
+        poses[:, :3, 3] = eye
+    # the image's scale is the tangent of half the angle: a zoom is uniform in its logarithm
+    zoom = smooth([math.log(math.tan(math.radians(0.5 * key.fov_deg))) for key in shot])
+    fov_deg = 2.0 * np.degrees(np.arctan(np.exp(zoom)))
+    return [Camera(pose, float(fov), *size) for pose, fov in zip(poses, fov_deg, strict=True)]
+
+
+def interpolate_rotations(knots: Matrix, rotations: Rotation, times: Matrix) -> Rotation:
+    """PCHIP for rotations: continuous angular velocity, no overshoot, the shorter way from key to key.
+
+    SciPy's ``RotationSpline`` turns past keys at rest; ``Slerp`` has no continuous angular velocity.
+
+    Parameters
+    ----------
+    knots : (K,) float64
+        Increasing, at least two.
+    rotations : Rotation of length K
+    times : (N,) float64
+        Within the knots.
+
+    Returns
+    -------
+    Rotation of length N
+    """
+    # Compute angular velocities at the keys, in camera axes
+    turn = (rotations[:-1].inv() * rotations[1:]).as_rotvec()  # (K-1, 3)
+    angle = np.concatenate([np.zeros((1, 3)), np.cumsum(turn, axis=0)])
+    velocity = PchipInterpolator(knots, angle).derivative()(knots)
+
+    # Find the rotation vectors between the four control rotations of each interval
+    span = np.diff(knots)[:, None]  # (K-1, 1)
+    leave, arrive = velocity[:-1] * span / 3.0, velocity[1:] * span / 3.0
+    rest = Rotation.from_rotvec(-leave) * Rotation.from_rotvec(turn) * Rotation.from_rotvec(-arrive)
+    middle = rest.as_rotvec()
+
+    # Evaluate the cumulative Bézier curve at the position of each time in its interval
+    k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(span) - 1)
+    u = (times - knots[k])[:, None] / span[k]  # (N, 1)
+    first = Rotation.from_rotvec((1.0 - (1.0 - u) ** 3) * leave[k])
+    second = Rotation.from_rotvec(u**2 * (3.0 - 2.0 * u) * middle[k])
+    third = Rotation.from_rotvec(u**3 * arrive[k])
+    return rotations[k] * first * second * third

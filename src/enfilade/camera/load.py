@@ -1,4 +1,4 @@
-"""Camera paths from files: the format is recognized, frames are selected, the image size is checked."""
+"""Camera paths from files: format, image size, selection of frames."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ from bisect import bisect_left
 from itertools import pairwise
 from pathlib import Path
 
-from enfilade.camera.fields import LARGEST_SIZE, LEAST_FPS, MOST_FPS, read_table
-from enfilade.camera.keyed import FORMAT, read_keyed
+from enfilade.camera.fields import FPS, SIDE_PX, JsonObject, read_object
 from enfilade.camera.nerfstudio import read_nerfstudio
 from enfilade.camera.path import CameraPath
-from enfilade.camera.pinhole import Camera
-from enfilade.camera.shots import Shots
 from enfilade.errors import CameraPathError
 
-ASPECT_TOLERANCE = 0.01  # relative; even sizes of a few hundred pixels miss an aspect by less
+KEYED_FORMAT = "enfilade-path"
+ASPECT_TOLERANCE = 0.01  # relative; even sizes of a few hundred pixels deviate by less
 
 
 def load_path(
@@ -32,8 +30,8 @@ def load_path(
     size
         Width and height of the images, pixels; the file's own by default.
     frames
-        Numbers of the frames to take, rising; the first camera of the file is frame 1. What is left is a
-        walkthrough of its own: the frame after 1 of ``1,3,5`` is 3, and flow goes from one to the other.
+        Numbers of the selected frames, rising; the first camera of the file is frame 1. A selection is a path
+        of its own: in ``1,3,5`` the frame after 1 is 3, and motion vectors lead from one to the other.
     fps
         Frames per second in place of the file's, from 0.01 to 10000. Keyed poses are sampled at this rate; a
         nerfstudio path keeps its frames and plays faster or slower.
@@ -44,57 +42,50 @@ def load_path(
         The file is missing or malformed, a pose is not rigid, a frame is not on the path, the size does
         not fit the path's aspect, or the frame rate is out of range.
     """
-    if fps is not None and not LEAST_FPS <= fps <= MOST_FPS:
-        raise CameraPathError(
-            f"{fps:g} frames per second can't be rendered; give {LEAST_FPS:g} to {MOST_FPS:g}"
-        )
-    table = read_table(file)
-    if table.values.get("format") == FORMAT:
-        shots = read_keyed(table, fps=fps)
-    elif "camera_path" in table.values:
-        shots = read_nerfstudio(table, fps=fps)
+    if fps is not None and not FPS[0] <= fps <= FPS[1]:
+        raise CameraPathError(f"{fps:g} frames per second is out of range; give {FPS[0]:g} to {FPS[1]:g}")
+    document = read_object(file)
+    if document.values.get("format") == KEYED_FORMAT:
+        from enfilade.camera.keyed import read_keyed  # imports parts of SciPy that load slowly
+
+        path = read_keyed(document, _image_size(document, size), fps)
+    elif "camera_path" in document.values:
+        path = read_nerfstudio(document, _image_size(document, size), fps)
     else:
-        raise table.fail(
-            f'no camera path: expected "format": "{FORMAT}", or a "camera_path" as nerfstudio exports it'
+        raise document.error(
+            f'no camera path: expected "format": "{KEYED_FORMAT}", or "camera_path" as exported by nerfstudio'
         )
-    return _select(shots, _image_size(shots, size, file), frames, file)
+    return path if frames is None else _select(document, path, frames)
 
 
-def _image_size(shots: Shots, size: tuple[int, int] | None, file: Path) -> tuple[int, int]:
-    if size is None:
-        if shots.size is None:
-            raise CameraPathError(f"{file} does not say how large the images are; give a size")
-        return shots.size
-    width, height = size
-    if not (1 <= width <= LARGEST_SIZE and 1 <= height <= LARGEST_SIZE):
-        raise CameraPathError(
-            f"images of {width}x{height} pixels can't be rendered; each side must be 1 to {LARGEST_SIZE}"
+def _image_size(document: JsonObject, size: tuple[int, int] | None) -> tuple[int, int]:
+    own: list[int] = []
+    if "size" in document:
+        own = document.array("size", (2,), within=SIDE_PX, whole=True).astype(int).tolist()
+    elif "render_width" in document or "render_height" in document:
+        own = [int(document.number(f"render_{side}", SIDE_PX, whole=True)) for side in ("width", "height")]
+    if not size and not own:
+        raise document.error("the file has no image size; give a size")
+    width, height = size or own
+    if not all(SIDE_PX[0] <= side <= SIDE_PX[1] for side in (width, height)):
+        raise CameraPathError(f"{width}x{height} is no image size; each side must be 1 to {SIDE_PX[1]:g}")
+    exact = width * own[1] / own[0] if own else height
+    # small images may deviate by a pixel: videos have even heights
+    if abs(height / exact - 1.0) > ASPECT_TOLERANCE and abs(height - exact) > 1.0:
+        raise document.error(
+            f"{width}x{height} does not fit the aspect of the path's size, {own[0]}x{own[1]}; "
+            f"{width}x{max(2 * round(0.5 * exact), 2)} would"
         )
-    if shots.aspect is not None and not _fits(width, height, shots.aspect):
-        fitting = max(2 * round(0.5 * width / shots.aspect), 2)
-        asked = f"{shots.size[0]}x{shots.size[1]}" if shots.size else f"aspect {shots.aspect:.4g}"
-        raise CameraPathError(
-            f"{width}x{height} does not fit the aspect of {file} ({asked}); {width}x{fitting} would"
-        )
-    return size
+    return width, height
 
 
-def _fits(width: int, height: int, aspect: float) -> bool:
-    exact = width / aspect  # small images may miss it by a pixel: heights are whole, and even for video
-    return abs(height / exact - 1.0) <= ASPECT_TOLERANCE or abs(height - exact) <= 1.0
-
-
-def _select(shots: Shots, size: tuple[int, int], frames: tuple[int, ...] | None, file: Path) -> CameraPath:
-    count = len(shots.poses)
-    numbers = tuple(range(1, count + 1)) if frames is None else frames
-    if not numbers:
-        raise CameraPathError(f"no frames of {file} are selected; it has 1-{count}")
+def _select(document: JsonObject, path: CameraPath, numbers: tuple[int, ...]) -> CameraPath:
+    if not numbers or any(b <= a for a, b in pairwise(numbers)):
+        raise document.error("select at least one frame, and each once, in rising order")
     for number in numbers:
-        if not 1 <= number <= count:
-            raise CameraPathError(f"frame {number} is not on the path {file}; it has 1-{count}")
-    if any(b <= a for a, b in pairwise(numbers)):
-        raise CameraPathError("the selected frames must rise, each named once")
-    cameras = tuple(Camera(shots.poses[n - 1], float(shots.fov_deg[n - 1]), *size) for n in numbers)
-    # a cut belongs to the first selected frame at or after it; index n is frame number n + 1
-    cuts = {bisect_left(numbers, cut + 1) for cut in shots.cuts} - {0, len(numbers)}
-    return CameraPath(cameras, numbers, shots.fps, frozenset(cuts))
+        if not 1 <= number <= len(path):
+            raise document.error(f"frame {number} is not on the path; it has 1-{len(path)}")
+    cameras = tuple(path.cameras[number - 1] for number in numbers)
+    # a cut moves to the first selected frame at or after it; index n is frame number n + 1
+    cuts = {bisect_left(numbers, cut + 1) for cut in path.cuts} - {0, len(numbers)}
+    return CameraPath(cameras, numbers, path.fps, frozenset(cuts))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,12 +37,12 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """The cameras of a walkthrough.
+    """The cameras of a walkthrough; methods take and return frames as indices.
 
     Attributes
     ----------
     cameras : tuple of Camera
-        One a frame; all of one image size.
+        One a frame, all of one image size.
     numbers : tuple of int
         Frame numbers as the user counts them, rising.
     fps : float
@@ -86,16 +86,17 @@ class CameraPath:
 
     @cached_property
     def distinct_frames(self) -> tuple[int, ...]:
-        """Frames whose pose differs from that of the frame before, and first frames of shots; rising."""
-        return tuple(frame for frame in range(len(self)) if not self._is_repeated(frame))
+        """Frames that do not repeat the pose of the previous frame of their shot, in order."""
+        previous = [self.neighbours(frame)[0] for frame in range(len(self))]
+        return tuple(f for f, p in enumerate(previous) if p is None or not p.is_same_view(self.cameras[f]))
 
     def static_frame(self, frame: int) -> int:
-        """First frame of a repeated pose; `frame` itself where the camera moves into it."""
+        """First frame of a repeated pose; `frame` itself if it is distinct."""
         return self.distinct_frames[self.distance(frame)]
 
     def distance(self, frame: int) -> int:
-        """Distance along the path, in distinct frames from the first one: repeated poses add nothing."""
-        return self._distances[frame]
+        """Distance along the path from the first frame, in distinct frames: repeated poses add nothing."""
+        return bisect_right(self.distinct_frames, frame) - 1
 
     def distinct_inbetweens(self, segment: Segment) -> list[int]:
         """In-betweens of a segment without those that repeat a pose."""
@@ -110,12 +111,3 @@ class CameraPath:
         """Distance of a distinct in-between from the first keyframe over the segment's length, in (0, 1)."""
         first, last = self.distance(segment.first), self.distance(segment.last)
         return (self.distance(frame) - first) / (last - first)
-
-    @cached_property
-    def _distances(self) -> list[int]:
-        is_distinct = (int(not self._is_repeated(frame)) for frame in range(len(self)))
-        return [count - 1 for count in itertools.accumulate(is_distinct)]
-
-    def _is_repeated(self, frame: int) -> bool:
-        previous, _ = self.neighbours(frame)
-        return previous is not None and self.cameras[frame].is_same_view(previous)

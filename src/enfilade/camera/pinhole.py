@@ -27,7 +27,7 @@ class Camera:
     Attributes
     ----------
     world_from_camera : (4, 4) float64
-        Rigid: a rotation and the eye's position; no scale, no shear, no mirror image.
+        Rigid: a rotation and the eye's position; no scale, shear or reflection.
     fov_deg : float
         Vertical field of view, degrees, in (0, 180).
     width, height : int
@@ -46,7 +46,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.world_from_camera, np.float64)
-        check_rigid(matrix)
+        _check_rigid(matrix)
         if not 0.0 < self.fov_deg < 180.0:
             raise CameraPathError(f"the field of view is {self.fov_deg} deg; it must lie in (0, 180)")
         if self.width < 1 or self.height < 1:
@@ -60,7 +60,7 @@ class Camera:
 
     @property
     def pixel_angle(self) -> float:
-        """What a pixel in the middle of the image spans, radians."""
+        """Angle between the rays of adjacent pixels at the image centre, radians."""
         return 1.0 / self.focal_px
 
     @property
@@ -75,51 +75,39 @@ class Camera:
         Depth is measured along the optical axis: ``eye + depth * (P @ (x, y, 1))`` is the point.
         """
         f = self.focal_px
-        camera_from_pixel = np.array(
-            [
-                [1.0 / f, 0.0, -0.5 * self.width / f],
-                [0.0, -1.0 / f, 0.5 * self.height / f],
-                [0.0, 0.0, -1.0],
-            ]
-        )
-        product: Matrix = self.world_from_camera[:3, :3] @ camera_from_pixel
-        return product
+        x, y = 0.5 * self.width, 0.5 * self.height
+        camera_from_pixel = np.array([[1.0 / f, 0.0, -x / f], [0.0, -1.0 / f, y / f], [0.0, 0.0, -1.0]])
+        result: Matrix = self.world_from_camera[:3, :3] @ camera_from_pixel
+        return result
 
     @cached_property
     def pixel_from_direction(self) -> Matrix:
         """Inverse of :attr:`direction_from_pixel`; the third row of the product is the depth, (3, 3)."""
-        inverse: Matrix = np.linalg.inv(self.direction_from_pixel).astype(np.float64)
-        return inverse
+        result: Matrix = np.linalg.inv(self.direction_from_pixel).astype(np.float64)
+        return result
 
     def is_same_view(self, other: Camera) -> bool:
-        """Whether both see the very same image."""
-        return (
-            (self.width, self.height, self.fov_deg) == (other.width, other.height, other.fov_deg)
-        ) and np.array_equal(self.world_from_camera, other.world_from_camera)
+        """Whether pose and intrinsics are exactly equal."""
+        intrinsics = [(camera.width, camera.height, camera.fov_deg) for camera in (self, other)]
+        is_same_pose = np.array_equal(self.world_from_camera, other.world_from_camera)
+        return is_same_pose and intrinsics[0] == intrinsics[1]
 
 
-def check_rigid(matrix: Matrix) -> None:
-    """Raise CameraPathError unless the matrix is a rotation and a translation.
-
-    Parameters
-    ----------
-    matrix : (4, 4) float64
-    """
-    if matrix.shape != (4, 4):
-        raise CameraPathError(f"a pose is a 4x4 matrix, not one of shape {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise CameraPathError("the pose holds a NaN or an infinity")
+def _check_rigid(matrix: Matrix) -> None:
+    """Raise CameraPathError unless the matrix is a rotation and a translation."""
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise CameraPathError(f"a pose must be a 4x4 matrix of finite numbers, not {matrix}")
     if np.abs(matrix[3] - LAST_ROW).max() > ROW_TOLERANCE:
-        raise CameraPathError(f"the last row of a pose is 0 0 0 1, not {matrix[3]}")
+        raise CameraPathError(f"the last row of a pose must be 0 0 0 1, not {matrix[3]}")
     rotation = matrix[:3, :3]
     defect = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if defect > RIGID_TOLERANCE:
         raise CameraPathError(
-            f"the pose is not rigid: its axes miss being orthonormal by {defect:.3g} "
-            f"(at most {RIGID_TOLERANCE:g}); remove scale and shear"
+            f"the pose is not rigid: R^T R - 1 has an entry of {defect:.3g} (at most {RIGID_TOLERANCE:g}); "
+            "remove scale and shear"
         )
     if np.linalg.det(rotation) < 0.0:
-        raise CameraPathError("the pose is a mirror image (determinant -1): flip one axis")
+        raise CameraPathError("the pose is a reflection (determinant -1): flip one axis")
 
 
 def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
@@ -158,9 +146,9 @@ def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0,
 class PlanarWarp:
     """McMillan's planar image-warping equation between two cameras (§3.3, Fig. 5).
 
-    A pixel x = (x, y, 1) of generalised disparity delta = 1 / depth goes to
-    ``x + change @ x + delta * epipole``, up to scale; the third component is the ratio of the new depth
-    to the old. Kept as the *change* of the identity, so that small motion loses no digits in float32.
+    A pixel x = (x, y, 1) of generalised disparity delta = 1 / depth maps to
+    ``x + change @ x + delta * epipole``, up to scale; the third component is the ratio of the new depth to
+    the old. The difference from the identity is stored: small motion loses no digits in float32.
 
     Attributes
     ----------
@@ -175,10 +163,7 @@ class PlanarWarp:
 
 
 def planar_warp(source: Camera, target: Camera) -> PlanarWarp:
-    """The warp that takes pixels of `source` to `target`.
-
-    Exactly zero between equal views.
-    """
+    """Warp from pixels of `source` to pixels of `target`; exactly zero between equal views."""
     if source.is_same_view(target):
         return PlanarWarp(np.zeros((3, 3)), np.zeros(3))
     inverse = target.pixel_from_direction
