@@ -226,7 +226,7 @@ def finish_units(run: "Run", numbers: range) -> None:
 
 def read_run(file: Path) -> None:
     """Read a run as the report does, and a copy of it as the command does that goes on with it."""
-    from enfilade.report.seen import SeenRun
+    from enfilade.reports.seen import SeenRun
     from enfilade.store import Run
 
     folder = file.parent if file.name != LATE else file.parents[1]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.compare import FlowChoice, SequenceDifference, Terms, compare, metric_options
+from enfilade.comparison import FlowChoice, SequenceDifference, Terms, compare, metric_options
 from enfilade.images import write_exr
 from enfilade.monitor import Silence
 from enfilade.settings import MetricSettings

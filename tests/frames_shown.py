@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.compare.measures import Shown, shown
+from enfilade.comparison.measures import Shown, shown
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import Flow
 from enfilade.viewing import Viewing

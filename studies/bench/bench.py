@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from enfilade.compare.measures import JUDGES, SCALES, why_missing
+from enfilade.comparison.measures import JUDGES, SCALES, why_missing
 from enfilade.device import Choice
 from enfilade.errors import RunFolderError, SceneError, SettingsError
 from enfilade.images.interpolate import why_no_interpolation

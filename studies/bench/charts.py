@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from enfilade.report.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
 
 __all__ = ["STYLES", "plot_bench"]
 

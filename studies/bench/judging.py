@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.compare.measures import SCALES, Shown, open_judge, seen_before, shown
+from enfilade.comparison.measures import SCALES, Shown, open_judge, seen_before, shown
 from enfilade.images import read_exr
 from enfilade.metric import Pursuit
 from enfilade.monitor import Monitor

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from enfilade.images import encode_video, read_exr
 from enfilade.kernels.tone import srgb_decode, srgb_encode
 from enfilade.records import F32
-from enfilade.report.charts import INK, Figure, save
+from enfilade.reports.charts import INK, Figure, save
 from enfilade.settings import VideoSettings
 from studies.bench.charts import STYLES
 from studies.bench.tables import score_text

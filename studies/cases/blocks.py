@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.report.charts import save
-from enfilade.report.plots import walkthrough_figure
+from enfilade.reports.charts import save
+from enfilade.reports.plots import walkthrough_figure
 from studies.cases import charts as figures
 from studies.cases import pictures as pictures_of
 from studies.cases import placement, separation, shares, times

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.report.charts import BLUE, GREEN, INK, ORANGE, SOURCE_COLORS, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, SOURCE_COLORS, VERMILION, Figure, save
 
 __all__ = [
     "draw_placement",

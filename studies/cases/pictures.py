@@ -9,9 +9,9 @@ import numpy as np
 
 from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32, U8
-from enfilade.report.charts import INK, Figure, save
-from enfilade.report.heatmap import overlay
-from enfilade.report.scales import VELOCITY
+from enfilade.reports.charts import INK, Figure, save
+from enfilade.reports.heatmap import overlay
+from enfilade.reports.scales import VELOCITY
 
 __all__ = ["draw_ghosts", "draw_mirrors"]
 

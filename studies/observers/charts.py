@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.report.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
 
 __all__ = ["plot_people"]
 

@@ -8,11 +8,11 @@ import pytest
 from PIL import Image
 
 from enfilade.cli.compare import DEPARTURES, FLOWS, IMAGES
-from enfilade.compare import FlowChoice
+from enfilade.comparison import FlowChoice
 from enfilade.images import encode_video, open_sequence, write_exr
 from enfilade.images.stored import SUFFIXES
 from enfilade.metric import MetricOptions
-from enfilade.report.heatmap import HeatmapPainter
+from enfilade.reports.heatmap import HeatmapPainter
 from enfilade.settings import VideoSettings
 from enfilade.viewing import DISPLAYS
 

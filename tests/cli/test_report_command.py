@@ -2,7 +2,7 @@
 
 import pytest
 
-from enfilade.report.page import Wishes
+from enfilade.reports.page import Wishes
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def pages(monkeypatch):
         seen.append((folder, file, wishes))
         return ["frame 3 is left out"]
 
-    monkeypatch.setattr("enfilade.report.page.write_page", write)
+    monkeypatch.setattr("enfilade.reports.page.write_page", write)
     return seen
 
 

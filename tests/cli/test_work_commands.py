@@ -223,7 +223,7 @@ def test_threads_are_those_of_this_process(run, jobs, camera_path, tmp_path):
     ],
 )
 def test_flags_that_would_say_nothing_are_refused(run, begun, tmp_path, monkeypatch, line, words):
-    monkeypatch.setattr("enfilade.report.live.Live.wait", lambda _: None)
+    monkeypatch.setattr("enfilade.reports.live.Live.wait", lambda _: None)
     command, *flags = line
     refused = run(command, tmp_path / "run", *flags)
     assert refused.exit_code == 2, refused.output

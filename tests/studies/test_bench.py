@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from enfilade.compare.measures import JUDGES, why_missing
+from enfilade.comparison.measures import JUDGES, why_missing
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.images import open_sequence, read_exr
 from enfilade.methods.denoise import why_no_denoiser

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from enfilade.camera import load_path
-from enfilade.compare.measures import JUDGES
+from enfilade.comparison.measures import JUDGES
 from scenes_analytic import room
 from small_runs import TABLES, scene_text
 from studies.bench.command import JUDGES as LISTED

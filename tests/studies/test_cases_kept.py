@@ -10,7 +10,7 @@ import pytest
 from enfilade.errors import RunFolderError
 from enfilade.files import read_json
 from enfilade.monitor import Silence
-from enfilade.report.plots import walkthrough_figure
+from enfilade.reports.plots import walkthrough_figure
 from scenes_analytic import room, room_walk
 from small_runs import Told, job_of
 from studies.cases.case import Case

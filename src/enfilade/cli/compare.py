@@ -17,9 +17,9 @@ from enfilade.cli.outcome import check_png
 from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
-    from enfilade.compare import JudgedFrame, Terms
-    from enfilade.compare.judge import Show
-    from enfilade.report.heatmap import HeatmapPainter
+    from enfilade.comparison import JudgedFrame, Terms
+    from enfilade.comparison.judge import Show
+    from enfilade.reports.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
 FLOWS = ("auto", "layers", "estimate", "none")
@@ -146,7 +146,7 @@ def command(
     _check_apart(test, reference, heatmap, graph)
     terms = _terms(ctx, **choices)
     from enfilade.cli.progress import watch
-    from enfilade.compare import compare
+    from enfilade.comparison import compare
 
     with watch(quiet=quiet) as monitor:
         found = compare(test, reference, terms, monitor, show=show).to_dict()
@@ -155,7 +155,7 @@ def command(
     else:
         _print(found)
     if graph is not None:
-        from enfilade.report.timegraph import plot_comparison
+        from enfilade.reports.timegraph import plot_comparison
 
         plot_comparison(found, graph)
     for name, file in (("heat map", heatmap), ("graph", graph)):
@@ -175,7 +175,7 @@ def _terms(
     layers: tuple[str, ...],
     device: str,
 ) -> Terms:
-    from enfilade.compare import FlowChoice, Terms, kernels_serve, metric_options
+    from enfilade.comparison import FlowChoice, Terms, kernels_serve, metric_options
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
@@ -214,7 +214,7 @@ def _display(ctx: click.Context, name: str) -> Display:
 
 
 def _painted(target: Path) -> Show:
-    from enfilade.report.heatmap import (
+    from enfilade.reports.heatmap import (
         VIDEO_CODECS,
         HeatmapPainter,
         write_heatmap_images,
@@ -287,7 +287,7 @@ def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.report.tables import comparison_table, verdict
+    from enfilade.reports.tables import comparison_table, verdict
 
     click.echo(verdict(found))
     Console().print(comparison_table(found))

@@ -34,7 +34,7 @@ def draw_plots(folder: Path, *, is_new: bool) -> list[Path]:
     there = sorted((folder / "plots").glob("*.png"))
     if there and not is_new:
         return there
-    from enfilade.report.plots import plot_run
+    from enfilade.reports.plots import plot_run
 
     return plot_run(folder)
 

@@ -39,7 +39,7 @@ def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: b
     else:
         _show(made)
     if plot is not None:
-        from enfilade.report.plots import plot_plan
+        from enfilade.reports.plots import plot_plan
 
         plot_plan(made, plot)
         if not as_json:
@@ -49,7 +49,7 @@ def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: b
 def _show(made: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.report.tables import plan_tables
+    from enfilade.reports.tables import plan_tables
 
     console = Console()
     for table in plan_tables(made):

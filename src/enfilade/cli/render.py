@@ -81,7 +81,7 @@ def command(
 def _show(summary: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.report.tables import run_tables
+    from enfilade.reports.tables import run_tables
 
     console = Console()
     for table in run_tables(summary):

@@ -81,7 +81,7 @@ def command(
         raise SettingsError("--port says nothing without --serve; add that, or leave it out")
     from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
-    from enfilade.report.page import Wishes, write_page
+    from enfilade.reports.page import Wishes, write_page
 
     numbers = None if frames is None else parse_frames(frames)
     page = run / PAGE if file is None else file
@@ -98,7 +98,7 @@ def command(
 
 def _serve(run: Path, wishes: Any, port: int, *, quiet: bool) -> None:
     from enfilade.cli.progress import watch
-    from enfilade.report.live import Live
+    from enfilade.reports.live import Live
 
     with watch(quiet=quiet) as monitor:
         live = Live(run, wishes, port, monitor=monitor)

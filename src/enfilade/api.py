@@ -1,0 +1,191 @@
+"""The public functions: render, plan, compare, report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enfilade.device import Choice, activate
+from enfilade.monitor import Monitor, Silence
+
+if TYPE_CHECKING:
+    from enfilade.camera import CameraPath
+    from enfilade.comparison import SequenceDifference
+    from enfilade.methods.base import Method
+    from enfilade.runs.job import Job
+    from enfilade.runs.plan import Plan
+    from enfilade.scene.opener import Scene
+    from enfilade.settings import Settings
+
+    File = str | Path
+    Tables = Mapping[str, Mapping[str, Any]]
+
+
+def render(
+    scene: File | Scene,
+    path: File | CameraPath,
+    out: File,
+    *,
+    method: str | Method | type[Method] = "decoupled",
+    settings: Settings | Tables | None = None,
+    device: Choice = "auto",
+    executor: str = "in-process",
+    workers: int | None = None,
+    monitor: Monitor | None = None,
+) -> dict[str, Any]:
+    """Render a walkthrough into a run folder, or go on with one.
+
+    Parameters
+    ----------
+    scene
+        A Mitsuba 3 scene in XML, or a :class:`Scene`.
+    path
+        A camera path file (see docs/formats.md), or a :class:`CameraPath`.
+    out
+        The run folder. With the same arguments the call continues where it stopped.
+    method
+        ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can import.
+    settings
+        A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``.
+    device
+        ``cpu``, ``gpu``, or ``auto``: the GPU where there is one.
+    executor
+        ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module: guard its
+        work by ``if __name__ == "__main__"``.
+    workers
+        Number of worker processes; None: one for each GPU, or CPU core.
+    monitor
+        Receives progress and messages; by default nothing is shown.
+
+    Returns
+    -------
+    dict
+        The summary of the run, as in ``summary.json``: see :func:`enfilade.runs.statistics.statistics`.
+
+    Raises
+    ------
+    InputError
+        The scene, the path, a setting, or a folder that holds another run.
+    DeviceError
+        No usable LLVM or CUDA.
+    NoSpaceError
+        The disk is full. All finished tasks stay.
+    UnfinishedError
+        Some tasks failed again and again; the rest is done.
+    """
+    activate(device)
+    from enfilade.runs.executor import Workers
+    from enfilade.runs.render import render as render_job
+
+    job = _job(scene, path, method, settings)
+    return render_job(job, Path(out), monitor or Silence(), Workers(executor, workers))
+
+
+def plan(
+    scene: File | Scene,
+    path: File | CameraPath,
+    *,
+    method: str | Method | type[Method] = "decoupled",
+    settings: Settings | Tables | None = None,
+    device: Choice = "auto",
+    monitor: Monitor | None = None,
+) -> Plan:
+    """Analyze every frame of a path, place the initial keyframes, and forecast the cost of rendering.
+
+    The parameters are those of :func:`render`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError, DeviceError
+        As of :func:`render`.
+    """
+    activate(device)
+    from enfilade.runs.plan import plan as plan_job
+
+    return plan_job(_job(scene, path, method, settings), monitor or Silence())
+
+
+def compare(
+    test: File, reference: File, *, device: Choice = "auto", monitor: Monitor | None = None, **terms: Any
+) -> SequenceDifference:
+    """Measure the visible difference between two image sequences, videos or run folders.
+
+    Parameters
+    ----------
+    test, reference
+        Run folders, videos, folders of images, or patterns such as ``frames/%04d.exr``.
+    device
+    monitor
+    terms
+        Fields of :class:`enfilade.comparison.Terms`.
+
+    Returns
+    -------
+    SequenceDifference
+
+    Raises
+    ------
+    ImageError
+        A sequence can't be read, or the two can't be compared.
+    """
+    activate(device)
+    from enfilade.comparison import Terms
+    from enfilade.comparison import compare as compare_sequences
+
+    return compare_sequences(test, reference, Terms(**terms), monitor or Silence())
+
+
+def report(run: File, *, reference: File | None = None, out: File | None = None) -> Path:
+    """Write a finished or running run as one HTML page.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    reference
+        Another run, or a sequence, of the same frames: adds the visible difference.
+    out
+        The page; by default ``report.html`` in the run folder.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    RunFolderError, ImageError
+    """
+    activate("cpu")
+    from enfilade.reports.page import write_report
+
+    return write_report(Path(run), reference=reference, out=out)
+
+
+def _job(
+    scene: File | Scene,
+    path: File | CameraPath,
+    method: str | Method | type[Method],
+    settings: Settings | Tables | None,
+) -> Job:
+    from enfilade.camera import CameraPath, load_path
+    from enfilade.methods.opener import name_of, open_method
+    from enfilade.runs.job import Job
+    from enfilade.scene.opener import Scene
+    from enfilade.settings import SECTIONS, Settings
+
+    name = name_of(method)
+    if not isinstance(settings, Settings):
+        kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
+        settings = Settings.from_tables(settings or {}, kinds)
+    return Job(
+        scene=scene if isinstance(scene, Scene) else Scene(Path(scene)),
+        path=path if isinstance(path, CameraPath) else load_path(Path(path)),
+        settings=settings,
+        method=name,
+    )

@@ -1,0 +1,20 @@
+"""Judging two sequences: opened side by side, followed along their motion, judged frame by frame (§3)."""
+
+from __future__ import annotations
+
+from enfilade.comparison.judge import JudgedFrame, Terms, compare, kernels_serve, metric_options
+from enfilade.comparison.motion import FlowChoice
+from enfilade.comparison.verdict import FrameDifference, SequenceDifference, meaning, psnr_db
+
+__all__ = [
+    "FlowChoice",
+    "FrameDifference",
+    "JudgedFrame",
+    "SequenceDifference",
+    "Terms",
+    "compare",
+    "kernels_serve",
+    "meaning",
+    "metric_options",
+    "psnr_db",
+]

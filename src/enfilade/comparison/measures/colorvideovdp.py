@@ -1,0 +1,77 @@
+"""ColorVideoVDP (Mantiuk et al. 2024): quality of a colour video in JOD, by ``cvvdp`` and PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.comparison.measures.judge import Scale
+from enfilade.comparison.measures.shown import Shown
+from enfilade.errors import SettingsError
+from enfilade.viewing import Viewing
+
+__all__ = ["ColorVideoVdp"]
+
+PERFECT_JOD = 10.0
+BLACK_LEAST_CD_M2 = 1e-4  # a contrast ratio is asked for: black can't be 0
+
+
+def _lost(jod: float) -> float:
+    return max(PERFECT_JOD - jod, 0.0)
+
+
+class ColorVideoVdp:
+    """Just objectionable differences: 10 is identical, 1 less is what three of four people find worse.
+
+    It has colour and flicker, and no motion of the eye. It judges a sequence as a whole.
+
+    Parameters
+    ----------
+    viewing
+
+    Raises
+    ------
+    SettingsError
+        ``cvvdp`` is not installed.
+
+    Notes
+    -----
+    Keeps all frames until the end as half floats: 12 bytes for a pixel of a pair.
+    """
+
+    SCALE = Scale("cvvdp", "ColorVideoVDP", "JOD", is_more_better=True, error_of=_lost)
+
+    def __init__(self, viewing: Viewing) -> None:
+        try:
+            import pycvvdp
+            from pycvvdp.display_model import vvdp_display_geometry, vvdp_display_photo_eotf
+            from torch import device
+        except ImportError as error:
+            raise SettingsError(
+                f"ColorVideoVDP can't judge: {error}; install it with: pip install cvvdp"
+            ) from error
+        black = max(viewing.black_cd_m2, BLACK_LEAST_CD_M2)
+        screen = vvdp_display_photo_eotf(viewing.peak_cd_m2, contrast=viewing.peak_cd_m2 / black, EOTF="sRGB")
+        place = vvdp_display_geometry(
+            (viewing.width_px, viewing.height_px), ppd=float(viewing.pixels_per_degree)
+        )
+        self._fps = viewing.fps
+        self._metric: Any = pycvvdp.cvvdp(
+            display_photometry=screen, display_geometry=place, device=device("cpu"), quiet=True
+        )
+        self._frames: list[tuple[npt.NDArray[np.float16], npt.NDArray[np.float16]]] = []
+
+    def judge(self, pair: Shown) -> None:
+        """Keep the next frame; nothing is said of it alone."""
+        self._frames.append((pair.test.astype(np.float16), pair.reference.astype(np.float16)))
+
+    def pooled(self, values: Sequence[float | None]) -> float:
+        """JOD of the frames that were judged."""
+        del values
+        test, reference = (np.stack(frames) for frames in zip(*self._frames, strict=True))
+        fps = self._fps if len(test) > 1 else 0.0  # its word for a single image
+        jod, _ = self._metric.predict(test, reference, dim_order="FHWC", frames_per_second=fps)
+        return float(jod)

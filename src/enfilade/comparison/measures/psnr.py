@@ -1,0 +1,40 @@
+"""Peak signal-to-noise ratio of display-encoded values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from enfilade.comparison.measures.judge import Scale
+from enfilade.comparison.measures.shown import Shown
+
+__all__ = ["Psnr"]
+
+
+def _rms(psnr_db: float) -> float:
+    return float(10.0 ** (-psnr_db / 20.0))
+
+
+class Psnr:
+    """-10 log10 of the mean squared error over pixels and channels, sRGB-encoded, 1 = white.
+
+    Infinite for identical frames. Noise counts in full, wherever it is and whether or not it is seen.
+    """
+
+    SCALE = Scale("psnr", "PSNR", "dB", is_more_better=True, error_of=_rms)
+
+    def judge(self, pair: Shown) -> float:
+        """PSNR of the next frame, dB."""
+        difference = (pair.test - pair.reference).ravel()
+        return _db(float(np.vdot(difference, difference)) / difference.size)
+
+    def pooled(self, values: Sequence[float | None]) -> float:
+        """PSNR of the whole sequence: of the mean squared error over all frames."""
+        squared = [_rms(value) ** 2 for value in values if value is not None]
+        return _db(sum(squared) / len(squared))
+
+
+def _db(squared_error: float) -> float:
+    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)

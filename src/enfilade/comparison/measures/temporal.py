@@ -1,0 +1,95 @@
+"""Flicker of the error: how much it changes from frame to frame along the reference's own motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.comparison.measures.judge import Scale
+from enfilade.comparison.measures.shown import Shown
+from enfilade.records import F32, Mask
+
+__all__ = ["Temporal", "seen_before"]
+
+PLANE_TOLERANCE = 0.01  # of the depth: how far from its plane a surface point counts as that surface
+ITEM, POSITION, NORMAL, DEPTH, BACKWARD = "item", "P", "N", "Z", "backward"  # layers of a delivered frame
+
+
+class Temporal:
+    """RMS change of the error since the last frame, followed along the surfaces.
+
+    With e_t = test - reference, sRGB-encoded, and the backward flow b_t of the reference, a frame's value is
+    the root of the mean of |e_t(x) - e_{t-1}(x + b_t(x))|^2 over channels and over the pixels whose
+    surface both frames see. An error that stays on its surface counts nothing, noise that is drawn afresh
+    counts sqrt(2) times its own size. It is the warping error of Lai et al. (2018, "Learning blind video
+    temporal consistency"), of the error rather than of the image, so that what the reference does by itself
+    (highlights that wander) is no fault.
+
+    The last error is read between its pixels by bilinear taps, which smooth fine noise somewhat and so
+    flatter those whose errors are noise.
+    """
+
+    SCALE = Scale("temporal", "temporal", "RMS", is_of_changes=True)
+
+    def __init__(self) -> None:
+        self._before: F32 | None = None
+
+    def judge(self, pair: Shown) -> float | None:
+        """Judge the next frame; None where a shot begins, or nothing is seen in both frames."""
+        error = pair.test - pair.reference
+        before, self._before = self._before, error
+        if before is None or pair.flow is None or pair.seen_before is None or not pair.seen_before.any():
+            return None
+        change = (error - _read(before, pair.flow.backward))[pair.seen_before]
+        return math.sqrt(float(np.mean(np.square(change, dtype=np.float64))))
+
+    def pooled(self, values: Sequence[float | None]) -> float:
+        """Root of the mean over frames of the squares; 0 where no frame has one before it."""
+        known = [value for value in values if value is not None]
+        return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
+
+
+def seen_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.NDArray[Any]]) -> Mask:
+    """Pixels whose surface the last frame sees too.
+
+    Parameters
+    ----------
+    layers, last
+        Layers ``item``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one before it
+        in the same shot.
+
+    Returns
+    -------
+    (H, W) bool
+        True where the flow leads to a pixel that shows the same item on the same plane (or nothing, where
+        nothing is seen).
+    """
+    backward = layers[BACKWARD].astype(np.float32)
+    height, width = backward.shape[:2]
+    column = np.arange(width) + backward[..., 0]
+    row = np.arange(height)[:, None] + backward[..., 1]
+    inside = (column > -0.5) & (column < width - 0.5) & (row > -0.5) & (row < height - 0.5)
+    at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0).astype(int)
+    step = last[POSITION][at] - layers[POSITION]
+    off_plane = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
+    same: Mask = inside & (last[ITEM][at] == layers[ITEM]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
+    return same
+
+
+def _read(image: F32, flow: F32) -> F32:
+    """Values of an image where the flow leads from each pixel: bilinear, held at the borders."""
+    height, width = image.shape[:2]
+    x = np.clip(np.arange(width) + flow[..., 0], 0.0, width - 1.0)
+    y = np.clip(np.arange(height)[:, None] + flow[..., 1], 0.0, height - 1.0)
+    left = np.minimum(x.astype(int), max(width - 2, 0))
+    top = np.minimum(y.astype(int), max(height - 2, 0))
+    u, v = (x - left)[..., None], (y - top)[..., None]
+    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    upper = image[top, left] * (1.0 - u) + image[top, right] * u
+    lower = image[below, left] * (1.0 - u) + image[below, right] * u
+    values: F32 = (upper * (1.0 - v) + lower * v).astype(np.float32)
+    return values

@@ -1,0 +1,283 @@
+"""Where the image flow of a compared sequence comes from: layers of its frames, an estimate, or nowhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.comparison.optical_flow import FlowEstimator
+from enfilade.comparison.pairs import Pair
+from enfilade.errors import ImageError
+from enfilade.images import Sequence
+from enfilade.kernels.tone import srgb_encode
+from enfilade.metric.transient import moved
+from enfilade.records import F32, U8, Flow
+
+__all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
+
+Layers = Mapping[str, npt.NDArray[Any]]
+
+CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, that means a cut where flow back is made up
+RESTING_DIFFERENCE = 0.02  # ... where layers know none: in a shot the camera rests, and little changes
+BLOCK_PX = 8  # over which it is averaged: noise is no cut
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """How the image moves at one frame.
+
+    Attributes
+    ----------
+    motion : (H, W, 2) float32 or None
+        Mean of the motion since the last frame and until the next, pixels per frame, x right, y down;
+        None: nothing moves.
+    backward : (H, W, 2) float32 or None
+        To the last frame, pixels; None where nothing moves or there is none.
+    is_cut : bool
+        Whether a new shot begins.
+    """
+
+    motion: F32 | None = None
+    backward: F32 | None = None
+    is_cut: bool = False
+
+
+class FlowChoice(Enum):
+    """Which image flow to use."""
+
+    AUTO = "auto"
+    LAYERS = "layers"
+    ESTIMATE = "estimate"
+    NONE = "none"
+
+
+class Motion(Protocol):
+    """Gives each pair of frames its flow.
+
+    Attributes
+    ----------
+    kind : str
+        ``layers``, ``estimate`` or ``none``.
+    text : str
+        One line for the log.
+    """
+
+    kind: str
+    text: str
+
+    def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
+        """Pairs in order, each with how it moves."""
+        ...
+
+
+def open_motion(
+    test: Sequence, reference: Sequence, choice: FlowChoice, starts: frozenset[int] | None = None
+) -> Motion:
+    """Choose the source of flow: layers of the reference, of the test, else an estimate.
+
+    Parameters
+    ----------
+    test, reference
+    choice
+        ``AUTO`` takes layers where there are some and estimates otherwise.
+    starts
+        Indices of the frames that do not follow the one before; None: the flow and the images tell.
+
+    Raises
+    ------
+    ImageError
+        Layers are asked for, and neither sequence has any that are known.
+    """
+    if choice in (FlowChoice.AUTO, FlowChoice.LAYERS):
+        for sequence, role in ((reference, "reference"), (test, "test")):
+            kind = _kind_of(sequence)
+            if kind is not None:
+                return _FromLayers(sequence, kind, role, starts)
+    if choice is FlowChoice.LAYERS:
+        raise ImageError(
+            f"neither {reference.name(0)} nor {test.name(0)} has layers of image flow; known are: "
+            f"{'; '.join(kind.text for kind in KINDS)}. --flow estimate needs none"
+        )
+    known = frozenset[int]() if starts is None else starts
+    if choice is FlowChoice.NONE:
+        return _Still("image flow: none, as asked; all is judged as if it stood still", known)
+    if len(reference) == 1:
+        return _Still("image flow: none in a single image; it is judged as if it stood still", known)
+    return _Estimated(reference.width, reference.height, known)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    text: str
+    read: Callable[[Layers], Flow | None]
+    is_forward_only: bool = False  # the flow to the last frame is made up from that to the next
+
+
+def _flow(backward: npt.NDArray[Any], forward: npt.NDArray[Any]) -> Flow:
+    # A frame without a neighbour in its shot has zeros for the flow to it.
+    return Flow(
+        np.ascontiguousarray(backward, np.float32),
+        np.ascontiguousarray(forward, np.float32),
+        bool(backward.any()),
+        bool(forward.any()),
+    )
+
+
+def _own(layers: Layers) -> Flow | None:
+    backward, forward = layers.get("backward"), layers.get("forward")
+    if backward is None or forward is None or not backward.shape == forward.shape == (*backward.shape[:2], 2):
+        return None
+    return _flow(backward, forward)
+
+
+def _blender(layers: Layers) -> Flow | None:
+    # Cycles (kernel/geom, primitive_motion_vector): X Y is where the point was minus where it is, Z W is
+    # where it is minus where it will be, in pixels, y up.
+    name = next((n for n in layers if n == "Vector" or n.endswith(".Vector")), None)
+    if name is None or f"{name}.W" not in layers or layers[name].ndim != 3:
+        return None
+    x, y, z = np.moveaxis(layers[name].astype(np.float32), -1, 0)
+    w = layers[f"{name}.W"].astype(np.float32)
+    return _flow(np.stack([x, -y], axis=-1), np.stack([-z, w], axis=-1))
+
+
+def _plain(layers: Layers) -> Flow | None:
+    forward = layers.get("motion")
+    if forward is None or forward.ndim != 3 or forward.shape[2] != 2:
+        return None
+    return _flow(-forward, forward)  # what comes to a pixel moved as what goes from it
+
+
+KINDS = (
+    _Kind("forward.u/v and backward.u/v (pixels to the next and previous frame, x right, y down)", _own),
+    _Kind("Vector.X/Y/Z/W (Blender's Vector pass)", _blender),
+    _Kind("motion.u/v (pixels to the next frame, x right, y down)", _plain, is_forward_only=True),
+)
+
+
+def flow_of_layers(layers: Layers) -> Flow | None:
+    """Flow from the layers of an OpenEXR frame; None if none of a known kind is among them.
+
+    Known are our own ``forward.u/v`` with ``backward.u/v``; the Vector pass of Blender, whatever view
+    layer stands before its name; and ``motion.u/v``, pixels to the next frame, x right, y down.
+
+    Parameters
+    ----------
+    layers
+        From :func:`enfilade.images.read_exr`.
+    """
+    found = (kind.read(layers) for kind in KINDS)
+    return next((flow for flow in found if flow is not None), None)
+
+
+def _kind_of(sequence: Sequence) -> _Kind | None:
+    if not sequence.name(0).lower().endswith(".exr"):
+        return None
+    layers = sequence.layers(0)
+    return next((kind for kind in KINDS if kind.read(layers) is not None), None)
+
+
+def _blocks(image: F32) -> F32:
+    rows, columns = (min(n, BLOCK_PX) for n in image.shape)
+    height, width = (n - n % block for n, block in zip(image.shape, (rows, columns), strict=True))
+    blocks = image[:height, :width].reshape(height // rows, rows, width // columns, columns)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
+
+
+def _change(image: F32, before: F32, backward: F32) -> float:
+    """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image."""
+    fetched, is_inside = moved(before, backward)
+    share = float(_blocks(is_inside.astype(np.float32)).mean())
+    change = _blocks(np.where(is_inside, image - fetched, np.float32(0.0)))
+    return float(np.abs(change).mean()) / share if share else 0.0
+
+
+class _FromLayers:
+    kind = "layers"
+
+    def __init__(self, sequence: Sequence, kind: _Kind, role: str, starts: frozenset[int] | None) -> None:
+        self._sequence = sequence
+        self._kind = kind
+        self._starts = starts
+        self.text = f"image flow: from the {role}'s layers {kind.text}"
+
+    def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
+        """Pairs with the flow of their layers.
+
+        Where neither a run nor a layer tells which frame is the last one, a cut is where the image changes
+        altogether.
+        """
+        before: F32 | None = None
+        for pair in pairs:
+            flow = self._read(pair.index)
+            now = srgb_encode(pair.reference_relative)
+            is_cut = before is not None and self._is_cut(pair.index, flow, now, before)
+            yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
+            before = now
+
+    def _is_cut(self, index: int, flow: Flow, now: F32, before: F32) -> bool:
+        if self._starts is not None:
+            return index in self._starts
+        if self._kind.is_forward_only:
+            return _change(now, before, flow.backward) > CUT_DIFFERENCE
+        return not flow.has_backward and _change(now, before, flow.backward) > RESTING_DIFFERENCE
+
+    def _read(self, index: int) -> Flow:
+        name = self._sequence.name(index)
+        flow = self._kind.read(self._sequence.layers(index))
+        if flow is None:
+            raise ImageError(f"{name} has no layers {self._kind.text}, which the first frame has")
+        if not np.isfinite(flow.motion).all():
+            raise ImageError(
+                f"{name} has NaN or infinite values in its image flow; --flow estimate needs none of it"
+            )
+        return flow
+
+
+class _Estimated:
+    kind = "estimate"
+
+    def __init__(self, width: int, height: int, starts: frozenset[int]) -> None:
+        self._estimator = FlowEstimator(width, height)
+        self._starts = starts
+        self.text = (
+            "image flow: no layers of it, so it is estimated from the reference (dense inverse search); "
+            "--flow none judges all as if it stood still"
+        )
+
+    def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
+        """Pairs with estimated flow, one frame after they came."""
+        before = now = None
+        waiting: Pair | None = None
+        for pair in pairs:
+            after = self._estimator.luma(pair.reference_relative)
+            if waiting is not None and now is not None:
+                yield waiting, self._moved(waiting.index, now, before, after)
+            waiting, before, now = pair, now, after
+        if waiting is not None and now is not None:
+            yield waiting, self._moved(waiting.index, now, before, None)
+
+    def _moved(self, index: int, now: U8, before: U8 | None, after: U8 | None) -> Moved:
+        previous = None if index in self._starts else before
+        following = None if index + 1 in self._starts else after
+        flow = self._estimator.flow(now, previous, following)
+        is_cut = index > 0 and not flow.has_backward
+        return Moved(flow.motion, flow.backward if flow.has_backward else None, is_cut)
+
+
+class _Still:
+    kind = "none"
+
+    def __init__(self, text: str, starts: frozenset[int]) -> None:
+        self.text = text
+        self._starts = starts
+
+    def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
+        """Pairs of which nothing moves."""
+        for pair in pairs:
+            yield pair, Moved(is_cut=pair.index in self._starts)

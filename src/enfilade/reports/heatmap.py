@@ -1,0 +1,224 @@
+"""Heat maps: visible differences in colour over the grey image, with a legend, as a video or as PNGs.
+
+Where nothing is seen the image is grey. From there the colours go from blue over red to yellow, growing
+lighter: readers with any of the common colour deficiencies tell them apart, and so does a grey print.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.errors import RunFolderError, SettingsError
+from enfilade.images import encode_video
+from enfilade.kernels.tone import srgb_decode
+from enfilade.records import F32, U8
+from enfilade.reports.charts import Figure, pixels, save_picture
+from enfilade.settings import VideoSettings
+
+__all__ = ["VIDEO_CODECS", "HeatmapPainter", "overlay", "write_heatmap_images", "write_heatmap_video"]
+
+VIDEO_CODECS = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}  # by the suffix that is asked for
+FAINT_JND, SOLID_JND, TOP_JND = 0.25, 1.0, 16.0  # colour begins, hides most of the grey, ends
+COLORS = {  # sRGB of each JND; between them by straight lines over log(1 + JND)
+    0.0: (0.10, 0.20, 0.70),
+    0.5: (0.16, 0.32, 0.92),
+    1.0: (0.58, 0.16, 0.78),
+    2.0: (0.86, 0.25, 0.46),
+    4.0: (0.96, 0.47, 0.20),
+    8.0: (0.99, 0.73, 0.16),
+    16.0: (1.00, 0.98, 0.50),
+}
+STEPS = 1024  # of the colours between 0 and TOP_JND
+OPACITY = 0.9  # at most: a little of the image shows through
+DARKEST, LIGHTEST = 0.06, 0.62  # encoded black and white of the grey image, so that colours stand out
+LEAST_WIDTH_PX = 480  # narrower images are enlarged by a whole factor: the legend must be legible
+BACKGROUND, INK = "#111111", "#EEEEEE"
+
+
+def _place(jnd: npt.ArrayLike) -> F32:
+    """Place on the scale of colours, 0..1: the logarithm of 1 + JND, so that faint and strong both show."""
+    return np.asarray(np.log1p(np.asarray(jnd, np.float32)) / np.float32(np.log1p(TOP_JND)), np.float32)
+
+
+def _ramp() -> tuple[F32, F32]:
+    place = np.linspace(0.0, 1.0, STEPS)
+    jnd = np.expm1(place * np.log1p(TOP_JND))
+    opacity = OPACITY * np.clip((jnd - FAINT_JND) / (SOLID_JND - FAINT_JND), 0.0, 1.0)
+    stops = _place(list(COLORS))
+    color = np.stack([np.interp(place, stops, [c[i] for c in COLORS.values()]) for i in range(3)], axis=-1)
+    return (opacity[:, None] * color).astype(np.float32), (1.0 - opacity).astype(np.float32)
+
+
+RAMP, TRANSPARENCY = _ramp()
+
+
+def overlay(jnd: F32, grey: F32) -> F32:
+    """Colour a map over an image.
+
+    Parameters
+    ----------
+    jnd : (H, W) float32
+        Visible difference, JND; from :data:`TOP_JND` on the colour stays.
+    grey : (H, W) float32
+        The image, encoded for a screen, 0..1.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Encoded sRGB, 0..1.
+    """
+    step = np.minimum(_place(jnd) * np.float32(STEPS), np.float32(STEPS - 1)).astype(np.intp)
+    shown = np.float32(DARKEST) + np.float32(LIGHTEST - DARKEST) * np.clip(grey, 0.0, 1.0)
+    mixed: F32 = RAMP[step]
+    mixed += (shown * TRANSPARENCY[step])[..., None]
+    return mixed
+
+
+class HeatmapPainter:
+    """Paints heat maps of one size, with the legend and a caption below.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the maps, pixels.
+
+    Attributes
+    ----------
+    width, height : int
+        Of the pictures, even: narrow maps are enlarged by a whole factor, and the legend is below.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        self._scale = -(-LEAST_WIDTH_PX // width) if width < LEAST_WIDTH_PX else 1
+        self._map_size = (height * self._scale, width * self._scale)
+        self.width = self._map_size[1] + self._map_size[1] % 2
+        self._text_px = int(np.clip(self.width / 52, 10, 30))
+        self._legend = self._drawn_legend()
+        strips = self._legend.shape[0] + self._caption_height
+        self.height = self._map_size[0] + strips + (self._map_size[0] + strips) % 2
+
+    @property
+    def _caption_height(self) -> int:
+        return 2 * self._text_px
+
+    @property
+    def _side(self) -> float:
+        return 1.2 * self._text_px / self.width
+
+    def paint(self, jnd: F32, grey: F32, caption: str) -> U8:
+        """Paint one frame.
+
+        Parameters
+        ----------
+        jnd, grey : (H, W) float32
+            See :func:`overlay`.
+        caption
+            One line, below the image.
+
+        Returns
+        -------
+        (height, width, 3) uint8
+            Encoded sRGB.
+        """
+        picture: U8 = np.full((self.height, self.width, 3), int(BACKGROUND[1:3], 16), np.uint8)
+        painted = np.rint(overlay(jnd, grey) * np.float32(255.0)).astype(np.uint8)
+        rows, columns = self._map_size
+        picture[:rows, :columns] = painted.repeat(self._scale, axis=0).repeat(self._scale, axis=1)
+        below = rows + self._caption_height
+        picture[rows:below] = self._drawn_caption(caption)
+        picture[below : below + self._legend.shape[0]] = self._legend
+        return picture
+
+    def _figure(self, height_px: int) -> Figure:
+        # At 72 dots per inch a point, the unit of text, is a pixel.
+        return Figure(figsize=(self.width / 72, height_px / 72), dpi=72, facecolor=BACKGROUND)
+
+    def _drawn_caption(self, text: str) -> U8:
+        figure = self._figure(self._caption_height)
+        figure.text(self._side, 0.45, text, color=INK, fontsize=self._text_px, va="center")
+        return pixels(figure)
+
+    def _drawn_legend(self) -> U8:
+        height_px = round(4.2 * self._text_px)
+        figure = self._figure(height_px)
+        side = self._side
+        ax = figure.add_axes((side, 0.72, 1.0 - 2.0 * side, 0.24))
+        ramp = np.expm1(np.linspace(0.0, np.log1p(TOP_JND), self.width, dtype=np.float32))[None, :]
+        ax.imshow(overlay(ramp, np.full_like(ramp, 0.5)), aspect="auto", extent=(0.0, 1.0, 0.0, 1.0))
+        ax.set_yticks([])
+        labels = [f"{jnd:g}" for jnd in COLORS]
+        ax.set_xticks(_place(list(COLORS)).tolist(), [*labels[:-1], f"{labels[-1]} and more"])
+        ax.get_xticklabels()[-1].set_horizontalalignment("right")
+        ax.tick_params(colors=INK, labelsize=0.9 * self._text_px, length=3, pad=1)
+        ax.spines[:].set_visible(False)
+        figure.text(
+            side, 0.06, "just noticeable differences (JND): at 1, three viewers of four see it",
+            color=INK, fontsize=0.9 * self._text_px, va="bottom",
+        )  # fmt: skip
+        return pixels(figure)
+
+
+def write_heatmap_video(file: Path, pictures: Iterable[U8], *, size: tuple[int, int], fps: float) -> None:
+    """Encode pictures of :class:`HeatmapPainter` as a video, whole or not at all.
+
+    Parameters
+    ----------
+    file
+        Its suffix chooses the codec: `.mp4` H.264, `.mkv` FFV1 (without loss), `.mov` ProRes.
+    pictures : iterable of (height, width, 3) uint8
+    size
+        Width and height.
+    fps
+
+    Raises
+    ------
+    SettingsError
+        Another suffix.
+    RunFolderError
+        The file can't be written.
+    """
+    codec = VIDEO_CODECS.get(file.suffix.lower())
+    if codec is None:
+        raise SettingsError(f"{file}: a heat map is written as {', '.join(VIDEO_CODECS)}, or into a folder")
+    decoded = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))
+    linear = (decoded[picture] for picture in pictures)
+    settings = VideoSettings(codec=codec)
+    encode_video(file, linear, fps=fps, width=size[0], height=size[1], settings=settings, exposure_ev=0.0)
+
+
+def write_heatmap_images(folder: Path, pictures: Iterable[tuple[str, U8]]) -> None:
+    """Write pictures as PNGs; none appears in the folder before all are there.
+
+    Parameters
+    ----------
+    folder
+        Made where it is missing. Files of the same names in it are replaced.
+    pictures : iterable of (str, (height, width, 3) uint8)
+        Name of the file without its suffix, and what is in it.
+
+    Raises
+    ------
+    RunFolderError
+        The folder can't be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(prefix=".heatmap-", dir=folder))
+    except OSError as error:
+        raise RunFolderError(f"can't write into {folder}: {error.strerror}") from error
+    try:
+        for file in list(_saved(beside, pictures)):
+            file.replace(folder / file.name)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _saved(folder: Path, pictures: Iterable[tuple[str, U8]]) -> Iterator[Path]:
+    for name, picture in pictures:
+        yield save_picture(picture, folder / f"{name}.png")
