@@ -291,10 +291,10 @@ class LimitSettings(Section):
     elements_m: int = option(200, "Most vertices or faces of a mesh, millions.", least=1, most=100_000)
     trial_mb: int = option(
         16_384,
-        "Memory in which a process of its own must be able to load a scene before it is rendered, or to "
-        "decode what is compared, MB.", least=512, most=10_000_000,
+        "Memory in which a process of its own must be able to load a scene before it is rendered, MB.",
+        least=512, most=10_000_000,
     )  # fmt: skip
-    trial_s: float = option(600.0, "... and seconds, for a scene or a frame.", least=0.1, most=86_400.0)
+    trial_s: float = option(600.0, "... and seconds.", least=0.1, most=86_400.0)
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def write_video(workshop: Workshop, spans: Sequence[range]) -> None:
             workshop.run.check(clip)
         file = workshop.run.folder / f"video{video_suffix(job.settings.video.codec)}"
         counted = [(clip, len(span)) for clip, span in zip(clips, spans, strict=True)]
-        join_videos(file, counted, fps=job.path.fps, settings=job.settings.video)
+        join_videos(file, counted, fps=job.path.fps)
     workshop.finish("video", [file])
 
 
