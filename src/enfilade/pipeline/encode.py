@@ -18,7 +18,6 @@ from enfilade.pipeline.job import Job
 from enfilade.records import F32
 from enfilade.settings import VideoSettings, ViewingSettings
 from enfilade.store import Run
-from enfilade.store.guest import guest
 
 NAME = "encoded"  # of the video where none is given
 OWN = "video"  # ... and of the run's
@@ -83,16 +82,15 @@ def encode(
     if note := odd_size_note(video.codec, width, height):
         monitor.say(note)
     monitor.stage("video", len(numbers))
-    with guest(folder):
-        encode_video(
-            file,
-            _images(run, numbers, monitor),
-            fps=fps,
-            width=width,
-            height=height,
-            settings=video,
-            exposure_ev=exposure_ev,
-        )
+    encode_video(
+        file,
+        _images(run, numbers, monitor),
+        fps=fps,
+        width=width,
+        height=height,
+        settings=video,
+        exposure_ev=exposure_ev,
+    )
     return file
 
 
