@@ -13,7 +13,7 @@ from enfilade.images import read_shading, write_shading
 from enfilade.kernels.tone import display_luminance
 from enfilade.methods.decoupled import Shader, VirtualImages
 from enfilade.methods.paper import spatial_support_px
-from enfilade.metric import Aqm, MetricOptions
+from enfilade.metric import Aqm
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
@@ -72,13 +72,14 @@ class Workshop:
 
     @cached_property
     def aqm(self) -> Aqm:
-        """The metric, with its filters made once."""
-        return Aqm(self.job.viewing, mask_slope=self.job.settings.metric.mask_slope, workers=FFT_WORKERS)
+        """The paper's metric, with its filters made once."""
+        slope = self.job.settings.metric.mask_slope
+        return Aqm.paper(self.job.viewing, mask_slope=slope, workers=FFT_WORKERS)
 
     @cached_property
     def judge(self) -> Aqm:
-        """The metric as it stands today, for what the paper does not ask."""
-        return Aqm(self.job.viewing, options=MetricOptions.modern(), workers=FFT_WORKERS)
+        """The modern metric, for what the paper does not ask."""
+        return Aqm.modern(self.job.viewing, workers=FFT_WORKERS)
 
     def shown(self, color: F32) -> F32:
         """What the screen emits for linear colours, (H, W) cd/m2."""
