@@ -133,7 +133,7 @@ class ModernMetric:
                 reference, difference = channel.reference * weight, channel.counted * weight
                 if channel.uniform is not None:
                     difference += channel.uniform * sensitivity.at_rest(band)
-                maps = energy_difference(reference, reference + difference)
+                maps = energy_difference(reference, np.add(reference, difference, out=difference))
                 if area is not None:
                     np.multiply(maps[2], area, out=maps[2])
                 if direction is not None:

@@ -33,14 +33,15 @@ INHIBITION_EXPONENT = 0.8  # no unit, of energy
 
 
 def energy_difference(reference: F32, test: F32) -> tuple[F32, F32, F32]:
-    """Energies c''^2, c'^2 and abs(c' abs(c') - c'' abs(c'')) of contrasts c'', c' in thresholds."""
-    signed = np.abs(test)
-    signed *= test
-    difference = np.abs(reference)
-    difference *= reference
-    np.subtract(signed, difference, out=difference)
+    """Energies c''^2, c'^2 and abs(c' abs(c') - c'' abs(c'')) of contrasts c'', c' in thresholds.
+
+    The contrasts are overwritten.
+    """
+    difference = np.abs(test)
+    difference *= test
+    difference -= np.abs(reference) * reference
     np.abs(difference, out=difference)
-    return np.square(reference), np.square(test, out=signed), difference
+    return np.square(reference, out=reference), np.square(test, out=test), difference
 
 
 @dataclass(frozen=True)
