@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -23,17 +23,6 @@ if TYPE_CHECKING:
     from enfilade.viewing import Display, Viewing
 
 FLOWS = ("auto", "layers", "estimate", "none")
-DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would load NumPy
-    "csf",
-    "luminance_adaptive",
-    "hold_blur",
-    "csf_within_bands",
-    "ripple_free",
-    "transducer",
-    "broad_masking",
-    "spatial_pooling",
-    "transient",
-)
 IMAGES = frozenset(  # frames of which a heat map takes the name: `SUFFIXES`, which --help can't ask either
     {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"}
 )
@@ -73,16 +62,8 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     type=click.Choice(("modern", "paper")),
     default="modern",
     show_default=True,
-    help="The metric as published, or with all departures.",
+    help="The metric as published, or brought up to later measurements of vision.",
 )
-@click.option(
-    "--with",
-    "include",
-    metavar="NAME",
-    multiple=True,
-    help=f"Add a departure to the mode: {', '.join(DEPARTURES)}.",
-)
-@click.option("--without", "leave_out", metavar="NAME", multiple=True, help="Take a departure away.")
 @click.option(
     "--flow",
     type=click.Choice(FLOWS),
@@ -99,15 +80,6 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     help="Layer or part of OpenEXR frames that is the picture: once for both sequences, or twice, the test's "
     "and then the reference's.  [default: R G B without a name, else rgba, beauty, C or Combined, else the "
     "only one of three channels]",
-)
-@click.option(
-    "--device",
-    type=click.Choice(("none", "auto", "cpu", "gpu")),
-    default="none",
-    show_default=True,
-    help="Where the modern mode's per-pixel part runs: in NumPy (none), or in Dr.Jit kernels, which are "
-    "faster and take a second to start; auto is the GPU where there is one. They need the departures "
-    "transducer and spatial_pooling.",
 )
 @click.option(
     "--heatmap",
@@ -168,38 +140,24 @@ def _terms(
     *,
     display: str | None,
     fps: float | None,
-    mode: str,
-    include: tuple[str, ...],
-    leave_out: tuple[str, ...],
+    mode: Literal["modern", "paper"],
     flow: str,
     layers: tuple[str, ...],
-    device: str,
 ) -> Terms:
-    from enfilade.comparison import FlowChoice, Terms, kernels_serve, metric_options
+    from enfilade.comparison import FlowChoice, Terms
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx)
-    options = metric_options(mode, include=include, leave_out=leave_out)
-    if device != "none":
-        if not kernels_serve(options):
-            raise SettingsError(
-                f"--device {device} says nothing to this metric: the kernels need the departures transducer "
-                "and spatial_pooling; leave it out, or have both"
-            )
-        from enfilade.device import activate
-
-        if note := activate(cast('Literal["auto", "cpu", "gpu"]', device)).note:
-            click.echo(f"note    judged on the CPU: {note}", err=True)
     return Terms(
         viewing=settings.viewing,
         metric=settings.metric,
         display=None if display is None else _display(ctx, display),
-        options=options,
+        mode=mode,
         flow=FlowChoice(flow),
         fps=fps,
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
-        has_kernels=device != "none",
+        limits=settings.limits,
         layers=(layers[0], layers[-1]) if layers else (None, None),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enfilade.comparison.judge import JudgedFrame, Terms, compare, kernels_serve, metric_options
+from enfilade.comparison.judge import JudgedFrame, Terms, compare
 from enfilade.comparison.motion import FlowChoice
 from enfilade.comparison.verdict import FrameDifference, SequenceDifference, meaning, psnr_db
 
@@ -13,8 +13,6 @@ __all__ = [
     "SequenceDifference",
     "Terms",
     "compare",
-    "kernels_serve",
     "meaning",
-    "metric_options",
     "psnr_db",
 ]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -14,13 +15,13 @@ from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.verdict import Band, FrameDifference, Part, SequenceDifference
 from enfilade.errors import ImageError, InputError
 from enfilade.kernels.tone import srgb_encode
-from enfilade.metric import Comparison, MetricOptions, Pursuit, SequenceAqm
+from enfilade.metric import Aqm, Comparison, Pursuit, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
-__all__ = ["JudgedFrame", "Terms", "compare", "kernels_serve", "metric_options"]
+__all__ = ["JudgedFrame", "Terms", "compare"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,21 +60,17 @@ class Terms:
     Attributes
     ----------
     viewing, metric
-        Of `viewing` the exposure does not count; of `metric` the slope of masking counts where the
-        transducer is off.
+        Of `viewing` the exposure does not count; the slope of masking counts in the paper's mode.
     display
         In place of the screen of `viewing`, which an image fills whatever its size.
-    options
-        Departures from the paper; by default all of them.
+    mode
+        Of the metric.
     flow
         Where image flow comes from.
     fps
         Frames per second shown; by default the reference's, the test's, or 30.
     exposure_ev
         Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
-    has_kernels
-        Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active; see
-        :func:`kernels_serve`.
     layers
         Of the test's and of the reference's OpenEXR frames: the layer or part that is the picture.
     """
@@ -81,11 +78,10 @@ class Terms:
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
     metric: MetricSettings = field(default_factory=MetricSettings)
     display: Display | None = None
-    options: MetricOptions = field(default_factory=MetricOptions.modern)
+    mode: Literal["modern", "paper"] = "modern"
     flow: FlowChoice = FlowChoice.AUTO
     fps: float | None = None
     exposure_ev: float | None = None
-    has_kernels: bool = False
     layers: tuple[str | None, str | None] = (None, None)
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
@@ -159,66 +155,24 @@ def compare(
         deque(judged(), maxlen=0)
     else:
         show(judged(), conditions)
-    return SequenceDifference(tuple(found), conditions, judge.bands, terms.options, motion.kind)
-
-
-def metric_options(mode: str, *, include: Iterable[str] = (), leave_out: Iterable[str] = ()) -> MetricOptions:
-    """Departures from the paper, by names.
-
-    Parameters
-    ----------
-    mode
-        ``paper`` or ``modern``.
-    include, leave_out
-        Departures to add to those of the mode, and to take away.
-
-    Raises
-    ------
-    InputError
-        An unknown mode or departure; the message lists the known ones.
-    """
-    modern = MetricOptions.modern()
-    if mode not in ("paper", "modern"):
-        raise InputError(f"unknown mode {mode!r} of the metric; choose paper or modern")
-    options = modern if mode == "modern" else MetricOptions.paper()
-    for name in include:
-        modern.without(name)  # which refuses an unknown one
-        options = replace(options, **{name: getattr(modern, name)})
-    for name in leave_out:
-        options = options.without(name)
-    return options
-
-
-def kernels_serve(options: MetricOptions) -> bool:
-    """Whether there is a part of the metric that the kernels can run, with some departures from the paper.
-
-    Parameters
-    ----------
-    options
-        Without the transducer or without spatial pooling all runs in NumPy.
-    """
-    return options.transducer and options.spatial_pooling
+    return SequenceDifference(tuple(found), conditions, judge.bands, terms.mode, motion.kind)
 
 
 class _Judge:
     def __init__(self, viewing: Viewing, terms: Terms) -> None:
         self._viewing = viewing
-        self._aqm = SequenceAqm(
-            viewing,
-            options=terms.options,
-            pursuit=Pursuit(terms.metric.metering.value),
-            mask_slope=terms.metric.mask_slope,
-            has_kernels=terms.has_kernels,
-        )
-        density = viewing.pixels_per_degree
-        self.bands = tuple(
-            Band(band.low_cpp * density, band.high_cpp * density) for band in self._aqm.aqm.cortex.bands
-        )
+        pursuit = Pursuit(terms.metric.metering.value)
+        if terms.mode == "paper":
+            aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=terms.metric.mask_slope)
+        else:
+            aqm = Aqm.modern(viewing, pursuit=pursuit)
+        self._aqm = SequenceAqm(aqm)
+        self.bands = tuple(Band(*ends) for ends in aqm.bands_cpd)
 
     def frame(self, pair: Pair, moved: Moved) -> JudgedFrame:
         velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
         try:
-            found = self._aqm.judge(
+            found = self._aqm.compare(
                 pair.test,
                 pair.reference,
                 velocity=velocity,

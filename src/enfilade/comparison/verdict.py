@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from enfilade.metric import MetricOptions, sequence_score
+from enfilade.metric import sequence_score
 from enfilade.viewing import Viewing
 
 __all__ = ["Band", "FrameDifference", "Part", "SequenceDifference", "meaning", "psnr_db"]
@@ -108,8 +108,8 @@ class SequenceDifference:
         Who was assumed to look.
     bands : tuple of Band
         Finest first.
-    options : MetricOptions
-        Departures from the paper.
+    mode : str
+        ``modern`` or ``paper``.
     flow : str
         Where the image flow came from: ``layers``, ``estimate`` or ``none``.
     """
@@ -117,7 +117,7 @@ class SequenceDifference:
     frames: tuple[FrameDifference, ...]
     viewing: Viewing
     bands: tuple[Band, ...]
-    options: MetricOptions
+    mode: str
     flow: str
 
     @property
@@ -132,15 +132,6 @@ class SequenceDifference:
         if not any(f.percent_visible for f in self.frames):
             return words
         return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
-
-    @property
-    def mode(self) -> str:
-        """``paper``, ``modern``, or ``custom`` for anything between."""
-        known = {"paper": MetricOptions.paper(), "modern": MetricOptions.modern()}
-        return next((name for name, options in known.items() if options == self.options), "custom")
-
-    def _is_on(self, departure: str) -> bool:
-        return self.options.without(departure) != self.options
 
     @property
     def psnr_db(self) -> float:
@@ -168,7 +159,6 @@ class SequenceDifference:
             "black_cd_m2": viewing.black_cd_m2,
             "persistence": viewing.persistence,
             "mode": self.mode,
-            "departures": [name for name in self.options.departures() if self._is_on(name)],
             "flow": self.flow,
             "bands_cpd": [[band.low_cpd, band.high_cpd] for band in self.bands],
             "per_frame": [frame.to_dict() for frame in self.frames],

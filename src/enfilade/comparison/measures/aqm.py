@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from enfilade.comparison.measures.judge import Scale
 from enfilade.comparison.measures.shown import Shown
-from enfilade.metric import Pursuit, SequenceAqm, sequence_score
+from enfilade.metric import Aqm, Pursuit, SequenceAqm, sequence_score
 from enfilade.viewing import Viewing
 
 __all__ = ["AqmJudge"]
@@ -27,12 +27,12 @@ class AqmJudge:
 
     def __init__(self, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> None:
         self._viewing = viewing
-        self._metric = SequenceAqm(viewing, pursuit=pursuit)
+        self._metric = SequenceAqm(Aqm.modern(viewing, pursuit=pursuit))
 
     def judge(self, pair: Shown) -> float:
         """Judge the next frame: JND."""
         flow = pair.flow
-        found = self._metric.judge(
+        found = self._metric.compare(
             pair.test_cd_m2,
             pair.reference_cd_m2,
             velocity=None if flow is None else self._viewing.velocity_deg_s(flow.motion),
