@@ -1,4 +1,4 @@
-"""One frame of a test and of its reference as the screen shows them: what judges look at."""
+"""One frame of a test and of its reference as the display shows them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from enfilade.kernels.tone import display_luminance, srgb_encode
 from enfilade.records import F32, Flow, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["Shown", "shown"]
+__all__ = ["DisplayedPair", "display_pair"]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class DisplayedPair:
     """A pair of frames after exposure and clipping at black and white.
 
     Attributes
     ----------
     test, reference : (H, W, 3) float32
-        Encoded for an sRGB screen, 0..1; not rounded to 8 bits.
+        Encoded for an sRGB display, 0..1; not rounded to 8 bits.
     test_cd_m2, reference_cd_m2 : (H, W) float32
-        Luminance on the screen.
+        Luminance on the display.
     flow : Flow or None
-        Of the reference; None: nothing moves, and there was no frame before.
-    seen_before : (H, W) bool or None
-        Where the last frame saw the same surface, `flow.backward` away; None where this frame begins a shot.
+        Motion vectors of the reference; None: nothing moves.
+    visible_before : (H, W) bool or None
+        Where the last frame shows the same surface, `flow.backward` away; None where this frame begins a
+        shot.
     """
 
     test: F32
@@ -35,19 +36,19 @@ class Shown:
     test_cd_m2: F32
     reference_cd_m2: F32
     flow: Flow | None = None
-    seen_before: Mask | None = None
+    visible_before: Mask | None = None
 
 
-def shown(
+def display_pair(
     test: F32,
     reference: F32,
     viewing: Viewing,
     *,
     exposure_ev: float = 0.0,
     flow: Flow | None = None,
-    seen_before: Mask | None = None,
-) -> Shown:
-    """Show a pair of frames.
+    visible_before: Mask | None = None,
+) -> DisplayedPair:
+    """Display a pair of frames.
 
     Parameters
     ----------
@@ -57,8 +58,8 @@ def shown(
         Its size is that of the frames.
     exposure_ev
         In stops.
-    flow, seen_before
-        See :class:`Shown`.
+    flow, visible_before
+        See :class:`DisplayedPair`.
 
     Raises
     ------
@@ -70,9 +71,9 @@ def shown(
         if image.shape != shape:
             raise InputError(f"the {name} has shape {image.shape}; the viewing conditions ask for {shape}")
         if not np.isfinite(image).all():
-            raise InputError(f"the {name} holds pixels that are NaN or infinite; it can't be judged")
+            raise InputError(f"the {name} holds pixels that are NaN or infinite; it can't be compared")
     of_test, of_reference = (_on_screen(image, viewing, exposure_ev) for image in (test, reference))
-    return Shown(of_test[0], of_reference[0], of_test[1], of_reference[1], flow, seen_before)
+    return DisplayedPair(of_test[0], of_reference[0], of_test[1], of_reference[1], flow, visible_before)
 
 
 def _on_screen(linear: F32, viewing: Viewing, exposure_ev: float) -> tuple[F32, F32]:

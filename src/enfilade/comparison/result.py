@@ -1,23 +1,24 @@
-"""What the metric says of two sequences: per frame, per band, steady and transient, and as one number."""
+"""The result of a comparison: per frame, per band, steady and transient, and as one number."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from enfilade.metric import sequence_score
 from enfilade.viewing import Viewing
 
-__all__ = ["Band", "FrameDifference", "Part", "SequenceDifference", "meaning", "psnr_db"]
+__all__ = ["FrameDifference", "Part", "SequenceDifference", "psnr_db"]
 
-MEANINGS = (  # up to which score, JND: of all pixels and frames together, so not of whether one spot is found
+WORDS = (  # for scores up to so many JND, of all pixels and frames taken together
     (0.0, "identical"),
-    (0.25, "next to none on the whole"),
-    (0.75, "faint on the whole"),
-    (1.5, "noticeable on the whole"),
-    (3.0, "plain on the whole"),
-    (math.inf, "strong on the whole"),
+    (0.25, "next to none overall"),
+    (0.75, "faint overall"),
+    (1.5, "noticeable overall"),
+    (3.0, "obvious overall"),
+    (math.inf, "strong overall"),
 )
 
 
@@ -39,27 +40,27 @@ class Part:
 
 @dataclass(frozen=True)
 class FrameDifference:
-    """What the metric says of one pair of frames.
+    """The visible difference between two frames.
 
     Attributes
     ----------
     name : str
         Of the test's frame.
     number : int
-        Of the test's frame; from 1 where it has none of its own.
+        Of the test's frame; counted from 1 where it has none of its own.
     percent_visible : float
         Pixels above 1 JND, percent.
     score : float
-        The map pooled to one number, JND.
+        The map of visible differences pooled to one number, JND.
     steady, transient : Part
-        Errors that stay on the surface, and errors that change from frame to frame. Both make up the
-        score; `transient` is zero where the metric doesn't look for them.
+        Errors that stay on their surface, and errors that change from frame to frame. Both are part of the
+        score; the paper's mode has no transient errors.
     squared_error : float
         Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
     velocity_deg_s : float
-        Mean image velocity that was assumed.
+        Mean image velocity.
     largest_jnd : float
-        Of the map: what is seen where most is, JND.
+        Largest value of the map, JND.
     """
 
     name: str
@@ -73,7 +74,7 @@ class FrameDifference:
     largest_jnd: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Figures as plain values for JSON; the PSNR of identical images is None."""
+        """As plain values, fit for JSON; the PSNR of identical images is None."""
         return {
             "name": self.name,
             "number": self.number,
@@ -90,35 +91,30 @@ class FrameDifference:
 
 
 @dataclass(frozen=True)
-class Band:
-    """Spatial frequencies that a band passes, cycles per degree; `low_cpd` is 0 in the base."""
-
-    low_cpd: float
-    high_cpd: float
-
-
-@dataclass(frozen=True)
 class SequenceDifference:
-    """What the metric says of two sequences.
+    """The visible difference between two sequences.
 
     Attributes
     ----------
     frames : tuple of FrameDifference
     viewing : Viewing
-        Who was assumed to look.
-    bands : tuple of Band
-        Finest first.
+        Viewing conditions.
+    bands_cpd : tuple of (float, float)
+        Frequencies that each radial band passes, cycles per degree, finest first; the base from 0.
     mode : str
-        ``modern`` or ``paper``.
+        Of the metric: ``modern`` or ``paper``.
     flow : str
-        Where the image flow came from: ``layers``, ``estimate`` or ``none``.
+        Origin of the motion vectors: ``layers``, ``estimate`` or ``none``.
+    scores : mapping of str to float
+        Results of further measures, by name.
     """
 
     frames: tuple[FrameDifference, ...]
     viewing: Viewing
-    bands: tuple[Band, ...]
+    bands_cpd: tuple[tuple[float, float], ...]
     mode: str
     flow: str
+    scores: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def score(self) -> float:
@@ -127,8 +123,8 @@ class SequenceDifference:
 
     @property
     def meaning(self) -> str:
-        """The score in words, and the frame with the most visible pixel, if any pixel is visible."""
-        words, worst = meaning(self.score), max(self.frames, key=lambda f: f.largest_jnd)
+        """The score in words, and the frame with the largest difference, if any pixel is visible."""
+        words, worst = words_of(self.score), max(self.frames, key=lambda f: f.largest_jnd)
         if not any(f.percent_visible for f in self.frames):
             return words
         return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
@@ -139,7 +135,7 @@ class SequenceDifference:
         return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
 
     def to_dict(self) -> dict[str, Any]:
-        """Figures as plain values for JSON; `docs/compare.md` describes them."""
+        """As plain values, fit for JSON."""
         viewing = self.viewing
         return {
             "score_jnd": self.score,
@@ -149,6 +145,7 @@ class SequenceDifference:
             "percent_visible": _spread([f.percent_visible for f in self.frames]),
             "largest_jnd": max(f.largest_jnd for f in self.frames),
             "psnr_db": _finite(self.psnr_db),
+            "scores": {name: _finite(score) for name, score in self.scores.items()},
             "worst_frame": max(range(len(self.frames)), key=lambda i: self.frames[i].score),
             "frames": len(self.frames),
             "size": [viewing.width_px, viewing.height_px],
@@ -160,22 +157,23 @@ class SequenceDifference:
             "persistence": viewing.persistence,
             "mode": self.mode,
             "flow": self.flow,
-            "bands_cpd": [[band.low_cpd, band.high_cpd] for band in self.bands],
+            "bands_cpd": [list(band) for band in self.bands_cpd],
             "per_frame": [frame.to_dict() for frame in self.frames],
         }
 
 
-def meaning(score: float) -> str:
-    """A score in words: how much the sequences differ, all pixels and frames taken together.
+def words_of(score: float) -> str:
+    """A score in words.
 
-    A defect that is small or brief has a low score, however plain it is itself.
+    It is that of all pixels and frames together: a small or brief defect has a low score, however plain it
+    is.
 
     Parameters
     ----------
     score
         JND, 0 or more.
     """
-    return next(text for most, text in MEANINGS if score <= most)
+    return next(text for most, text in WORDS if score <= most)
 
 
 def psnr_db(squared_error: float) -> float:

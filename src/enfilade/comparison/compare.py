@@ -1,18 +1,19 @@
-"""How much of a difference a viewer sees between two sequences, frame by frame (§3)."""
+"""The visible difference between two sequences, frame by frame (§3)."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from enfilade.comparison.measures import Measure, open_measure
 from enfilade.comparison.motion import FlowChoice, Moved, open_motion
 from enfilade.comparison.pairs import Pair, open_pairs
-from enfilade.comparison.verdict import Band, FrameDifference, Part, SequenceDifference
+from enfilade.comparison.result import FrameDifference, Part, SequenceDifference
 from enfilade.errors import ImageError, InputError
 from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Aqm, Comparison, Pursuit, SequenceAqm
@@ -21,12 +22,12 @@ from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
-__all__ = ["JudgedFrame", "Terms", "compare"]
+__all__ = ["ComparedFrame", "Show", "Terms", "compare"]
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedFrame:
-    """One frame as it is judged, for heat maps.
+class ComparedFrame:
+    """A compared frame, for heat maps.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class JudgedFrame:
         From 0.
     difference : FrameDifference
     jnd : (H, W) float32
-        The map.
+        Map of visible differences.
     reference_relative : (H, W) float32
         Luminance of the reference, 1 = white.
     """
@@ -46,33 +47,38 @@ class JudgedFrame:
 
     @property
     def grey(self) -> F32:
-        """The reference, encoded for a screen, (H, W) float32, 0..1."""
+        """The reference, encoded for a display, (H, W) float32, 0..1."""
         return srgb_encode(self.reference_relative)
 
 
-Show = Callable[[Iterator[JudgedFrame], Viewing], object]
+Show = Callable[[Iterator[ComparedFrame], Viewing], object]
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What a comparison assumes.
+    """Assumptions of a comparison.
 
     Attributes
     ----------
-    viewing, metric
-        Of `viewing` the exposure does not count; the slope of masking counts in the paper's mode.
+    viewing
+        Viewing conditions of an image that fills the display; its exposure is not used.
+    metric
+        Eye movements, and the slope of masking in the paper's mode.
     display
-        In place of the screen of `viewing`, which an image fills whatever its size.
+        Replaces `viewing`: images stand pixel for pixel on a display.
     mode
         Of the metric.
     flow
-        Where image flow comes from.
+        Origin of the motion vectors.
     fps
         Frames per second shown; by default the reference's, the test's, or 30.
     exposure_ev
-        Stops, of OpenEXR frames alone: others are as shown. By default those of the run folders, or 0.
+        Of OpenEXR frames, stops; by default that of the run folders, or 0.
     layers
-        Of the test's and of the reference's OpenEXR frames: the layer or part that is the picture.
+        Layer or part of the test's and the reference's OpenEXR frames that is compared.
+    measures
+        Further measures: ``psnr``, ``flip``, ``cvvdp``, or a :class:`~enfilade.comparison.measures.Measure`
+        of your own.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
@@ -83,6 +89,7 @@ class Terms:
     fps: float | None = None
     exposure_ev: float | None = None
     layers: tuple[str | None, str | None] = (None, None)
+    measures: Sequence[str | Measure] = ()
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""
@@ -107,58 +114,60 @@ def compare(
     *,
     show: Show | None = None,
 ) -> SequenceDifference:
-    """Judge two image sequences, videos or run folders with the animation quality metric.
+    """Measure the visible difference between two image sequences, videos or run folders.
 
-    Frames are read and judged one after another, each once: memory does not grow with their number.
+    Frames are read and compared one after another: memory does not grow with their number.
 
     Parameters
     ----------
     test, reference
-        Whatever :func:`enfilade.images.open_sequence` reads.
+        Sources of :func:`enfilade.images.open_sequence`.
     terms
     monitor
     show
-        Takes the judged frames as they come, and the viewing conditions. It must take all of them.
+        Receives the compared frames and the viewing conditions, and must iterate over all of them.
 
     Raises
     ------
     ImageError
-        A sequence can't be read, the two differ in length, size or frame rate, they are runs of other
+        A sequence can't be read, the two differ in length, size or frame rate, they are runs of different
         frames, or pixels are NaN or infinite. The message names the frame.
+    SettingsError
+        There is no such measure, or it is not installed.
     """
     pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers)
     conditions = terms.conditions(pairs.size, pairs.fps)
     motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
-    monitor.say(motion.text)
-    for note in filter(None, (pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note)))):
-        monitor.say(note)
+    notes = [motion.text, pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note))]
     if pairs.exposure_ev:
-        monitor.say(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
+        notes.append(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     if terms.display is None:
-        monitor.say(
-            f"screen: the image fills a diagonal of {conditions.diagonal_m:g} m, seen from "
-            f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; "
-            "--display names others"
+        notes.append(
+            f"display: the image fills a diagonal of {conditions.diagonal_m:g} m, seen from "
+            f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; --display "
+            "chooses another"
         )
-    judge = _Judge(conditions, terms)
-    monitor.stage("compare", len(pairs))
+    for note in filter(None, notes):
+        monitor.say(note)
+    comparer = _Comparer(conditions, terms)
     found: list[FrameDifference] = []
 
-    def judged() -> Iterator[JudgedFrame]:
-        for pair, moved in motion.follow(pairs.shown(conditions, monitor)):
-            frame = judge.frame(pair, moved)
+    def compared() -> Iterator[ComparedFrame]:
+        for pair, moved in motion.follow(pairs.displayed(conditions, monitor)):
+            frame = comparer.compare(pair, moved)
             found.append(frame.difference)
             yield frame
-            monitor.advance()
+            monitor.progress("compare", len(found), len(pairs))
 
     if show is None:
-        deque(judged(), maxlen=0)
+        deque(compared(), maxlen=0)
     else:
-        show(judged(), conditions)
-    return SequenceDifference(tuple(found), conditions, judge.bands, terms.mode, motion.kind)
+        show(compared(), conditions)
+    bands = comparer.bands_cpd
+    return SequenceDifference(tuple(found), conditions, bands, terms.mode, motion.kind, comparer.scores())
 
 
-class _Judge:
+class _Comparer:
     def __init__(self, viewing: Viewing, terms: Terms) -> None:
         self._viewing = viewing
         pursuit = Pursuit(terms.metric.metering.value)
@@ -167,9 +176,11 @@ class _Judge:
         else:
             aqm = Aqm.modern(viewing, pursuit=pursuit)
         self._aqm = SequenceAqm(aqm)
-        self.bands = tuple(Band(*ends) for ends in aqm.bands_cpd)
+        self.bands_cpd = aqm.bands_cpd
+        opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in terms.measures]
+        self._measures: list[tuple[Measure, list[float | None]]] = [(measure, []) for measure in opened]
 
-    def frame(self, pair: Pair, moved: Moved) -> JudgedFrame:
+    def compare(self, pair: Pair, moved: Moved) -> ComparedFrame:
         velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
         try:
             found = self._aqm.compare(
@@ -180,10 +191,15 @@ class _Judge:
                 is_cut=moved.is_cut,
             )
         except InputError as error:
-            raise ImageError(f"{pair.name} can't be judged: {error}") from error
+            raise ImageError(f"{pair.name} can't be compared: {error}") from error
+        for measure, values in self._measures:
+            values.append(measure.measure(pair.displayed))
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
         difference = _difference(pair, found, speed)
-        return JudgedFrame(pair.index, difference, found.jnd, pair.reference_relative)
+        return ComparedFrame(pair.index, difference, found.jnd, pair.reference_relative)
+
+    def scores(self) -> dict[str, float]:
+        return {measure.name: measure.pool(values) for measure, values in self._measures}
 
 
 def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
