@@ -43,7 +43,7 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @click.argument("test")
 @click.argument("reference")
 @click.option(
-    "--on",
+    "--display",
     "display",
     metavar="DISPLAY",
     callback=_list_displays,
@@ -248,7 +248,7 @@ def _picture(painter: HeatmapPainter, frame: ComparedFrame) -> Any:
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.reports.tables import comparison_table, comparison_text
+    from enfilade.reports.tables import comparison_table, result_line
 
-    click.echo(comparison_text(found))
+    click.echo(result_line(found))
     Console().print(comparison_table(found))

@@ -32,19 +32,15 @@ PAGE = "report.html"
 @quiet_option
 @debug_option
 def command(
-    *, run: Path, file: Path | None, reference: Path | None, frames: str | None, max_mb: float, quiet: bool
+    *, run: Path, file: Path | None, reference: Path | None, max_mb: float, quiet: bool
 ) -> None:
     """Write a page about the finished or running run in the folder RUN.
 
     The page is one file that needs no network.
     """
-    from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
     from enfilade.reports.page import write_report
 
-    numbers = None if frames is None else parse_frames(frames)
     with watch(quiet=quiet) as monitor:
-        page = write_report(
-            run, reference=reference, out=file, frames=numbers, max_mb=max_mb, monitor=monitor
-        )
+        page = write_report(run, reference=reference, out=file, max_mb=max_mb, monitor=monitor)
     click.echo(f"report  {page}")
