@@ -278,23 +278,17 @@ class OutputSettings(Section):
 
 @dataclass(frozen=True)
 class LimitSettings(Section):
-    """What scenes and images may ask for before they are read; no result depends on it."""
+    """Folders and resources that a scene may use; no result depends on them."""
 
     allow: str = option(
         "", f"Folders beside the scene's own in which its files may lie, with {os.pathsep!r} between them.",
         is_path=True, joined_by=os.pathsep,
     )  # fmt: skip
-    file_mb: int = option(4096, "Largest file of a scene, megabytes.", least=1, most=1_000_000)
-    megapixels: int = option(
-        268, "Largest image or film of a scene, millions of pixels.", least=1, most=100_000
-    )
-    elements_m: int = option(200, "Most vertices or faces of a mesh, millions.", least=1, most=100_000)
-    trial_mb: int = option(
-        16_384,
-        "Memory in which a process of its own must be able to load a scene before it is rendered, or to "
-        "decode what is compared, MB.", least=512, most=10_000_000,
+    preflight_mb: int = option(
+        16_384, "Memory of the preflight process, which loads the scene before a run begins, MB.",
+        least=512, most=10_000_000,
     )  # fmt: skip
-    trial_s: float = option(600.0, "... and seconds, for a scene or a frame.", least=0.1, most=86_400.0)
+    preflight_s: float = option(600.0, "Time limit of the preflight process, s.", least=0.1, most=86_400.0)
 
 
 @dataclass(frozen=True)

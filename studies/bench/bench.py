@@ -21,13 +21,13 @@ from typing import Any
 
 from enfilade.compare.measures import JUDGES, SCALES, why_missing
 from enfilade.device import Choice
-from enfilade.errors import RunFolderError, SceneError, SettingsError
+from enfilade.errors import RunFolderError, SettingsError
 from enfilade.images.interpolate import why_no_interpolation
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Monitor
-from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job, path_identity
+from enfilade.pipeline.job import Job, path_identity
 from enfilade.renderer import PixelFilter
-from enfilade.scene.scenefile import fingerprint
+from enfilade.scene.opener import identify_scene
 from enfilade.settings import Settings
 from enfilade.store import Run
 from studies.bench.contestants import FAMILIES, Contestant
@@ -336,7 +336,7 @@ def _identity(job: Job, terms: Terms) -> dict[str, Any]:
     viewing = settings.to_tables()["viewing"]
     return {
         "method": "bench",
-        "scene": _scene_digest(job.scene),
+        "scene": identify_scene(job.scene, job.renderer).fingerprint,
         "path": path_identity(job.path),
         "reference_spp": terms.reference_spp,
         "seed": trace.seed,
@@ -344,14 +344,6 @@ def _identity(job: Job, terms: Terms) -> dict[str, Any]:
         "viewing": viewing,
         "metering": settings.metric.metering.value,
     }
-
-
-def _scene_digest(scene: Path) -> str:
-    if not scene.is_file():
-        raise SceneError(f"there is no scene file {scene}")
-    if scene.name.endswith(ANALYTIC_SUFFIX):
-        return hashlib.sha256(scene.read_bytes()).hexdigest()
-    return fingerprint(scene)
 
 
 def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:

@@ -72,12 +72,12 @@ def large_png(folder, size=6000):
 
 def test_too_much_memory(tmp_path):
     with pytest.raises(ImageError, match=r"large\.png"):  # 36 megapixels are 430 MB as floats
-        FencedSequence(large_png(tmp_path), replace(LIMITS, trial_mb=900))
+        FencedSequence(large_png(tmp_path), replace(LIMITS, preflight_mb=900))
 
 
 def test_too_much_time(tmp_path):
-    with pytest.raises(ImageError, match=r"was not decoded in 0\.1 s; raise --limits-trial-s"):
-        FencedSequence(large_png(tmp_path), replace(LIMITS, trial_s=0.1))
+    with pytest.raises(ImageError, match=r"was not decoded in 0\.1 s; raise --limits-preflight-s"):
+        FencedSequence(large_png(tmp_path), replace(LIMITS, preflight_s=0.1))
 
 
 def test_a_decoder_that_dies(tmp_path):
@@ -132,5 +132,5 @@ def test_modules_that_lie_where_one_stands_are_not_run(tmp_path, monkeypatch):
 
 def test_an_exr_that_takes_too_much_memory_is_not_called_damaged(tmp_path):
     write_exr(tmp_path / "a.exr", {"RGB": np.zeros((5000, 5000, 3), np.float32)})
-    with pytest.raises(ImageError, match="needs more --limits-trial-mb"):
-        FencedSequence(tmp_path / "a.exr", replace(LIMITS, trial_mb=700))
+    with pytest.raises(ImageError, match="needs more --limits-preflight-mb"):
+        FencedSequence(tmp_path / "a.exr", replace(LIMITS, preflight_mb=700))

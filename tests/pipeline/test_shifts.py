@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,7 @@ from enfilade.store import Run
 from enfilade.store.guest import guest
 from scenes_analytic import room, room_walk
 from small_runs import Told, Watcher, children, job_of
+from support.analytic_scene import read_scene, write_scene
 
 COUNT = 6
 DAMAGED = "frames/0001.exr"
@@ -242,8 +244,7 @@ def test_files_that_other_shares_are_writing_stay(folder, trace):
 
 
 def change(scene):
-    scene.write_text(scene.read_text().replace('"noise": 0.0', '"noise": 0.1'))
-    assert '"noise": 0.1' in scene.read_text()
+    write_scene(scene, replace(read_scene(scene), noise=0.1))
 
 
 def test_a_scene_that_changed_is_refused_by_the_next_worker(tmp_path, monkeypatch):

@@ -118,7 +118,7 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @json_option
 @quiet_option
 @debug_option
-@settings_options("viewing", "metric", "limits.trial_mb", "limits.trial_s")
+@settings_options("viewing", "metric", "limits.preflight_mb", "limits.preflight_s")
 @click.pass_context
 def command(
     ctx: click.Context,

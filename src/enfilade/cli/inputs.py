@@ -57,6 +57,13 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+renderer_option = click.option(
+    "--renderer",
+    metavar="MODULE:FUNCTION",
+    help="Your own renderer: a function that loads SCENE.  [default: Mitsuba]",
+)
+
+
 def job_options(command: Command) -> Command:
     """Decorate a command with the scene, the camera path, how to look at them, and the method."""
     method = click.option(
@@ -75,6 +82,7 @@ def path_options(command: Command) -> Command:
     for decorate in reversed(
         [
             click.argument("scene", type=file),
+            renderer_option,
             click.option(
                 "--path",
                 "path_file",
@@ -174,6 +182,7 @@ def job_of(
     frames: str | None,
     fps: float | None,
     method: str,
+    renderer: str | None,
     device: Choice,
 ) -> Job:
     """Put together what to render; everything wrong in it raises here, before any work.
@@ -200,4 +209,4 @@ def job_of(
 
     selected = None if frames is None else parse_frames(frames)
     path = load_path(path_file, size=size, frames=selected, fps=fps)
-    return Job(scene=scene, path=path, settings=settings, method=method)
+    return Job(scene=scene, path=path, settings=settings, method=method, renderer=renderer)

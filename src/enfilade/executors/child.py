@@ -9,8 +9,8 @@ import sys
 import traceback
 from typing import Any
 
-from enfilade.confined import die_with
 from enfilade.executors.executor import Failure, Recipe, Worker
+from enfilade.resource_limits import die_with
 
 
 def main() -> None:

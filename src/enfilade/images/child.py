@@ -9,11 +9,11 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from enfilade.confined import die_with, limit_memory
 from enfilade.errors import InputError
 from enfilade.images.fence import receive, send
 from enfilade.images.sequence import Sequence, open_sequence
 from enfilade.records import F32
+from enfilade.resource_limits import die_with, limit_memory
 
 
 class _Decoder:

@@ -68,7 +68,7 @@ class FencedSequence:
         self._source = str(source)
         self._limits = limits
         self._line, there = socket.socketpair()
-        options = [there.fileno(), os.getpid(), limits.trial_mb, limits.trial_s]
+        options = [there.fileno(), os.getpid(), limits.preflight_mb, limits.preflight_s]
         module = "enfilade.images.child"
         with there:
             child = subprocess.Popen(  # noqa: S603
@@ -116,7 +116,7 @@ class FencedSequence:
     def _ask(self, what: str, value: Any = None) -> tuple[Any, dict[str, Any]]:
         try:
             send(self._line, [what, value], {})
-            answer, pixels = receive(self._line, most_bytes=self._limits.trial_mb * MB)
+            answer, pixels = receive(self._line, most_bytes=self._limits.preflight_mb * MB)
         except (OSError, EOFError, ValueError, TypeError, RecursionError) as error:
             raise ImageError(self._ended()) from error
         if "error" in answer:
@@ -129,12 +129,12 @@ class FencedSequence:
         code = self._child.returncode
         if code == -signal.SIGALRM:
             return (
-                f"{self._source}: a frame was not decoded in {self._limits.trial_s:g} s; raise "
-                "--limits-trial-s, or write it again in a simpler format"
+                f"{self._source}: a frame was not decoded in {self._limits.preflight_s:g} s; raise "
+                "--limits-preflight-s, or write it again in a simpler format"
             )
         return (
             f"{self._source} was too much for the process that decodes it (exit code {code}, "
-            f"{self._limits.trial_mb} MB of memory): it is damaged, or needs more --limits-trial-mb"
+            f"{self._limits.preflight_mb} MB of memory): it is damaged, or needs more --limits-preflight-mb"
         )
 
 

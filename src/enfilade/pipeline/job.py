@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import socket
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +19,13 @@ from enfilade.images import check_encodable
 from enfilade.images.view import view_identity
 from enfilade.methods.denoise import denoiser_name, why_no_denoiser
 from enfilade.pipeline.versions import makers
-from enfilade.renderer import Renderer
-from enfilade.settings import Settings, TraceSettings
+from enfilade.renderer import Renderer, why_inseparable
+from enfilade.scene.opener import check_scene, identify_scene, open_renderer
+from enfilade.scene.preflight import preflight
+from enfilade.settings import Settings
 from enfilade.store import Run
 from enfilade.viewing import Viewing
 
-ANALYTIC_SUFFIX = ".analytic.json"
 JOB_FILE = "job.json"  # in a run folder: what its workers read
 
 
@@ -36,16 +36,19 @@ class Job:
     Attributes
     ----------
     scene : Path
-        A Mitsuba scene, or planes and spheres in closed form (``.analytic.json``).
+        A Mitsuba scene, or one for the renderer.
     path : CameraPath
     settings : Settings
     method : {"decoupled", "paper", "reference"}
+    renderer : str or None
+        Import path of your own renderer (:mod:`enfilade.scene.opener`); Mitsuba by default.
     """
 
     scene: Path
     path: CameraPath
     settings: Settings
     method: str
+    renderer: str | None = None
 
     @property
     def viewing(self) -> Viewing:
@@ -80,7 +83,7 @@ class Job:
         SettingsError
             The view of an OpenColorIO configuration can't be opened.
         """
-        name, fingerprint = _renderer_and_fingerprint(self.scene)
+        scene = identify_scene(self.scene, self.renderer)
         shapes = {} if renderer is None else {"shapes": len(renderer.describe().shapes)}
         settings = self.settings.to_tables()
         del settings["trace"]["chunk"]
@@ -89,14 +92,14 @@ class Job:
         ocio = {"opencolorio": view["opencolorio"]} if view else {}
         return {
             "method": self.method,
-            "scene": {"fingerprint": fingerprint, **shapes},
+            "scene": {"fingerprint": scene.fingerprint, **shapes},
             "path": path_identity(self.path),
             "settings": settings,
             **({"view": {"processor": view["processor"]}} if view else {}),
             "versions": {
                 **makers(),
-                "renderer": name,
-                "variant": _variant(self.scene),
+                "renderer": scene.renderer,
+                "variant": scene.variant,
                 **({"denoiser": denoiser_name()} if self._denoises else {}),
                 **ocio,
             },
@@ -107,36 +110,39 @@ class Job:
         return self.method == "decoupled" and self.settings.light.denoiser != "none"
 
     def check_scene(self, *, is_tried: bool = False) -> None:
-        """Refuse a scene that reaches for what is not its own, or for too much, before it is loaded.
+        """Refuse a scene that can't be rendered, or uses what it may not, before it is loaded.
 
         Parameters
         ----------
         is_tried
-            Let a process of its own load it, too.
+            Load it as well, in a preflight process if Mitsuba renders it.
 
         Raises
         ------
         SceneError
         SettingsError
-            The method asks more of the scene than it has, or the settings more than is installed.
+            The method can't render the scene, or needs a library that is not installed.
         """
         if self._denoises and (why := why_no_denoiser()):
             raise SettingsError(why)
-        if self.scene.name.endswith(ANALYTIC_SUFFIX):
-            if self.method == "decoupled":
-                raise SettingsError(
-                    f"{self.scene} has surfaces but no light to ask for: --method decoupled needs a "
-                    "Mitsuba scene; add --method paper"
-                )
-            return  # its files are its own, and it has no plugins
-        from enfilade.scene.scenecheck import check_scene
-        from enfilade.scene.trial import try_scene
+        settings = self.settings
+        check_scene(self.scene, settings.limits, self.renderer)
+        if is_tried and self.renderer is None:
+            self.check_separable(preflight(self.scene, settings.trace, settings.limits, active().variant))
+        elif is_tried and self.method == "decoupled":
+            self.check_separable(why_inseparable(self.open_renderer()))
 
-        check_scene(self.scene, self.settings.limits)
-        if is_tried:
-            self.check_light(
-                try_scene(self.scene, self.settings.trace, self.settings.limits, active().variant)
-            )
+    def open_renderer(self) -> Renderer:
+        """Load the scene.
+
+        Raises
+        ------
+        SceneError
+            The scene is missing or malformed.
+        DeviceError
+            No usable LLVM or CUDA.
+        """
+        return open_renderer(self.scene, self.settings.trace, self.renderer)
 
     def check_video(self) -> None:
         """Refuse a video that can't be encoded here, before a night of rendering.
@@ -152,13 +158,13 @@ class Job:
             exposure_ev=self.settings.viewing.exposure_ev,
         )
 
-    def check_light(self, why_inseparable: str) -> None:
-        """Refuse a scene that can't be asked for light, where the method asks for it.
+    def check_separable(self, why_inseparable: str) -> None:
+        """Refuse a scene whose lobes can't be estimated apart, if the method requires it.
 
         Parameters
         ----------
         why_inseparable
-            What :meth:`enfilade.renderer.LobeRenderer.why_inseparable` says of the scene.
+            See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`.
 
         Raises
         ------
@@ -176,6 +182,7 @@ class Job:
         return {
             "scene": str(self.scene.resolve()),
             "method": self.method,
+            "renderer": self.renderer,
             "settings": self.settings.to_tables(),
             "path": {
                 "size": [path.width, path.height],
@@ -207,6 +214,7 @@ class Job:
             path=CameraPath(cameras, numbers, float(path["fps"]), frozenset(path["cuts"])),
             settings=Settings.from_tables(table["settings"]),
             method=str(table["method"]),
+            renderer=table["renderer"],
         )
 
 
@@ -247,41 +255,6 @@ def check_identity(job: Job, run: Run) -> None:
             "enfilade or of a library is not the one with which the run began; `enfilade render` says what "
             "differs"
         )
-
-
-def open_renderer(scene: Path, settings: TraceSettings) -> Renderer:
-    """Load a scene into the backend that its name asks for.
-
-    Raises
-    ------
-    SceneError
-        The scene is missing or malformed.
-    DeviceError
-        No usable LLVM or CUDA.
-    """
-    if scene.name.endswith(ANALYTIC_SUFFIX):
-        from enfilade.scene.analytic import load
-
-        return load(scene, chunk=settings.chunk)
-    from enfilade.scene.mitsuba import MitsubaRenderer
-
-    return MitsubaRenderer(scene, settings)
-
-
-def _renderer_and_fingerprint(scene: Path) -> tuple[str, str]:
-    """Name of the renderer, and what the scene's files hold, without loading either."""
-    if scene.name.endswith(ANALYTIC_SUFFIX):
-        from enfilade.scene.analytic_scene import NAME, read_scene, scene_text
-
-        return NAME, hashlib.sha256(scene_text(read_scene(scene)).encode()).hexdigest()
-    from enfilade.scene.scenefile import fingerprint
-
-    return f"Mitsuba {importlib.metadata.version('mitsuba')}", fingerprint(scene)
-
-
-def _variant(scene: Path) -> str:
-    device = active()
-    return device.backend if scene.name.endswith(ANALYTIC_SUFFIX) else device.variant
 
 
 def path_identity(path: CameraPath) -> dict[str, Any]:

@@ -12,14 +12,14 @@ from enfilade.camera.path import Segment
 from enfilade.methods.paper import composite, warp_keyframe
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.rehearsal import forecast_decoupled
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.units import segments_of
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import check_job
 from enfilade.records import Keyframe, Shading
-from enfilade.renderer import LobeRenderer, PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer, why_inseparable
 
 HOLE_PROBES = (0.25, 0.5, 0.75)  # where in a segment holes are looked for
 PROBE_PIXELS, PROBE_SPP = 4096, 16  # paths traced to learn what a path costs
@@ -85,9 +85,8 @@ def plan(job: Job, monitor: Monitor, *, is_tried: bool = False) -> Plan:
     check_job(job)
     if is_tried:
         job.check_scene(is_tried=True)
-    renderer = open_renderer(job.scene, job.settings.trace)
-    if isinstance(renderer, LobeRenderer):
-        job.check_light(renderer.why_inseparable)
+    renderer = job.open_renderer()
+    job.check_separable(why_inseparable(renderer))
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
     shots = segments_of(job, survey)

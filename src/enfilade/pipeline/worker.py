@@ -13,7 +13,7 @@ from enfilade.monitor import Monitor
 from enfilade.pipeline.decoupled import DecoupledFrames
 from enfilade.pipeline.finish import Antialiasing, trace_reference, write_clip, write_video
 from enfilade.pipeline.inbetween import make_copy, make_inbetween, make_keyframe
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.light import LightTable
 from enfilade.pipeline.refine import Verdict, refine
 from enfilade.pipeline.survey import Survey, survey_path
@@ -82,8 +82,7 @@ class Worker:
 
     @cached_property
     def _workshop(self) -> Workshop:
-        renderer = open_renderer(self._job.scene, self._job.settings.trace)
-        return Workshop(self._job, renderer, self._run, self._monitor)
+        return Workshop(self._job, self._job.open_renderer(), self._run, self._monitor)
 
     @cached_property
     def _antialiasing(self) -> Antialiasing:

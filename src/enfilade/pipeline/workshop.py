@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from enfilade.errors import SettingsError
 from enfilade.images import read_shading, write_shading
 from enfilade.kernels.tone import display_luminance
 from enfilade.methods.decoupled import Shader, VirtualImages
@@ -19,7 +18,7 @@ from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.views import View, Views
 from enfilade.records import F32, Keyframe, Mask, Shading
-from enfilade.renderer import LobeRenderer, PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.renderer import LobeRenderer, PixelFilter, Purpose, RandomKey, Renderer, why_inseparable
 from enfilade.store import Run
 
 KEPT = 3  # keyframes kept in memory
@@ -47,18 +46,15 @@ class Workshop:
 
     @cached_property
     def lobe_renderer(self) -> LobeRenderer:
-        """The renderer, which must be one that can be asked for light.
+        """The renderer, which must estimate lobes apart.
 
         Raises
         ------
         SettingsError
             It can't.
         """
-        if not isinstance(self.renderer, LobeRenderer):
-            name = self.renderer.describe().renderer
-            raise SettingsError(f"{name} can't be asked for light: --method decoupled needs a Mitsuba scene")
-        self.job.check_light(self.renderer.why_inseparable)
-        return self.renderer
+        self.job.check_separable(why_inseparable(self.renderer))
+        return cast("LobeRenderer", self.renderer)
 
     @cached_property
     def shader(self) -> Shader:
