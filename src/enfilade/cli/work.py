@@ -77,7 +77,7 @@ def _device_of(run: Path) -> Choice:
     from enfilade.runs.folder import identity_of
 
     try:
-        variant = str(identity_of(run)["renderer"]["variant"])
+        variant = str(identity_of(run)["scene"]["variant"])
     except (RunFolderError, LookupError, TypeError):  # the next step names the cause
         return "auto"
     return "gpu" if variant.startswith("cuda") else "cpu"

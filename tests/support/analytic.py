@@ -1,13 +1,11 @@
-"""Planes, parallelograms and spheres in closed form: a renderer whose every answer is known exactly.
+"""A renderer of planes, parallelograms and spheres in closed form.
 
-It makes everything above it testable in milliseconds against exact truth: depth, normals and flow have
-closed forms, and the noise of its paths has a known distribution. There
-are no shadows and at most one bounce.
+Depth, normals and motion vectors are known exactly, and so is the distribution of the noise. There are no
+shadows, and at most one bounce. :func:`load` is an import path for ``--renderer``.
 """
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +19,7 @@ from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
-from enfilade.scene.analytic_scene import (
-    NAME,
+from support.analytic_scene import (
     AnalyticScene,
     Checker,
     Material,
@@ -32,7 +29,6 @@ from enfilade.scene.analytic_scene import (
     Vector,
     Waves,
     read_scene,
-    scene_text,
 )
 
 CHECKER_SHIFT = 0.381966  # of a period: planes at round coordinates do not lie on a cube's face
@@ -56,12 +52,11 @@ class AnalyticRenderer:
         self._classes = UInt([SurfaceClass.NONE, *(shape.material.surface for shape in scene.shapes)])
 
     def describe(self) -> SceneFacts:
-        """Say what is rendered, and by what."""
+        """Facts of the scene."""
         return SceneFacts(
-            renderer=NAME,
+            renderer="analytic",
             variant=dr.backend_v(Float).name.lower(),
             shapes=tuple(shape.name for shape in self._scene.shapes),
-            fingerprint=hashlib.sha256(scene_text(self._scene).encode()).hexdigest(),
         )
 
     def surfaces(self, rays: Rays) -> Surfaces:
@@ -98,7 +93,7 @@ class AnalyticRenderer:
         )
 
     def _noisy(self, rays: Rays, rng: Any) -> Any:
-        """Radiance along rays, and the noise put upon it."""
+        """Radiance along rays, with noise."""
         radiance = self._radiance(rays.origin, rays.direction)
         radiance *= 1 + self._scene.noise * (-dr.log(1 - rng.next_float32()) - 1)
         is_lost = rng.next_float32() < self._scene.nan_share
@@ -138,7 +133,7 @@ class AnalyticRenderer:
         return albedo
 
     def _shade(self, hit: _Hit, direction: Any) -> Any:
-        """Light that leaves a surface by itself: emitted, diffuse and the highlight; or the sky."""
+        """Emitted and diffusely reflected radiance and the highlight; or the sky."""
         scene = self._scene
         to_light = dr.normalize(_constant(scene.to_light))
         height = 0.5 + 0.5 * dr.normalize(direction).y
@@ -162,13 +157,9 @@ class _Hit:
     position: Any
 
 
-def load(file: Path, *, chunk: int = 1 << 20) -> AnalyticRenderer:
-    """Renderer of a scene in a ``.analytic.json`` file.
-
-    Raises
-    ------
-    SceneError
-    """
+def load(file: Path, *, max_depth: int = 0, chunk: int = 1 << 20) -> AnalyticRenderer:
+    """Renderer of a scene that :func:`support.analytic_scene.write_scene` wrote."""
+    del max_depth  # paths have one bounce
     return AnalyticRenderer(read_scene(file), chunk=chunk)
 
 

@@ -1,4 +1,4 @@
-"""Bounds that a process of its own sets itself, before it does what may go wrong."""
+"""Limits that a child process sets for itself."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import sys
 __all__ = ["die_with", "limit_memory"]
 
 MB = 1 << 20
-PR_SET_PDEATHSIG = 1  # prctl(2): a signal for this process when its parent dies
+PR_SET_PDEATHSIG = 1  # prctl(2): the signal for this process when its parent dies
 
 
 def die_with(parent: int) -> None:
     """End with the process of this number, or at once if that is no longer the parent.
 
-    The kernel looks at the thread that made this process: it must live as long.
+    The kernel signals the end of the thread that started this process, which must live as long.
     """
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it died before
@@ -25,7 +25,7 @@ def die_with(parent: int) -> None:
 
 
 def limit_memory(megabytes: int) -> None:
-    """Take no more address space than that, or than a lower limit that is there already; leave no core."""
+    """Bound the address space, below any limit already set, and write no core file."""
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     most = megabytes * MB if hard == resource.RLIM_INFINITY else min(megabytes * MB, hard)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
