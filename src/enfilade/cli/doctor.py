@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import click
 
 from enfilade.cli.group import FAILURE, debug_option
-from enfilade.cli.inputs import device_option, json_option
+from enfilade.cli.options import device_option, json_option
 
 if TYPE_CHECKING:
     from enfilade.device import Choice
-    from enfilade.pipeline.installation import Check
+    from enfilade.installation import Check
 
 
 @click.command("doctor", short_help="What is installed, what is missing and how to get it.")
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(ctx: click.Context, /, *, device: Choice, as_json: bool) -> None:
     """Say what is installed, which variant will run, what is missing and how to get it."""
-    from enfilade.pipeline.installation import examine
+    from enfilade.installation import examine
 
     checks = examine(device)
     missing = [check for check in checks if check.is_required and not check.is_ok]

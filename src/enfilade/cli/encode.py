@@ -1,4 +1,4 @@
-"""``enfilade encode``: the frames of a run once more, with another exposure, view, codec or quality."""
+"""``enfilade encode``: the frames of a run encoded once more."""
 
 from __future__ import annotations
 
@@ -6,54 +6,40 @@ from pathlib import Path
 
 import click
 
-from enfilade.cli.flags import SettingsCommand, settings_of, settings_options, tables_of
 from enfilade.cli.group import debug_option
-from enfilade.cli.inputs import quiet_option
+from enfilade.cli.options import VIDEO_FLAGS, quiet_option, settings_of, settings_options, tables_of
+from enfilade.settings import SECTIONS
 
 
-@click.command("encode", cls=SettingsCommand, short_help="Encode the frames of a run once more.")
+@click.command("encode", short_help="Encode the frames of a run once more.")
 @click.argument("run", type=click.Path(path_type=Path))
 @click.option(
     "--out",
     "file",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="The video, its suffix that of the codec.  [default: encoded.mp4, .mkv or .mov in the run folder]",
+    help="The video, with the codec's suffix.  [default: encoded.mp4, .mkv or .mov in the run folder]",
 )
 @click.option("--overwrite", "is_replaced", is_flag=True, help="Replace a file that is there.")
 @click.option(
-    "--unfinished", "is_partial", is_flag=True, help="Encode the frames that are there if some are missing."
+    "--unfinished", "is_partial", is_flag=True, help="Encode the finished frames if some are missing."
 )
+@settings_options(*VIDEO_FLAGS, default="the run's")
 @quiet_option
 @debug_option
-@settings_options("video", "viewing.exposure_ev", default="the run's")
 @click.pass_context
 def command(
-    ctx: click.Context,
-    /,
-    *,
-    run: Path,
-    file: Path | None,
-    is_replaced: bool,
-    is_partial: bool,
-    quiet: bool,
+    ctx: click.Context, /, *, run: Path, file: Path | None, is_replaced: bool, is_partial: bool, quiet: bool
 ) -> None:
     """Encode the frames of the run in the folder RUN with another exposure, view, codec or quality.
 
-    Nothing is rendered, and the run stays what it is, its own video included. What no flag says is as the run
-    has it. How much noise the frames keep was judged at the exposure of the run.
+    Nothing is rendered, and the run stays as it is.
     """
-    settings_of(ctx)  # what is wrong with them raises here, also in other sections of the file
-    tables = tables_of(ctx)
+    settings_of(ctx, SECTIONS)  # raises on wrong values
+    tables = tables_of(ctx, SECTIONS)
     from enfilade.cli.progress import watch
-    from enfilade.pipeline.encode import encode
+    from enfilade.runs.encode import encode
 
     with watch(quiet=quiet) as monitor:
-        made = encode(
-            run,
-            {name: tables.get(name, {}) for name in ("video", "viewing")},
-            monitor,
-            file=file,
-            is_partial=is_partial,
-            is_replaced=is_replaced,
-        )
+        changes = {name: tables.get(name, {}) for name in ("video", "viewing")}
+        made = encode(run, changes, monitor, file=file, is_partial=is_partial, is_replaced=is_replaced)
     click.echo(f"video   {made}")

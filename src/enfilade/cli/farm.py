@@ -13,11 +13,7 @@ from enfilade.errors import SettingsError
 
 @click.command("farm", short_help="Give a run to a render farm (Open Job Description) or to Slurm.")
 @click.argument("run", type=click.Path(path_type=Path))
-@click.option(
-    "--chunks",
-    type=click.IntRange(1),
-    help="How many tasks share a step.  [default: one for each 16 frames]",
-)
+@click.option("--shards", type=click.IntRange(1), help="Shards of a pass.  [default: one for each 16 frames]")
 @click.option(
     "--out",
     "file",
@@ -28,37 +24,35 @@ from enfilade.errors import SettingsError
     "--submit",
     "cluster",
     type=click.Choice(("slurm", "local")),
-    help="Write no template: give it to Slurm now, or, to try that, to processes of this machine, one after "
-    "the other.",
+    help="Write no template: submit to Slurm, or, for a trial, to processes of this machine in turn.",
 )
 @click.option(
     "--slurm",
     "options",
     multiple=True,
     metavar="KEY=VALUE",
-    help="A parameter of submitit's, such as slurm_partition=cpu, timeout_min=120 (instead of 60) or "
+    help="A parameter of submitit, such as slurm_partition=cpu, timeout_min=120 (instead of 60) or "
     "cpus_per_task=16 (instead of 8); as often as wanted.",
 )
 @debug_option
 def command(
-    *, run: Path, chunks: int | None, file: Path | None, cluster: str | None, options: tuple[str, ...]
+    *, run: Path, shards: int | None, file: Path | None, cluster: str | None, options: tuple[str, ...]
 ) -> None:
     """Write a job template for the run in the folder RUN, which `enfilade render --prepare` begins.
 
-    All hosts must see the folder, and the scene, under the same names. Each task is an `enfilade work`
-    command and can be given to any host again.
+    All hosts must see the folder, and the scene, under the same names.
     """
     if options and cluster is None:
-        raise SettingsError("--slurm says nothing to a job template; add --submit slurm, or leave it out")
+        raise SettingsError("--slurm needs --submit slurm")
     if file is not None and cluster is not None:
-        raise SettingsError("--out says nothing to --submit, which writes no template; leave one of them out")
-    from enfilade.pipeline.farm import TEMPLATE, submit, write_template
+        raise SettingsError("--out has no effect with --submit, which writes no template")
+    from enfilade.runs.farm import TEMPLATE, submit, write_template
 
     if cluster is not None:
-        submit(run, cluster, chunks, dict(_pair(text) for text in options), click.echo)
+        submit(run, cluster, shards, dict(_pair(text) for text in options), click.echo)
         return
     out = run / TEMPLATE if file is None else file
-    write_template(run, out, chunks)
+    write_template(run, out, shards)
     click.echo(f"template {out}")
 
 

@@ -92,7 +92,7 @@ def _message(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     if isinstance(error, MemoryError):
-        return "out of memory; a smaller --trace-chunk or --size needs less"
+        return "out of memory; a smaller --size, or --set limits.paths_in_flight, needs less"
     return str(error)
 
 

@@ -8,29 +8,34 @@ from typing import Any
 
 import click
 
-from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import JOB_SECTIONS, crew_of, crew_options, job_of, job_options, output_options
-from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
-
-
-@click.command(
-    "render", cls=SettingsCommand, short_help="Render a walkthrough: frames, video, report of the cost."
+from enfilade.cli.options import (
+    FLAGS,
+    job_of,
+    job_options,
+    output_options,
+    settings_options,
+    worker_options,
+    workers_of,
 )
+
+
+@click.command("render", short_help="Render a walkthrough: frames, video, and a report of the cost.")
 @job_options
 @click.option(
     "--out",
     "folder",
     type=click.Path(path_type=Path),
     required=True,
-    help="The run folder; the same command goes on with what is there.",
+    help="The run folder; the same command continues a run that was interrupted.",
 )
-@crew_options
+@settings_options(*FLAGS)
+@worker_options
 @click.option(
     "--verify",
     "is_verified",
     is_flag=True,
-    help="Compare every file that is there with its checksum first; what is damaged is made again.",
+    help="First compare every file with its checksum; damaged ones are made again.",
 )
 @click.option(
     "--prepare",
@@ -40,13 +45,15 @@ from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
 )
 @output_options
 @debug_option
-@settings_options(*JOB_SECTIONS)
 @click.pass_context
 def command(
     ctx: click.Context,
     /,
     *,
     folder: Path,
+    executor: str,
+    workers: int | None,
+    threads: int,
     is_verified: bool,
     is_prepared: bool,
     as_json: bool,
@@ -55,30 +62,30 @@ def command(
 ) -> None:
     """Render a walkthrough of SCENE (Mitsuba 3 XML) into frames, a video and a report of the cost."""
     mark_resumable(ctx)
-    who = [inputs.pop(name) for name in ("executor", "workers", "threads")]
     job = job_of(ctx, **inputs)
-    crew = crew_of(*who)
     from enfilade.cli.progress import watch
-    from enfilade.pipeline.walkthrough import prepare, render
+    from enfilade.runs.render import prepare, render
 
     if is_prepared:
-        prepare(job, folder, is_tried=True)
+        prepare(job, folder, has_preflight=True)
         begun = {"folder": str(folder), "method": job.method, "frames": len(job.path)}
         click.echo(json.dumps(begun, indent=2) if as_json else f"run     {folder}")
         return
-    before = ledger_bytes(folder)
+    team = workers_of(executor, workers, threads)
     with watch(quiet=quiet) as monitor:
-        summary = render(job, folder, monitor, crew, is_verified=is_verified, is_tried=True)
-    plots = draw_plots(folder, is_new=is_verified or ledger_bytes(folder) != before)
+        summary = render(job, folder, monitor, team, is_verified=is_verified, has_preflight=True)
+    show_run(folder, summary, as_json=as_json)
+
+
+def show_run(folder: Path, summary: dict[str, Any], *, as_json: bool = False) -> None:
+    """Draw the plots of a finished run, and print its tables and the places of its files."""
+    from enfilade.reports.plots import plot_run
+
+    plots = plot_run(folder)
     if as_json:
         extra = {"folder": str(folder), "plots": [str(plot) for plot in plots]}
         click.echo(json.dumps({**summary, **extra}, indent=2))
         return
-    _show(summary)
-    name_files(folder, summary, plots)
-
-
-def _show(summary: dict[str, Any]) -> None:
     from rich.console import Console
 
     from enfilade.reports.tables import run_tables
@@ -88,3 +95,6 @@ def _show(summary: dict[str, Any]) -> None:
         console.print(table)
     if summary["dropped_samples"]:
         click.echo(f"{summary['dropped_samples']} samples were NaN or infinite and were left out.")
+    files = [("video", folder / summary["video"]), *(("plot", plot) for plot in plots), ("run", folder)]
+    for name, file in files:
+        click.echo(f"{name:7} {file}")

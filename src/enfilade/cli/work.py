@@ -1,30 +1,32 @@
-"""``enfilade work``: go on with a run that was begun, or do a share of it beside others."""
+"""``enfilade work``: continue a run that was begun, or do a shard of a pass beside other commands."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Any
 
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import crew_of, crew_options, device_option, quiet_option
-from enfilade.cli.outcome import draw_plots, ledger_bytes, name_files
+from enfilade.cli.options import device_option, quiet_option, worker_options, workers_of
 from enfilade.device import Choice, activate
 from enfilade.errors import RunFolderError, SettingsError
 
 
-@click.command("work", short_help="Go on with a run, or do a share of it beside other commands.")
+@click.command("work", short_help="Continue a run, or do a shard of a pass beside other commands.")
 @click.argument("run", type=click.Path(path_type=Path))
-@click.option("--step", help="Do this step alone: other commands may work on the run.  [default: all]")
 @click.option(
-    "--chunk", type=click.IntRange(1), default=1, show_default=True, help="Which share of the step, from 1."
+    "--pass", "pass_name", help="Do this pass alone: other commands may work on the run.  [default: all]"
 )
 @click.option(
-    "--of", "count", type=click.IntRange(1), default=1, show_default=True, help="How many shares there are."
+    "--shard",
+    default="1/1",
+    show_default=True,
+    metavar="I/N",
+    help="Shard of the pass: the first of four is 1/4.",
 )
-@click.option("--openjd", "is_openjd", is_flag=True, help="Print progress as Open Job Description wants it.")
-@crew_options
+@click.option("--openjd", "is_openjd", is_flag=True, help="Print progress for Open Job Description.")
+@worker_options
 @device_option
 @quiet_option
 @debug_option
@@ -34,45 +36,48 @@ def command(
     /,
     *,
     run: Path,
-    step: str | None,
-    chunk: int,
-    count: int,
+    pass_name: str | None,
+    shard: str,
     is_openjd: bool,
+    executor: str,
+    workers: int | None,
+    threads: int,
     device: Choice,
     quiet: bool,
-    **who: Any,
 ) -> None:
-    """Go on with the run in the folder RUN, which `enfilade render` or another of these began.
+    """Continue the run in the folder RUN, which `enfilade render` began.
 
-    Without --step, all that is left is done. With it, several commands can work on one run, on one or on
-    many hosts: each step after the one before, all chunks of a step at the same time. On a run that was
-    shared before, what others hold, or have not done yet, is waited for up to two minutes.
+    With --pass, several commands may work on one run, on one or many hosts: each pass after the one before, all
+    shards of a pass at the same time.
     """
-    if step is None and (chunk, count) != (1, 1):
-        raise SettingsError("--chunk and --of share a step out: say which with --step, or leave them out")
+    match = re.fullmatch(r"([0-9]+)/([0-9]+)", shard)
+    if match is None:
+        raise SettingsError(f"--shard {shard}: write it like 1/4")
+    if pass_name is None and shard != "1/1":
+        raise SettingsError("--shard needs --pass")
     mark_resumable(ctx)
     activate(_device_of(run) if device == "auto" else device)
-    crew = crew_of(**who)
+    team = workers_of(executor, workers, threads)
     from enfilade.cli.progress import OpenJdMonitor, watch
-    from enfilade.pipeline.share import Share, do_share, go_on
+    from enfilade.cli.render import show_run
+    from enfilade.runs.render import Shard, render_shard, resume
 
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
-        if step is None:
-            before = ledger_bytes(run)
-            summary = go_on(run, monitor, crew)
-            plots = draw_plots(run, is_new=ledger_bytes(run) != before)
-            name_files(run, summary, plots)
+        if pass_name is None:
+            summary = resume(run, monitor, team)
         else:
-            do_share(run, Share(step, chunk, count), monitor, crew)
+            render_shard(run, Shard(pass_name, int(match[1]), int(match[2])), monitor, team)
+    if pass_name is None:
+        show_run(run, summary)
 
 
 def _device_of(run: Path) -> Choice:
-    """The device that a run was begun for: another would be refused."""
-    from enfilade.store import Run
+    """The device that a run was begun on: another would be refused."""
+    from enfilade.runs.folder import identity_of
 
     try:
-        variant = str(Run.existing(run, is_lenient=True).identity["versions"]["variant"])
-    except (RunFolderError, LookupError):  # who goes on with the run says what is wrong with it
+        variant = str(identity_of(run)["renderer"]["variant"])
+    except (RunFolderError, LookupError, TypeError):  # the next step names the cause
         return "auto"
     return "gpu" if variant.startswith("cuda") else "cpu"
