@@ -1,24 +1,22 @@
-"""Tasks on a Ray cluster. Only paths, numbers and ledger lines travel; the run folder is on a disk that all nodes see."""
+"""Tasks on a Ray cluster. Only names, numbers and ledger lines travel; all nodes see the run folder."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 import os
-import threading
-import traceback
+import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from enfilade.errors import EnfiladeError
+from enfilade.runs.child import WorkerTerms, do_remotely
 from enfilade.runs.executor import Ended, Order, Workers
 from enfilade.runs.failure import Failure, FailureKind
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.resources import cores
-
-TIMED_OUT = 75  # exit code of a Ray worker that took too long
-_WORKERS: dict[tuple[str, int], Any] = {}  # in a Ray worker: the one with the scene loaded
+from enfilade.settings import LimitSettings
 
 
 class Cluster:
@@ -27,14 +25,15 @@ class Cluster:
     Parameters
     ----------
     run
+    limits
+        ``task_timeout_s``: a worker that has not finished its task after this time ends itself; loading the scene may
+        take ``preflight_s`` more. 0: never.
     workers
         Number of tasks at once (None: as many as the cluster has GPUs, or CPUs for), and threads of each.
     address
         Of a cluster to join; empty: a local one is started.
     device
         ``cpu`` or ``gpu``.
-    timeout_s
-        After which a worker that has not finished its task ends itself; 0: never.
 
     Raises
     ------
@@ -43,7 +42,7 @@ class Cluster:
     """
 
     def __init__(
-        self, run: RunFolder, workers: Workers, *, address: str, device: str, timeout_s: float
+        self, run: RunFolder, limits: LimitSettings, workers: Workers, *, address: str, device: str
     ) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
@@ -66,14 +65,19 @@ class Cluster:
             ray.shutdown()
             raise
         self.slots = share.slots
-        self._terms = str(run.folder.resolve()), device, share.cpus, timeout_s
-        # Ray repeats nothing by itself: the scheduler does, with fewer paths in flight where memory was short.
-        self._do = ray.remote(num_cpus=share.cpus, num_gpus=share.gpus, max_retries=0)(do_task)
+        self._terms = WorkerTerms(str(run.folder.resolve()), device, share.cpus)
+        self._limits = limits
+        # Nothing is repeated by Ray: the scheduler does it, with fewer paths in flight after a lack of memory.
+        # Ray ends a worker after each task on a GPU unless `max_calls` is 0.
+        self._do = ray.remote(num_cpus=share.cpus, num_gpus=share.gpus, max_retries=0, max_calls=0)(
+            do_remotely
+        )
 
     def begin(self, slot: int, order: Order) -> None:
         """Submit a task."""
+        limits = self._limits.task_timeout_s, self._limits.preflight_s
         with self._answering():
-            self._in_hand[self._do.remote(*self._terms, order)] = slot
+            self._in_hand[self._do.remote(self._terms, pickle.dumps(order), *limits)] = slot
 
     def wait(self, timeout_s: float | None) -> list[Ended]:
         """Wait until Ray has finished a task, or has lost its worker or node."""
@@ -114,10 +118,8 @@ class Cluster:
         except self._ray.exceptions.RayError as error:
             is_memory = isinstance(error, self._ray.exceptions.OutOfMemoryError)
             kind = FailureKind.MEMORY if is_memory else FailureKind.ERROR
-            return Ended(slot, failure=Failure(kind, f"Ray says: {_first_line(error)}", str(error)))
-        if isinstance(result, Failure):
-            return Ended(slot, failure=result)
-        return Ended(slot, line=result)
+            return Ended(slot, Failure(kind, f"Ray: {_first_line(error)}", str(error)))
+        return Ended(slot, result)
 
 
 @dataclass(frozen=True)
@@ -168,34 +170,6 @@ class Share:
         each = max(min(wanted, max(cpus, default=0)), 1)
         slots = workers.count or (gpus if has_gpu else max(sum(count // each for count in cpus), 1))
         return Share(slots, each, 1 / math.ceil(slots / gpus) if has_gpu else 0.0)
-
-
-def do_task(folder: str, device: str, threads: int, timeout_s: float, order: Order) -> Any:
-    """Do a task in a Ray worker.
-
-    Returns
-    -------
-    dict or Failure
-        The line for the ledger.
-    """
-    from enfilade.runs.child import open_here
-
-    timer: threading.Timer | None = None
-    try:
-        key = folder, order.reduction
-        if key not in _WORKERS:
-            _WORKERS.clear()  # one scene in memory
-            _WORKERS[key] = open_here(folder, device, threads, order.reduction)
-        if timeout_s:
-            timer = threading.Timer(timeout_s, os._exit, (TIMED_OUT,))
-            timer.start()
-        return _WORKERS[key].do(order.task)
-    except Exception as error:  # noqa: BLE001  (the scheduler decides)
-        _WORKERS.clear()
-        return Failure.of(error, traceback.format_exc())
-    finally:
-        if timer is not None:
-            timer.cancel()
 
 
 def _first_line(error: Exception) -> str:

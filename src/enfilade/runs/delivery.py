@@ -1,4 +1,4 @@
-"""The passes that every run has beside its method's: analysis before, clips and video after."""
+"""The passes of every run besides those of its method: analysis before, clips and video after."""
 
 from __future__ import annotations
 
@@ -31,21 +31,16 @@ def analysis_tasks(frames: int) -> list[Task]:
 
 def video_tasks(frames: int) -> list[Task]:
     """Tasks that encode all frames of a path."""
-    clips = []
-    for span in clip_spans(frames):
-        clips.append(Task(CLIPS.name, span.start, needs=tuple(TaskId(FRAMES, frame) for frame in span)))
+    clips = [
+        Task(CLIPS.name, span.start, needs=tuple(TaskId(FRAMES, frame) for frame in span))
+        for span in clip_spans(frames)
+    ]
     return [*clips, Task(VIDEO.name, 0, needs=tuple(clip.id for clip in clips))]
 
 
 def clip_spans(frames: int) -> list[range]:
     """Frames of each clip."""
     return [range(first, min(first + CLIP_FRAMES, frames)) for first in range(0, frames, CLIP_FRAMES)]
-
-
-def video_facts(job: Job) -> dict[str, Any]:
-    """Settings of the video, for the ledger: a clip of other settings is encoded again."""
-    exposure_ev = job.settings[ViewingSettings].exposure_ev
-    return {"video": {**job.settings[VideoSettings].to_table(), "exposure_ev": exposure_ev}}
 
 
 def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:

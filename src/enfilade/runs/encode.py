@@ -98,7 +98,9 @@ def _video(own: VideoSettings, changes: Mapping[str, Any]) -> VideoSettings:
 
 def _check_free(run: RunFolder, file: Path, suffix: str, *, is_replaced: bool) -> None:
     if file.suffix != suffix:
-        raise SettingsError(f"{file}: files of this codec end in {suffix}; name it so, or choose another codec")
+        raise SettingsError(
+            f"{file}: files of this codec end in {suffix}; name it so, or choose another codec"
+        )
     folder, place = run.folder.resolve(), file.resolve()
     own = {(folder / name).resolve() for line in run.lines() for name in line["files"]}
     if place in own or place == folder / f"video{suffix}" or place.parent == folder / "clips":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import math
 import traceback
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -51,7 +50,11 @@ class Workers:
                 f"there is no executor {self.executor!r}; choose one of {', '.join(EXECUTORS)}"
             )
         if self.executor == "ray:":
-            raise SettingsError("ray: lacks the address of a cluster; ray:HOST:PORT joins one, ray starts one")
+            raise SettingsError(
+                "ray: lacks the address of a cluster; ray:HOST:PORT joins one, ray starts one"
+            )
+        if (self.count is not None and self.count < 1) or self.threads < 0:
+            raise SettingsError(f"{self.count} workers of {self.threads} threads each can't do anything")
         if self.executor == EXECUTORS[0] and (self.count or 1) > 1:
             raise SettingsError(
                 f"--workers {self.count}: in-process is one worker; add --executor processes, or leave it out"
@@ -81,15 +84,12 @@ class Ended:
     ----------
     slot : int
         Of the worker.
-    line : dict or None
-        For the ledger.
-    failure : Failure or None
-        None: the task is finished.
+    result : dict or Failure
+        The line for the ledger, or why there is none.
     """
 
     slot: int
-    line: dict[str, Any] | None = None
-    failure: Failure | None = None
+    result: dict[str, Any] | Failure
 
 
 class Executor(Protocol):
@@ -106,7 +106,7 @@ class Executor(Protocol):
         Raises
         ------
         EnfiladeError
-            No worker can be started.
+            The worker can't be started.
         """
         ...
 
@@ -115,7 +115,7 @@ class Executor(Protocol):
         ...
 
     def discard(self, slot: int) -> None:
-        """End a worker that is free: the next task of its slot gets a new one."""
+        """End a worker that is free: the next task of its slot goes to a new one."""
         ...
 
     def close(self) -> None:
@@ -155,11 +155,11 @@ class InProcess:
         try:
             if self._worker is None or order.reduction != self._reduction:
                 self.discard(0)
-                self._worker, self._reduction = open_worker(self._job, self._run, order.reduction), order.reduction
+                self._worker = open_worker(self._job, self._run, order.reduction)
+                self._reduction = order.reduction
             return [Ended(0, self._worker.do(order.task))]
-        except Exception as error:  # noqa: BLE001  (one task must not end the others)
-            self.discard(0)
-            return [Ended(0, failure=Failure.of(error, traceback.format_exc()))]
+        except Exception as error:  # noqa: BLE001  (the scheduler decides)
+            return [Ended(0, Failure.of(error, traceback.format_exc()))]
 
     def discard(self, slot: int) -> None:
         """Free the worker's memory."""
@@ -183,15 +183,14 @@ def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
     """
     if job.identity() != run.identity:
         raise RunFolderError(
-            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer on this host is not "
-            "that with which the run began; `enfilade render` lists the differences"
+            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer is not that with "
+            "which the run began; `enfilade render` lists the differences"
         )
     if reduction > 1:
         paths = job.settings[LimitSettings].paths_in_flight
         least = min(MIN_PATHS_IN_FLIGHT, paths)
-        settings = job.settings.replace(LimitSettings, paths_in_flight=max(math.ceil(paths / reduction), least))
+        settings = job.settings.replace(
+            LimitSettings, paths_in_flight=max(math.ceil(paths / reduction), least)
+        )
         job = replace(job, settings=settings)
     return Worker(job, run)
-
-
-Open = Callable[[], Executor]

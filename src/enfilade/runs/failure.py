@@ -9,7 +9,7 @@ from enum import Enum
 from enfilade import errors
 from enfilade.files import is_passing
 
-# Dr.Jit's words for too little memory; the second one while it records a kernel.
+# Dr.Jit's messages of too little memory; the second one while it records a kernel.
 OUT_OF_MEMORY = ("out of memory", "tried to free the allocation cache", "bad_alloc")
 
 
@@ -18,8 +18,9 @@ class FailureKind(Enum):
 
     ERROR = "error"  # an unexpected exception, an I/O error, a worker that died or took too long: tried again
     MEMORY = "memory"  # too little memory: tried again with fewer paths in flight
-    DAMAGED = "damaged"  # a file that the task reads is not what was written: made again
-    FATAL = "fatal"  # the disk is full, or the input is wrong: ends the run
+    FATAL = (
+        "fatal"  # an error of the input, a full disk: ends the run, unless a damaged file can be made again
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class Failure:
     log : str
         Traceback, or the last output of the worker.
     error : EnfiladeError or None
-        To be raised where it ends the run.
+        To be raised if it ends the run.
     """
 
     kind: FailureKind
@@ -48,8 +49,6 @@ class Failure:
         text = f"{type(error).__name__}: {error}"
         if _is_memory(error):
             return Failure(FailureKind.MEMORY, text, log)
-        if isinstance(error, errors.DamagedFileError):
-            return Failure(FailureKind.DAMAGED, text, log, error)
         if isinstance(error, errors.EnfiladeError) and not _is_passing(error):
             return Failure(FailureKind.FATAL, text, log, error)
         return Failure(FailureKind.ERROR, text, log)
@@ -66,7 +65,7 @@ def _is_memory(error: BaseException | None) -> bool:
 
 
 def _is_passing(error: BaseException | None) -> bool:
-    """Whether a disk or a network caused it, which may answer the next time."""
+    """Whether the cause is a disk or a network that may work the next time."""
     while error is not None:
         if isinstance(error, OSError):
             return is_passing(error)

@@ -21,15 +21,13 @@ from types import TracebackType
 from typing import Any, Self
 
 from enfilade.errors import DamagedFileError, RunFolderError
-from enfilade.files import MARK, is_full, read_json, sweep, unwritable, write_json
-from enfilade.runs.ledger import Ledger, digest_line
-from enfilade.runs.lock import LOCK_FILE, Lock
+from enfilade.files import sweep, write_json
+from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, digest_of, identity_of
+from enfilade.runs.ledger import LEDGER_FILE, Ledger, digest_line
+from enfilade.runs.lock import Lock
 
-__all__ = ["FORMAT", "LEDGER_FILE", "RUN_FILE", "RunFolder"]
+__all__ = ["RunFolder", "check_place", "identity_of"]
 
-FORMAT = 4  # of the folder; another number is refused
-RUN_FILE, LEDGER_FILE = "run.json", "ledger.jsonl"
-SHOWN_DIFFERENCES, SHOWN_LETTERS = 12, 80
 RECORD_SUFFIXES = (".exr", ".npz")
 LATE_S, LOOK_S = 5.0, 0.5  # a network file system may show files of other hosts late
 
@@ -61,7 +59,7 @@ class RunFolder:
         self._ledger = Ledger(folder / LEDGER_FILE)
         if damaged := self._ledger.damaged:
             numbers = ", ".join(map(str, damaged))
-            self.notes.append(f"{LEDGER_FILE}: line {numbers} is damaged; its task is done again")
+            self.notes.append(f"{LEDGER_FILE}: line {numbers} is damaged and left out")
 
     @classmethod
     def create(cls, folder: Path, identity: Mapping[str, Any]) -> Self:
@@ -83,20 +81,18 @@ class RunFolder:
         check_place(folder)
         lock = Lock(folder)
         try:
-            head = {"format": FORMAT, "identity": _digest(wanted)}
-            known = Ledger(folder / LEDGER_FILE).head
-            if known != head:
-                _check_same(folder, wanted, is_begun=bool(known))
-            if _read_or_none(folder) != wanted:
-                write_json(folder / RUN_FILE, {"format": FORMAT, "identity": wanted})
-            left = sweep(folder)
             run = cls(folder, wanted, lock)
+            head, known = {"format": FORMAT, "identity": digest_of(wanted)}, run._ledger.head
+            if known != head:
+                check_same(folder, wanted, is_begun=bool(known))
+            if not _has_identity(folder, wanted):
+                write_json(folder / RUN_FILE, {"format": FORMAT, "identity": wanted})
             run._ledger.write_head(head)
+            if left := run.sweep():
+                run.notes.append(f"removed {left} unfinished files of a run that was interrupted")
         except BaseException:
             lock.release()
             raise
-        if left:
-            run.notes.append(f"removed {len(left)} unfinished files of a run that was interrupted")
         return run
 
     @classmethod
@@ -106,11 +102,13 @@ class RunFolder:
         Raises
         ------
         RunFolderError
-            It holds no run, is damaged, or one command has it to itself.
+            It holds no run, is damaged, or another command has it to itself.
         NoSpaceError
         """
-        identity = identity_of(folder)
-        return cls(folder, identity, Lock(folder, is_shared=True))
+        run = cls.read(folder)
+        run.lock = Lock(folder, is_shared=True)
+        run.refresh()
+        return run
 
     @classmethod
     def read(cls, folder: Path) -> Self:
@@ -121,7 +119,10 @@ class RunFolder:
         RunFolderError
             It holds no run, or is damaged.
         """
-        return cls(folder, identity_of(folder))
+        run = cls(folder, identity_of(folder))
+        if run._ledger.head.get("identity", digest_of(run.identity)) != digest_of(run.identity):
+            raise RunFolderError(f"{folder / RUN_FILE} is damaged; run the command that made it again")
+        return run
 
     def __enter__(self) -> Self:
         return self
@@ -135,6 +136,10 @@ class RunFolder:
         """Let others write. A second call does nothing."""
         if self.lock is not None:
             self.lock.release()
+
+    def sweep(self) -> int:
+        """Remove the unfinished files of killed processes; returns how many there were."""
+        return len(sweep(self.folder))
 
     def stem(self, pass_name: str, number: int) -> Path:
         """Path, without suffix, of the file of a pass for a frame number, of four digits or more."""
@@ -185,17 +190,24 @@ class RunFolder:
         Raises
         ------
         DamagedFileError
-            It is missing, damaged, or not on record.
+            It is missing or damaged.
+        KeyError
+            No finished task has written it.
         """
         file = self._file(name)
+        self.refresh()  # another process may have written it
+        line = self._ledger.writer(name)
+        if line is None:
+            raise KeyError(f"no finished task has written {name}")
         until = time.monotonic() + LATE_S
         while not file.exists() and time.monotonic() < until:
             time.sleep(LOOK_S)
             list(file.parent.glob("*"))  # makes NFS query its server
-        line = self._ledger.writer(name)
-        if line is not None and _checksum(file) == line["files"][name]:
+        if _is_intact(file, line["files"][name]):
             return file
-        raise DamagedFileError(f"{file} is missing or damaged; run the same command again to make it again", name)
+        raise DamagedFileError(
+            f"{file} is missing or damaged; run the same command again to make it again", name
+        )
 
     def file_of(self, pass_name: str, number: int) -> Path:
         """The file of a pass for a frame number, compared with its checksum.
@@ -203,21 +215,30 @@ class RunFolder:
         Raises
         ------
         DamagedFileError
-            It is missing, damaged, or not on record.
+            It is missing or damaged.
+        KeyError
+            Its task is not finished.
         """
         stem = self.stem(pass_name, number).relative_to(self.folder).as_posix()
         names = [f"{stem}{suffix}" for suffix in RECORD_SUFFIXES]
-        if not any(self._ledger.writer(name) for name in names):  # finished by another process, perhaps
+        if not any(map(self._ledger.writer, names)):
             self.refresh()
-        return self.check(next((name for name in names if self._ledger.writer(name)), names[0]))
+        return self.check(next(filter(self._ledger.writer, names), names[0]))
 
     def damaged(self) -> list[str]:
-        """Names of all files that are missing or do not have the checksum on record."""
-        records = {name: record for line in self.lines() for name, record in line["files"].items()}
-        return [name for name, record in records.items() if _checksum(self._file(name)) != record]
+        """Names of all files that are missing, can't be read, or do not have the checksum on record."""
+        found = []
+        for name, record in {n: r for line in self.lines() for n, r in line["files"].items()}.items():
+            try:
+                is_intact = _is_intact(self._file(name), record)
+            except RunFolderError:
+                is_intact = False
+            if not is_intact:
+                found.append(name)
+        return found
 
     def forget(self, name: str) -> None:
-        """Remove a damaged file, so that its task counts as not done.
+        """Remove a damaged file, so that its task counts as not done; it stays if it was made again meanwhile.
 
         Raises
         ------
@@ -225,8 +246,11 @@ class RunFolder:
             It can't be removed.
         """
         file = self._file(name)
+        self.refresh()
+        line = self._ledger.writer(name)
         try:
-            file.unlink(missing_ok=True)
+            if line is None or not _is_intact(file, line["files"][name]):
+                file.unlink(missing_ok=True)
         except OSError as error:
             raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
 
@@ -242,93 +266,11 @@ class RunFolder:
         return file
 
 
-def check_place(folder: Path) -> None:
-    """Make a folder for a run; it must be new, empty, or hold one.
-
-    Raises
-    ------
-    RunFolderError
-        It holds something else, or can't be made.
-    NoSpaceError
-    """
+def _has_identity(folder: Path, wanted: Mapping[str, Any]) -> bool:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        names = sorted(entry.name for entry in folder.iterdir())
-    except OSError as error:
-        if is_full(error):
-            raise unwritable(folder, error) from error
-        raise RunFolderError(f"can't make a run in {folder}: {error.strerror}; choose another --out") from error
-    foreign = [name for name in names if name != LOCK_FILE and MARK not in name]
-    if foreign and RUN_FILE not in names and LEDGER_FILE not in names:
-        raise RunFolderError(
-            f"{folder} is not empty and holds no run (it has {', '.join(foreign[:3])}); choose another --out"
-        )
-
-
-def identity_of(folder: Path) -> dict[str, Any]:
-    """Identity of the run in a folder.
-
-    Raises
-    ------
-    RunFolderError
-        The folder holds no run, one of another format, or is damaged.
-    """
-    file = folder / RUN_FILE
-    if not file.is_file():
-        raise RunFolderError(f"{folder} is no run folder: it has no {RUN_FILE}")
-    value = read_json(file)
-    if not isinstance(value, dict) or not isinstance(value.get("identity"), dict):
-        raise RunFolderError(f"{file} is damaged; run the command that made it again")
-    if value.get("format") != FORMAT:
-        raise RunFolderError(
-            f"{file} has format {value.get('format')!r}, this version reads format {FORMAT}; choose another --out"
-        )
-    identity: dict[str, Any] = value["identity"]
-    return identity
-
-
-def _read_or_none(folder: Path) -> dict[str, Any] | None:
-    try:
-        return identity_of(folder)
-    except RunFolderError:
-        return None
-
-
-def _check_same(folder: Path, now: dict[str, Any], *, is_begun: bool) -> None:
-    """Refuse a folder that holds another run, and list the differences."""
-    if not is_begun and not (folder / RUN_FILE).exists():
-        return
-    before, after = _flat(identity_of(folder)), _flat(now)
-    keys = [k for k in {**before, **after} if before.get(k, _ABSENT) != after.get(k, _ABSENT)]
-    if not keys and not is_begun:
-        return
-    shown = "".join(
-        f"\n  {key}: {_shown(before.get(key, _ABSENT))} there, {_shown(after.get(key, _ABSENT))} now"
-        for key in keys[:SHOWN_DIFFERENCES]
-    )
-    more = f"\n  and {len(keys) - SHOWN_DIFFERENCES} more" if len(keys) > SHOWN_DIFFERENCES else ""
-    raise RunFolderError(
-        f"{folder} holds another run:{shown}{more}\nChoose another --out, or delete {folder} to begin anew"
-    )
-
-
-_ABSENT = object()
-
-
-def _shown(value: Any) -> str:
-    text = "nothing" if value is _ABSENT else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= SHOWN_LETTERS else f"{text[:SHOWN_LETTERS]}..."
-
-
-def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
-    if isinstance(value, dict) and value:
-        parts = [_flat(v, f"{prefix}.{k}" if prefix else str(k)) for k, v in value.items()]
-        return {key: leaf for part in parts for key, leaf in part.items()}
-    return {prefix: value}
-
-
-def _digest(identity: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+        return identity_of(folder) == wanted
+    except RunFolderError:  # it is missing or damaged
+        return False
 
 
 def _size(file: Path) -> int | None:
@@ -338,10 +280,14 @@ def _size(file: Path) -> int | None:
         return None
 
 
-def _checksum(file: Path) -> dict[str, Any] | None:
+def _is_intact(file: Path, record: Mapping[str, Any]) -> bool:
+    return file.exists() and _checksum(file) == record
+
+
+def _checksum(file: Path) -> dict[str, Any]:
     try:
         with file.open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
             return {"bytes": stream.tell(), "sha256": digest}
-    except OSError:
-        return None
+    except OSError as error:
+        raise RunFolderError(f"can't read {file}: {error.strerror}") from error

@@ -9,7 +9,7 @@ from enfilade.methods.base import Pass, Task, TaskId
 
 BLOCK = 16  # frames; neighbouring tasks are best done by one worker, which has their inputs in memory
 
-Gate = tuple[str, int]  # a pass that is a barrier, and a shot
+Gate = tuple[str, str, int]  # "barrier", its pass and shot: never equal to the name of a task
 
 
 class TaskGraph:
@@ -98,7 +98,7 @@ class TaskGraph:
         needs: list[TaskId | Gate] = [name for name in dict.fromkeys(task.needs) if name in self._unfinished]
         index, of = self._passes[task.pass_name]
         if of.is_barrier and not self._is_open(index, task.shot):
-            needs.append((task.pass_name, task.shot))
+            needs.append(("barrier", task.pass_name, task.shot))
         self._blocked[task.id] = len(needs)
         for need in needs:
             self._waiting.setdefault(need, []).append(task.id)
@@ -113,7 +113,7 @@ class TaskGraph:
         """Tasks that waited for a barrier of a shot, if it has just opened."""
         released: list[TaskId] = []
         for name, (index, of) in self._passes.items():
-            gate = name, shot
+            gate = "barrier", name, shot
             if of.is_barrier and gate in self._waiting and self._is_open(index, shot):
                 released += self._waiting.pop(gate)
         return released
@@ -126,5 +126,5 @@ class TaskGraph:
 
 
 def block_of(task: Task) -> int:
-    """The block of frames that a task belongs to: that of the last frame that it needs."""
-    return max(task.frame, *(need.frame for need in task.needs), task.frame) // BLOCK
+    """The block of frames of a task: that of the last frame that it needs."""
+    return max([task.frame, *(need.frame for need in task.needs)]) // BLOCK

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ import numpy as np
 from enfilade import __version__
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
-from enfilade.errors import RunFolderError
+from enfilade.errors import RunFolderError, SettingsError
 from enfilade.files import read_json
 from enfilade.images import check_encodable
+from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
 from enfilade.methods.opener import open_method
 from enfilade.methods.walkthrough import viewing_of
@@ -73,7 +75,7 @@ class Job:
     def identity(self) -> dict[str, Any]:
         """Everything on which the frames depend: a run folder holds the results of one identity.
 
-        Limits of resources are left out, and so is the video, which is encoded again where its settings change.
+        Limits of resources are left out, and so is the video, which is encoded again if its settings change.
 
         Raises
         ------
@@ -89,6 +91,13 @@ class Job:
             "path": path_identity(self.path),
             "settings": self.settings.to_tables([*method.settings, OutputSettings]),
         }
+
+    @cached_property
+    def video_identity(self) -> dict[str, Any]:
+        """Everything on which the video depends beside the frames: clips of another one are encoded again."""
+        settings = self.settings[VideoSettings]
+        exposure_ev = self.settings[ViewingSettings].exposure_ev
+        return {**settings.to_table(), **view_identity(settings), "exposure_ev": exposure_ev}
 
     def check(self) -> None:
         """Refuse everything that can be known to be wrong before the scene is loaded.
@@ -155,13 +164,16 @@ class Job:
 
         Raises
         ------
-        KeyError, TypeError, ValueError
+        SettingsError
+            There is no such method or setting.
+        ArithmeticError, AttributeError, LookupError, TypeError, ValueError
             It is something else.
         """
         path = table["path"]
+        width, height = map(int, path["size"])
         poses = np.array(path["poses"], np.float64).reshape(-1, 4, 4)
         cameras = tuple(
-            Camera(pose, float(fov), *path["size"]) for pose, fov in zip(poses, path["fov_deg"], strict=True)
+            Camera(pose, float(fov), width, height) for pose, fov in zip(poses, path["fov_deg"], strict=True)
         )
         numbers = tuple(int(number) for number in path["numbers"])
         kinds = list(dict.fromkeys([*SECTIONS, *open_method(table["method"]).settings]))
@@ -180,14 +192,21 @@ def read_job(folder: Path) -> Job:
     ------
     RunFolderError
         It holds none, or is damaged.
+    SettingsError
+        Its method can't be imported, or its settings are unknown here.
     """
     file = folder / JOB_FILE
     if not file.is_file():
         raise RunFolderError(f"{folder} holds no run; begin one with `enfilade render SCENE --out {folder}`")
+    table = read_json(file)
     try:
-        return Job.from_json(read_json(file))
-    except (KeyError, TypeError, ValueError) as error:
-        raise RunFolderError(f"{file} is damaged ({error}); run the command that made the run again") from error
+        return Job.from_json(table)
+    except SettingsError:  # a method that can't be imported here, or an unknown setting
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RunFolderError(
+            f"{file} is damaged ({error}); run the command that made the run again"
+        ) from error
 
 
 def path_identity(path: CameraPath) -> dict[str, Any]:
@@ -195,7 +214,7 @@ def path_identity(path: CameraPath) -> dict[str, Any]:
     digest = hashlib.sha256()
     for camera in path.cameras:
         digest.update(camera.world_from_camera.tobytes())
-        digest.update(repr(camera.fov_deg).encode())
+        digest.update(repr(float(camera.fov_deg)).encode())
     return {
         "size": [path.width, path.height],
         "fps": path.fps,

@@ -1,7 +1,7 @@
 """The ledger of a run: one line of JSON for each finished task, only ever appended to.
 
 Several processes, also on several hosts, may append: each append holds the file's lock. Each line ends with a
-checksum of itself; damaged lines are skipped, so that their tasks are done again.
+checksum of itself; damaged lines are left out, so that their tasks are done again.
 """
 
 from __future__ import annotations
@@ -18,13 +18,16 @@ from typing import Any
 from enfilade.errors import RunFolderError
 from enfilade.files import unwritable
 
-__all__ = ["Key", "Ledger", "digest_line"]
+__all__ = ["LEDGER_FILE", "Key", "Ledger", "digest_line", "plain"]
+
+LEDGER_FILE = "ledger.jsonl"  # in a run folder
 
 Key = tuple[str, int]  # pass and number of the frame
 
 SUM = "sum"  # last key of a line
 SUM_DIGITS = 16  # of SHA-256
 NOT_IN_DIGEST = ("cost",)  # times differ from run to run
+APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW
 
 
 class Ledger:
@@ -38,9 +41,9 @@ class Ledger:
     Attributes
     ----------
     head : dict
-        The first line; empty where there is none.
+        The line of the run itself, usually the first; empty where there is none.
     damaged : list of int
-        Numbers of the lines that were skipped, from 1.
+        Numbers of the lines that are left out, from 1.
 
     Raises
     ------
@@ -86,7 +89,7 @@ class Ledger:
         self._take(data[: data.rfind(b"\n") + 1])  # a line without an end is being written, or is torn
 
     def write_head(self, head: Mapping[str, Any]) -> None:
-        """Write the first line, where there is none."""
+        """Write the line of the run itself, where there is none."""
         with self._appending() as handle:
             if not self.head:
                 self._write(handle, head)
@@ -97,14 +100,12 @@ class Ledger:
         Parameters
         ----------
         line
-            With ``pass``, ``frame`` and ``files``; fit for JSON.
+            With ``pass``, ``frame`` and ``files``, as :func:`plain` makes it.
 
         Raises
         ------
         RunFolderError, NoSpaceError
             It can't be written. The ledger is as before.
-        ValueError
-            A value is NaN or infinite.
         """
         with self._appending() as handle:
             self._write(handle, line)
@@ -113,7 +114,7 @@ class Ledger:
     def _appending(self) -> Iterator[int]:
         """The file, locked, with all lines read and the torn end of a killed process cut off."""
         try:
-            handle = os.open(self._file, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            handle = os.open(self._file, APPENDING, 0o666)
         except OSError as error:
             raise unwritable(self._file, error) from error
         try:
@@ -144,9 +145,9 @@ class Ledger:
             line = _checked(raw)
             if line is None:
                 self.damaged.append(self._count)
-            elif self._count == 1 and "pass" not in line:
-                self.head = {key: value for key, value in line.items() if key != SUM}
-            elif "pass" in line:
+            elif "pass" not in line:
+                self.head = _parsed(raw)
+            else:
                 key = line["pass"], line["frame"]
                 self._lines.pop(key, None)  # a task done again counts where it was done last
                 self._lines[key] = raw
@@ -160,8 +161,20 @@ def digest_line(line: Mapping[str, Any]) -> str:
     return json.dumps(kept, sort_keys=True, ensure_ascii=False)
 
 
+def plain(line: Mapping[str, Any]) -> dict[str, Any]:
+    """A line as it will be read back.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is NaN, infinite, or not fit for JSON.
+    """
+    read_back: dict[str, Any] = json.loads(json.dumps(line, allow_nan=False, default=_number))
+    return read_back
+
+
 def _sealed(line: Mapping[str, Any]) -> bytes:
-    text = json.dumps(line, ensure_ascii=False, allow_nan=False, default=_plain)
+    text = json.dumps(line, ensure_ascii=False, allow_nan=False)
     return f'{text[:-1]}, "{SUM}": "{_sum(text.encode())}"}}\n'.encode()
 
 
@@ -185,7 +198,7 @@ def _parsed(raw: bytes) -> dict[str, Any]:
     return line
 
 
-def _plain(value: Any) -> Any:
+def _number(value: Any) -> Any:
     """NumPy's numbers as plain ones."""
     if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
         return value.item()

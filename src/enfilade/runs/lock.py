@@ -22,8 +22,8 @@ LOCK_FILE = "run.lock"
 class Lock:
     """A claim on a run folder, until :meth:`release` or the end of the process.
 
-    The kernel holds it (``flock``), so that it ends with the process. The file stays and names the last holder:
-    removing it would let two processes lock two files of one name.
+    The kernel holds it (``flock``), so that it ends with the process. The file stays: removing it would let two
+    processes lock two files of one name.
 
     Parameters
     ----------
@@ -41,6 +41,7 @@ class Lock:
 
     def __init__(self, folder: Path, *, is_shared: bool = False) -> None:
         file = folder / LOCK_FILE
+        self._folder = folder
         try:
             self._handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
         except OSError as error:
@@ -74,6 +75,9 @@ class Lock:
     def release(self) -> None:
         """Let others write. A second call does nothing."""
         if self._handle >= 0:
+            holder = holder_of(self._folder) or {}
+            if (holder.get("host"), holder.get("pid")) == (socket.gethostname(), os.getpid()):
+                os.ftruncate(self._handle, 0)
             fcntl.flock(self._handle, fcntl.LOCK_UN)  # also for processes that were forked from this one
             os.close(self._handle)
             self._handle = -1

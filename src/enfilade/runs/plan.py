@@ -15,7 +15,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.methods.analysis import Analysis, analyze
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.runs.delivery import analysis_tasks, video_tasks
+from enfilade.runs.delivery import ANALYSIS, CLIPS, analysis_tasks, video_tasks
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
@@ -106,7 +106,8 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
         lines = list(RunFolder.read(Path(place) / "run").lines())
         monitor.progress("dry run", 1, 1)
     pixels = path.width * path.height / (small.path.width * small.path.height)
-    wall_s, cpu_s = forecast(lines, counts)
+    frames_each = len(path) / len(small.path)  # the excerpt has one task of these passes
+    wall_s, cpu_s = forecast(lines, {**counts, ANALYSIS.name: frames_each, CLIPS.name: frames_each})
     return Plan(
         method=method.name,
         frames=path.numbers,
@@ -124,7 +125,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     )
 
 
-def forecast(lines: Iterable[Mapping[str, Any]], counts: Mapping[str, int]) -> tuple[float, float]:
+def forecast(lines: Iterable[Mapping[str, Any]], counts: Mapping[str, float]) -> tuple[float, float]:
     """Wall and CPU seconds of so many tasks of each pass, from the ledger of an excerpt.
 
     The median task of a pass counts, so that the first one, which compiles kernels, does not. Tasks of the excerpt's

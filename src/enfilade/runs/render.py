@@ -17,8 +17,9 @@ from enfilade.methods.base import Task
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS
 from enfilade.runs.executor import Workers
-from enfilade.runs.folder import LEDGER_FILE, RunFolder, check_place
+from enfilade.runs.folder import RunFolder, check_place
 from enfilade.runs.job import JOB_FILE, Job, read_job
+from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings
@@ -76,6 +77,7 @@ def render(
             run.forget(name)
             monitor.say(f"{name} is missing or damaged: its task is done again")
         work(job, run, workers or Workers(), monitor)
+        run.sweep()  # of workers that were killed
         summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
         write_json(folder / SUMMARY_FILE, summary)
     return summary
@@ -147,8 +149,12 @@ def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers 
     job = read_job(folder)
     names = [of.name for of in passes_of(job)]
     if shard.pass_name not in names:
-        raise SettingsError(f"--method {job.method} has no pass {shard.pass_name!r}; it has {', '.join(names)}")
+        raise SettingsError(
+            f"--method {job.method} has no pass {shard.pass_name!r}; it has {', '.join(names)}"
+        )
     with RunFolder.share(folder) as run:
+        for note in run.notes:
+            monitor.say(note)
         work(job, run, workers or Workers(), monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
 
 

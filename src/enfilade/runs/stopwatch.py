@@ -37,5 +37,6 @@ class Stopwatch:
         """The times since the last call."""
         taken, self._cost = self._cost, {}
         return {
-            part: {kind: round(seconds, 6) for kind, seconds in spent.items()} for part, spent in taken.items()
+            part: {kind: round(seconds, 6) for kind, seconds in spent.items()}
+            for part, spent in taken.items()
         }

@@ -17,13 +17,13 @@ from enfilade.runs.delivery import (
     ANALYZED_FRAMES,
     CLIPS,
     VIDEO,
-    video_facts,
     write_clip,
     write_frame,
     write_video,
 )
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
+from enfilade.runs.ledger import plain
 from enfilade.runs.stopwatch import Stopwatch
 
 CACHED_RECORDS = 4
@@ -48,9 +48,10 @@ class Worker:
         self._stopwatch = Stopwatch()
         self._inputs = _Inputs(job, run, self._records, self._stopwatch)
 
-    def load(self) -> None:
-        """Load the scene."""
-        _ = self._walk
+    def prepare(self, task: Task) -> None:
+        """Load the scene, unless the task needs none."""
+        if task.pass_name not in (CLIPS.name, VIDEO.name):
+            _ = self._walk
 
     def do(self, task: Task) -> dict[str, Any]:
         """Do a task.
@@ -68,26 +69,25 @@ class Worker:
         with self._stopwatch.timed(task.pass_name):
             output, files = self._done(task)
         if taken := RESERVED.intersection(output.facts):
-            raise ValueError(f"the ledger keeps these keys for itself: {', '.join(sorted(taken))}")
-        return {
-            "pass": task.pass_name,
-            "frame": number,
-            **output.facts,
-            "files": self._run.record_of(files),
-            "cost": self._stopwatch.take(),
-        }
+            raise ValueError(f"these facts have names of the ledger's own: {', '.join(sorted(taken))}")
+        line = {"pass": task.pass_name, "frame": number, **output.facts, "files": self._run.record_of(files)}
+        return plain({**line, "cost": self._stopwatch.take()})
 
     def _done(self, task: Task) -> tuple[Output, list[Any]]:
         match task.pass_name:
             case ANALYSIS.name:
                 return self._analyzed(task.frame), []
             case CLIPS.name:
-                return Output(facts=video_facts(self._job)), [write_clip(self._run, self._job, task.frame)]
+                return self._video_facts, [write_clip(self._run, self._job, task.frame)]
             case VIDEO.name:
-                return Output(facts=video_facts(self._job)), [write_video(self._run, self._job)]
+                return self._video_facts, [write_video(self._run, self._job)]
             case _:
                 output = self._method.run(task, self._inputs, self._walk)
                 return self._written(task, output)
+
+    @property
+    def _video_facts(self) -> Output:
+        return Output(facts={"video": self._job.video_identity})
 
     def _analyzed(self, first: int) -> Output:
         frames = range(first, min(first + ANALYZED_FRAMES, len(self._job.path)))
@@ -115,7 +115,9 @@ class Worker:
 class _Inputs:
     """Records and facts of earlier passes, from the run folder."""
 
-    def __init__(self, job: Job, run: RunFolder, kinds: Mapping[str, type | None], stopwatch: Stopwatch) -> None:
+    def __init__(
+        self, job: Job, run: RunFolder, kinds: Mapping[str, type | None], stopwatch: Stopwatch
+    ) -> None:
         self._job = job
         self._run = run
         self._kinds = kinds
