@@ -76,10 +76,10 @@ class UnfinishedError(EnfiladeError):
 
     Attributes
     ----------
-    units : tuple of str
+    tasks : tuple of str
         Their names.
     """
 
-    def __init__(self, message: str, units: tuple[str, ...] = ()) -> None:
+    def __init__(self, message: str, tasks: tuple[str, ...] = ()) -> None:
         super().__init__(message)
-        self.units = units
+        self.tasks = tasks
