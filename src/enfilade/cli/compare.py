@@ -48,9 +48,9 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     metavar="DISPLAY",
     callback=_list_displays,
     is_eager=True,
-    help="A display on which images stand pixel for pixel: paper, desktop-24-fhd, desktop-27-4k, laptop-14, phone, "
-    "tv-55-4k, cinema; list describes them. Numbers of [viewing] win over its own.  [default: the numbers of "
-    "[viewing], on a display that the image fills]",
+    help="A display on which images stand pixel for pixel: paper, desktop-24-fhd, desktop-27-4k, "
+    "laptop-14, phone, tv-55-4k, cinema; list describes them. Numbers of [viewing] win over its own.  "
+    "[default: the numbers of [viewing], on a display that the image fills]",
 )
 @click.option("--fps", type=float, help="Frames per second shown.  [default: the sequences', or 30]")
 @click.option(
@@ -72,15 +72,17 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     type=click.Choice(("auto", "layers", "estimate", "none")),
     default="auto",
     show_default=True,
-    help="Motion vectors: from layers of OpenEXR frames, estimated, or none; auto estimates where there are no layers.",
+    help="Motion vectors: from layers of OpenEXR frames, estimated, or none; auto estimates where there are "
+    "no layers.",
 )
 @click.option(
     "--layer",
     "layers",
     metavar="NAME",
     multiple=True,
-    help="Layer or part of OpenEXR frames that is compared: once for both sequences, or twice, for the test and the "
-    "reference.  [default: R G B without a name, else rgba, beauty, C or Combined, else the only one of three channels]",
+    help="Layer or part of OpenEXR frames that is compared: once for both sequences, or twice, for the test "
+    "and the reference.  [default: R G B without a name, else rgba, beauty, C or Combined, else the only one "
+    "of three channels]",
 )
 @click.option(
     "--heatmap",
@@ -112,9 +114,10 @@ def command(
     Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), a pattern such as
     frames/%04d.exr, or a video.
 
-    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical; 1 is a
-    difference that three of four observers find when they look for it, everywhere and all the time. A small or brief
-    difference has a lower score than its own JND; where it is visible, the largest value is printed, too.
+    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical; 1
+    is a difference that three of four observers find when they look for it, everywhere and all the time. A
+    small or brief difference has a lower score than its own JND; where it is visible, the largest value is
+    printed, too.
     """
     check_png("--graph", graph)
     show = None if heatmap is None else _painted(heatmap)

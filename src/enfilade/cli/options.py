@@ -317,8 +317,8 @@ def _check_effect(ctx: click.Context, method: Method) -> None:
     for flag, table in asked.items():
         if table not in read:
             raise SettingsError(
-                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it out, or "
-                "choose another method"
+                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "
+                "out, or choose another method"
             )
 
 

@@ -31,9 +31,7 @@ PAGE = "report.html"
 @click.option("--max-mb", type=float, default=30.0, show_default=True, help="Largest size of the page, MB.")
 @quiet_option
 @debug_option
-def command(
-    *, run: Path, file: Path | None, reference: Path | None, max_mb: float, quiet: bool
-) -> None:
+def command(*, run: Path, file: Path | None, reference: Path | None, max_mb: float, quiet: bool) -> None:
     """Write a page about the finished or running run in the folder RUN.
 
     The page is one file that needs no network.
