@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["castle_sensitivity", "sustained_sensitivity", "transient_sensitivity"]
+__all__ = ["castle_sensitivity", "transient_sensitivity"]
 
 F64: TypeAlias = npt.NDArray[np.float64]
 
@@ -59,15 +59,33 @@ def _arrays(*quantities: npt.ArrayLike) -> tuple[F64, ...]:
     return tuple(np.asarray(quantity, dtype=np.float64) for quantity in quantities)
 
 
-def sustained_sensitivity(
+def castle_sensitivity(
     frequency_cpd: npt.ArrayLike,
     temporal_hz: npt.ArrayLike,
     luminance_cd_m2: npt.ArrayLike,
     area_deg2: npt.ArrayLike,
 ) -> F64:
-    """Sensitivity of the sustained channel; arguments and result as in `castle_sensitivity`.
+    """Contrast sensitivity to a patch of grating that moves or flickers (castleCSF, achromatic).
 
-    The temporal response is exp(-w^1.3314 / 10.5795).
+    The sum of `transient_sensitivity` and a sustained channel with the temporal response
+    exp(-w^1.3314 / 10.5795).
+
+    Parameters
+    ----------
+    frequency_cpd : array_like
+        Spatial frequency rho, above 0.
+    temporal_hz : array_like
+        Temporal frequency w on the screen for an eye at rest, 0 or more: v rho for a pattern that
+        moves at v degrees per second. The eye's own drift is part of the measurements.
+    luminance_cd_m2 : array_like
+        Adapting luminance L; measured from 0.0002 to 10 000 cd/m2.
+    area_deg2 : array_like
+        Area A of the patch, square degrees; of a Gabor pi sigma^2.
+
+    Returns
+    -------
+    array of float64
+        1 / (threshold contrast of luminance), broadcast over the arguments.
     """
     rho, hertz, luminance, area = _arrays(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2)
     luminance = np.maximum(luminance, LEAST_CD_M2)
@@ -75,7 +93,8 @@ def sustained_sensitivity(
     peak *= -np.expm1(-9.66862e9 * np.log1p(5.58341e-7 / luminance))  # 1 - (1 + k2 / L)^-k3
     peak_cpd = 1.78119 * (1.0 + 91.5718 / luminance) ** -0.256682
     response = np.exp(-(hertz**SUSTAINED_EXPONENT) / SUSTAINED_SCALE)
-    return response * _spatial(SUSTAINED, peak, peak_cpd, rho, area)
+    sustained = response * _spatial(SUSTAINED, peak, peak_cpd, rho, area)
+    return sustained + transient_sensitivity(rho, hertz, luminance, area)
 
 
 def transient_sensitivity(
@@ -96,34 +115,3 @@ def transient_sensitivity(
     distance = hertz**TRANSIENT_EXPONENT - peak_hz**TRANSIENT_EXPONENT
     response = np.exp(-(distance**2) / TRANSIENT_SCALE)
     return response * _spatial(TRANSIENT, peak, 0.000316696, rho, area)
-
-
-def castle_sensitivity(
-    frequency_cpd: npt.ArrayLike,
-    temporal_hz: npt.ArrayLike,
-    luminance_cd_m2: npt.ArrayLike,
-    area_deg2: npt.ArrayLike,
-) -> F64:
-    """Contrast sensitivity to a patch of grating that moves or flickers (castleCSF, achromatic).
-
-    The sum of a sustained and a transient channel.
-
-    Parameters
-    ----------
-    frequency_cpd : array_like
-        Spatial frequency rho, above 0.
-    temporal_hz : array_like
-        Temporal frequency w on the screen for an eye at rest, 0 or more: v rho for a pattern that
-        moves at v degrees per second. The eye's own drift is part of the measurements.
-    luminance_cd_m2 : array_like
-        Adapting luminance L; measured from 0.0002 to 10 000 cd/m2.
-    area_deg2 : array_like
-        Area A of the patch, square degrees; of a Gabor pi sigma^2.
-
-    Returns
-    -------
-    array of float64
-        1 / (threshold contrast of luminance), broadcast over the arguments.
-    """
-    arguments = frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2
-    return sustained_sensitivity(*arguments) + transient_sensitivity(*arguments)
