@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["castle_sensitivity", "transient_sensitivity"]
+__all__ = ["castlecsf_sensitivity", "transient_sensitivity"]
 
 F64: TypeAlias = npt.NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def _arrays(*quantities: npt.ArrayLike) -> tuple[F64, ...]:
     return tuple(np.asarray(quantity, dtype=np.float64) for quantity in quantities)
 
 
-def castle_sensitivity(
+def castlecsf_sensitivity(
     frequency_cpd: npt.ArrayLike,
     temporal_hz: npt.ArrayLike,
     luminance_cd_m2: npt.ArrayLike,
@@ -103,7 +103,7 @@ def transient_sensitivity(
     luminance_cd_m2: npt.ArrayLike,
     area_deg2: npt.ArrayLike,
 ) -> F64:
-    """Sensitivity of the transient channel; arguments and result as in `castle_sensitivity`.
+    """Sensitivity of the transient channel; arguments and result as in `castlecsf_sensitivity`.
 
     The temporal response is exp(-(w^0.1898 - w0^0.1898)^2 / 0.0844836), w0 = 2.41482 log10 L +
     4.7036 Hz: 9.5 Hz at 100 cd/m2, close to nothing at 0 Hz.
