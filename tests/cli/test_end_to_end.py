@@ -7,7 +7,8 @@ import pytest
 
 import scenes_analytic
 from enfilade.camera.pinhole import look_at
-from enfilade.scene.analytic_scene import scene_text
+from small_runs import RENDERER
+from support.analytic_scene import write_scene
 
 FRAMES = 5
 
@@ -15,13 +16,16 @@ FRAMES = 5
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scene")
-    scene, path = folder / "room.analytic.json", folder / "camera_path.json"
-    scene.write_text(scene_text(scenes_analytic.room()))
+    scene = write_scene(folder / "room.analytic", scenes_analytic.room())
+    path = folder / "camera_path.json"
     poses = [look_at((x, 1.5, 2.5), (0.0, 1.2, -2.0)) for x in np.linspace(-0.2, 0.2, FRAMES)]
     cameras = [{"camera_to_world": p.ravel().tolist(), "fov": 55, "aspect": 4 / 3} for p in poses]
     values = {"render_width": 64, "render_height": 48, "fps": 24, "seconds": FRAMES / 24}
     path.write_text(json.dumps({**values, "camera_type": "perspective", "camera_path": cameras}))
-    return scene, "--path", path, "--device", "cpu", "--spp", "2", "--method", "paper"
+    return (
+        *(scene, "--renderer", RENDERER),
+        *("--path", path, "--device", "cpu", "--spp", "2", "--method", "paper"),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -69,14 +73,13 @@ def test_plan(run, inputs, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [(None, "No such file"), ("{", "not valid JSON"), ("{}", "room.analytic.json")]
+    ("renderer", "words"),
+    [("support.analytic", "support.analytic"), ("support.analytic:gone", "gone"), ("gone:load", "gone")],
 )
-def test_a_scene_that_cannot_be_read(run, inputs, tmp_path, text, words):
-    scene = tmp_path / "room.analytic.json"
-    if text is not None:
-        scene.write_text(text)
-    result = run("render", scene, *inputs[1:], "--out", tmp_path / "run")
+def test_a_renderer_that_there_is_not(run, inputs, tmp_path, renderer, words):
+    result = run("render", inputs[0], "--renderer", renderer, *inputs[3:], "--out", tmp_path / "run")
     assert result.exit_code == 2
+    assert f"there is no renderer '{renderer}'" in result.stderr
     assert words in result.stderr
 
 
@@ -90,6 +93,6 @@ def test_an_output_that_is_a_file(run, inputs, tmp_path):
 def test_a_mitsuba_scene_that_is_malformed(run, inputs, tmp_path):
     scene = tmp_path / "scene.xml"
     scene.write_text('<scene version="3.0.0"><shape type="no_such_shape"/></scene>')
-    result = run("render", scene, *inputs[1:], "--out", tmp_path / "run")
+    result = run("render", scene, *inputs[3:], "--out", tmp_path / "run")
     assert result.exit_code == 2, result.output
     assert "scene.xml" in result.stderr

@@ -9,20 +9,21 @@ import scenes_analytic
 from enfilade.cli import work
 from enfilade.errors import EnfiladeError
 from enfilade.pipeline.crew import Crew
-from enfilade.scene.analytic_scene import scene_text
 from enfilade.store import Run
 from enfilade.store.lock import Lock
+from small_runs import RENDERER
+from support.analytic_scene import write_scene
 
 PAPER = ("--method", "paper")
 
 
 @pytest.fixture
 def begun(run, camera_path, tmp_path):
-    scene = tmp_path / "room.analytic.json"
-    scene.write_text(scene_text(scenes_analytic.room()))
+    scene = write_scene(tmp_path / "room.analytic", scenes_analytic.room())
     line = (
         "render",
         scene,
+        *("--renderer", RENDERER),
         "--path",
         camera_path,
         "--device",
@@ -97,7 +98,7 @@ def test_what_is_begun_is_told_as_json(run, begun, tmp_path):
     ("integrator", "wrong", "words", "right"),
     [
         ("path", ("--viewing-black-cd-m2", "200"), "less than peak_cd_m2", ()),
-        ("path", ("--trace-max-depth", "3"), "3 edges, fewer than 4; take --method paper", ()),
+        ("path", ("--trace-max-depth", "3"), "depth 3, below 4; take --method paper", ()),
         ("direct", (), "not a path tracer; take --method paper", PAPER),
         ("direct", (*PAPER, "--trace-max-depth", "7"), "leave --trace-max-depth out", PAPER),
     ],
@@ -232,13 +233,13 @@ def test_flags_that_would_say_nothing_are_refused(run, begun, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("command", [("render",), ("plan",)])
-def test_a_scene_is_tried_by_a_process_of_its_own_first(run, camera_path, tmp_path, command):
+def test_a_scene_is_loaded_by_a_preflight_process_first(run, camera_path, tmp_path, command):
     scene = tmp_path / "scene.xml"
     scene.write_text(
         '<scene version="3.0.0"><shape type="sphere"/><emitter type="constant"/></scene>', encoding="utf-8"
     )
     more = ("--out", tmp_path / "run") if command == ("render",) else ()
-    line = [*command, scene, "--path", camera_path, "--device", "cpu", "--limits-trial-s", "0.1", *more]
+    line = [*command, scene, "--path", camera_path, "--device", "cpu", "--limits-preflight-s", "0.1", *more]
     result = run(*line)
     assert result.exit_code == 2, result.output
     assert "was not loaded in 0.1 s" in result.stderr  # in which no Mitsuba starts

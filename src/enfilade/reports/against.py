@@ -9,7 +9,7 @@ import numpy as np
 from enfilade.comparison.measures.shown import Shown, shown
 from enfilade.errors import ImageError, RunFolderError
 from enfilade.kernels.tone import srgb_encode
-from enfilade.metric import Pursuit, SequenceAqm
+from enfilade.metric import Aqm, Pursuit, SequenceAqm
 from enfilade.records import F32, Flow
 from enfilade.reports.seen import SeenFrame, SeenRun
 from enfilade.settings import MetricSettings
@@ -133,7 +133,7 @@ class Against:
         flow, index = pair.flow, frame.index
         is_cut = self._last is None or self._last != index - 1 or self._test.begins_shot(index)
         self._last = index
-        found = self._aqm.judge(
+        found = self._aqm.compare(
             pair.test_cd_m2,
             pair.reference_cd_m2,
             velocity=None if flow is None else self._test.viewing.velocity_deg_s(flow.motion),
@@ -154,11 +154,8 @@ def _metric(test: SeenRun) -> SequenceAqm:
     table = test.identity.get("settings", {}).get("metric", {})
     default = MetricSettings()
     try:
-        return SequenceAqm(
-            test.viewing,
-            pursuit=Pursuit(table.get("metering", default.metering.value)),
-            mask_slope=float(table.get("mask_slope", default.mask_slope)),
-        )
+        pursuit = Pursuit(table.get("metering", default.metering.value))
+        return SequenceAqm(Aqm.modern(test.viewing, pursuit=pursuit))
     except ValueError as error:
         raise ImageError(f"{test.run.folder}: its settings of the metric can't be used: {error}") from error
 

@@ -101,7 +101,7 @@ def write_video(run: RunFolder, job: Job) -> Path:
         run.check(clip.relative_to(run.folder).as_posix())
     file = run.folder / f"video{video_suffix(settings.codec)}"
     counted = [(clip, len(span)) for clip, span in zip(clips, spans, strict=True)]
-    join_videos(file, counted, fps=job.path.fps, settings=settings)
+    join_videos(file, counted, fps=job.path.fps)
     return file
 
 

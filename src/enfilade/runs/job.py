@@ -20,7 +20,7 @@ from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
 from enfilade.methods.opener import open_method
 from enfilade.methods.walkthrough import viewing_of
-from enfilade.renderer import Renderer
+from enfilade.renderer import LobeRenderer, Renderer
 from enfilade.scene.opener import Scene
 from enfilade.settings import (
     SECTIONS,
@@ -86,8 +86,7 @@ class Job:
         return {
             "enfilade": __version__,
             "method": {"name": method.name, "revision": method.revision},
-            "renderer": self.scene.renderer_identity(),
-            "scene": self.scene.fingerprint(),
+            "scene": self.scene.identity(),
             "path": path_identity(self.path),
             "settings": self.settings.to_tables([*method.settings, OutputSettings]),
         }
@@ -122,8 +121,10 @@ class Job:
         Raises
         ------
         SceneError
+        SettingsError
+            The method can't render it.
         """
-        self.scene.preflight(self.settings)
+        self._check_lobes(self.scene.preflight(self.settings))
 
     def open_renderer(self) -> Renderer:
         """Load the scene.
@@ -138,8 +139,18 @@ class Job:
             No usable LLVM or CUDA.
         """
         renderer = self.scene.open(self.settings)
-        self.opened_method().check_scene(renderer)
+        if isinstance(renderer, LobeRenderer):
+            self._check_lobes(renderer.why_inseparable)
+        else:
+            self._check_lobes(f"{renderer.describe().renderer} does not separate lobes")
         return renderer
+
+    def _check_lobes(self, why_inseparable: str) -> None:
+        if why_inseparable and self.opened_method().needs_lobes:
+            raise SettingsError(
+                f"--method {self.method} can't render {self.scene.file}: {why_inseparable}; take --method paper or "
+                "--method reference"
+            )
 
     def to_json(self) -> dict[str, Any]:
         """All of it, fit for JSON; read back by :meth:`from_json`."""
