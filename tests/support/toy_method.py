@@ -1,9 +1,9 @@
 """A method of cheap tasks that fail on demand.
 
-The file ``orders/PASS-NUMBER`` in the scene's folder lists, line by line, the behaviour of each attempt at a task:
-``raise``, ``memory``, ``kill``, ``exit``, ``stop``, ``hang``, ``full``, ``refuse``, ``disk`` (an I/O error), ``nan``,
-``leave`` (a temporary file, then death). Every attempt appends the process number and the paths in flight to
-``attempts/PASS-NUMBER``.
+The file ``orders/PASS-NUMBER`` in the scene's folder lists, line by line, the behaviour of each attempt at a
+task: ``raise``, ``memory``, ``kill``, ``exit``, ``stop``, ``hang``, ``full``, ``refuse``, ``disk`` (an I/O
+error), ``leave`` (a temporary file, then death). Every attempt appends the process number, the paths in
+flight and the GPU to ``attempts/PASS-NUMBER``.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ class Toy(Method):
                 return Output({task.frame: Light(light, task.frame)}, {"rays": {"camera": light.size}})
             case "mean":
                 values = [inputs.record("light", frame).value for frame in shot]
-                return Output({task.frame: Light(np.mean(values, axis=0), len(shot))}, {"mean": np.mean(values)})
+                return Output(
+                    {task.frame: Light(np.mean(values, axis=0), len(shot))}, {"mean": np.mean(values)}
+                )
         mean = inputs.facts("mean", shot.start)["mean"]
         value = inputs.record("mean", shot.start).value + inputs.record("light", task.frame).value - mean
         color = np.repeat(value[..., None], 3, axis=2) * np.float32(walk.settings[ToySettings].gain)
@@ -86,7 +88,7 @@ def obey(folder: Path, name: str, paths_in_flight: int) -> None:
     attempts, orders = folder / "attempts" / name, folder / "orders" / name
     attempts.parent.mkdir(exist_ok=True)
     with attempts.open("a") as file:
-        file.write(f"{os.getpid()} {paths_in_flight}\n")
+        file.write(f"{os.getpid()} {paths_in_flight} {os.environ.get('CUDA_VISIBLE_DEVICES')}\n")
     number = len(attempts.read_text().splitlines())
     asked = orders.read_text().splitlines() if orders.exists() else []
     if number <= len(asked):
@@ -105,7 +107,8 @@ def misbehave(how: str, folder: Path) -> None:
         case "hang":
             time.sleep(3600)
         case "leave":
-            with whole_file(folder / "run" / "light" / "left.exr"):
+            with whole_file(folder / "run" / "light" / "left.exr") as beside:
+                beside.write_bytes(b"half")
                 os.kill(os.getpid(), signal.SIGKILL)
         case "disk":
             raise RunFolderError("can't read it") from OSError(errno.ESTALE, "Stale file handle")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array3f, Float, UInt
+from enfilade.arrays import Array3f, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
@@ -55,7 +54,3 @@ class Wall:
         image = np.random.default_rng(seed).random((camera.height * camera.width, 3), np.float32)
         color: F32 = image[pixels]
         return Shading(color, np.ones(len(pixels), np.float32))
-
-
-def flat(value: Any) -> Any:
-    return Float(value)

@@ -1,7 +1,7 @@
 """The worker of another process: a child of this one, or one of a Ray cluster.
 
-The device is chosen before anything is imported that binds to it: all imports of this module are light, and orders
-travel as bytes.
+The device is chosen before anything is imported that binds to it: all imports of this module are light, and
+orders travel as bytes.
 """
 
 from __future__ import annotations

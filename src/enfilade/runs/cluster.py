@@ -26,8 +26,8 @@ class Cluster:
     ----------
     run
     limits
-        ``task_timeout_s``: a worker that has not finished its task after this time ends itself; loading the scene may
-        take ``preflight_s`` more. 0: never.
+        ``task_timeout_s``: a worker that has not finished its task after this time ends itself; loading the
+        scene may take ``preflight_s`` more. 0: never.
     workers
         Number of tasks at once (None: as many as the cluster has GPUs, or CPUs for), and threads of each.
     address
@@ -67,8 +67,8 @@ class Cluster:
         self.slots = share.slots
         self._terms = WorkerTerms(str(run.folder.resolve()), device, share.cpus)
         self._limits = limits
-        # Nothing is repeated by Ray: the scheduler does it, with fewer paths in flight after a lack of memory.
-        # Ray ends a worker after each task on a GPU unless `max_calls` is 0.
+        # Nothing is repeated by Ray: the scheduler does it, with fewer paths in flight after a lack of
+        # memory. Ray ends a worker after each task on a GPU unless `max_calls` is 0.
         self._do = ray.remote(num_cpus=share.cpus, num_gpus=share.gpus, max_retries=0, max_calls=0)(
             do_remotely
         )
@@ -101,7 +101,8 @@ class Cluster:
             yield
         except (self._ray.exceptions.RayError, ConnectionError) as error:
             raise EnfiladeError(
-                f"the Ray cluster does not answer: {_first_line(error)}; start one, then run the same command again"
+                f"the Ray cluster does not answer: {_first_line(error)}; start one, then run the same command "
+                "again"
             ) from error
 
     def _connect(self, address: str, *, cpus: int) -> None:
@@ -149,7 +150,8 @@ class Share:
         nodes
             Resources of each, as Ray names them.
         workers
-            Number and threads, as far as they are given. A task gets no more threads than the largest node has CPUs.
+            Number and threads, as far as they are given. A task gets no more threads than the largest node
+            has CPUs.
         has_gpu
             Whether a task needs a GPU.
 

@@ -46,9 +46,9 @@ def clip_spans(frames: int) -> list[range]:
 def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:
     """Write a delivered frame: linear Rec.709 in half floats, and the AOVs of ``[output] layers``.
 
-    Floats of the AOVs are rounded to 16 significant bits. ``Z``, along the optical axis, and ``P``, in the world,
-    are in scene units; ``forward`` and ``backward`` in pixels per frame, x right, y down; ``shape_index`` and
-    ``provenance`` are unsigned integers.
+    Floats of the AOVs are rounded to 16 significant bits. ``Z``, along the optical axis, and ``P``, in the
+    world, are in scene units; ``forward`` and ``backward`` in pixels per frame, x right, y down;
+    ``shape_index`` and ``provenance`` are unsigned integers.
 
     Raises
     ------

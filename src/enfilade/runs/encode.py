@@ -39,8 +39,8 @@ def encode(
     folder
         The run; it may be running.
     changes
-        Settings that differ from those of the run: of ``video``, and the exposure of ``viewing``. With another
-        ``ocio``, view and display of the run are dropped.
+        Settings that differ from those of the run: of ``video``, and the exposure of ``viewing``. With
+        another ``ocio``, view and display of the run are dropped.
     monitor
     file
         The video; by default ``encoded`` with the codec's suffix, in the run folder.

@@ -183,8 +183,8 @@ def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
     """
     if job.identity() != run.identity:
         raise RunFolderError(
-            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer is not that with "
-            "which the run began; `enfilade render` lists the differences"
+            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer is not that "
+            "with which the run began; `enfilade render` lists the differences"
         )
     if reduction > 1:
         paths = job.settings[LimitSettings].paths_in_flight

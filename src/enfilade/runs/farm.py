@@ -1,7 +1,7 @@
 """A run on a render farm: a job template of Open Job Description, or Slurm jobs through submitit.
 
-Each job task is an ordinary `enfilade work` command on a run folder that all hosts see, and may be given to any host
-again (https://github.com/OpenJobDescription, 2023-09).
+Each job task is an ordinary `enfilade work` command on a run folder that all hosts see, and may be given to
+any host again (https://github.com/OpenJobDescription, 2023-09).
 """
 
 from __future__ import annotations
@@ -11,28 +11,28 @@ import re
 import shutil
 import subprocess
 import sys
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.files import write_json
-from enfilade.runs.delivery import CLIPS, VIDEO, clip_spans
+from enfilade.runs.delivery import VIDEO, analysis_tasks, video_tasks
 from enfilade.runs.job import read_job
 from enfilade.runs.scheduler import passes_of
 
 TEMPLATE = "farm.template.json"  # in the run folder
 SPECIFICATION = "jobtemplate-2023-09"
 FRAMES_PER_SHARD = 16  # by default
-# A worker process of its own: one that crashes, or is killed for its memory, costs an attempt at its unit.
+# A worker process of its own: a crash, or a kill for lack of memory, costs an attempt at one task.
 WORKER = ("--executor", "processes", "--workers", "1")
 TIMEOUT_MIN = 60
 CORES = 8  # of a Slurm task: Slurm itself gives one
-TIMEOUTS = 10  # times that a Slurm task is queued again: what it has finished is not done again
-MOST_TASKS = 1001  # of an array, where Slurm's settings say nothing else
+TIMEOUTS = 10  # times that a Slurm task is queued again; finished tasks of the run are not done again
+MOST_TASKS = 1001  # of an array, if Slurm's settings are not known
 CORE_OPTIONS = frozenset({"cpus_per_task", "slurm_cpus_per_task", "slurm_cpus_per_gpu", "slurm_exclusive"})
-TAIL = 20  # lines of what a task said that are told when it fails
+TAIL = 20  # lines of a command's output in the message that it failed
 
 
 def shards_for(frames: int) -> int:
@@ -64,9 +64,9 @@ def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
     job = read_job(folder)
     count = shards or shards_for(len(job.path))
     steps: list[dict[str, Any]] = []
+    tasks = Counter(task.pass_name for task in (*analysis_tasks(len(job.path)), *video_tasks(len(job.path))))
     for of in passes_of(job):
-        most = len(clip_spans(len(job.path))) if of.name == CLIPS.name else count
-        steps.append(_step(of.name, steps, min(count, most) if of.is_shared else 1))
+        steps.append(_step(of.name, steps, min(count, tasks.get(of.name, count)) if of.is_shared else 1))
     return {
         "specificationVersion": SPECIFICATION,
         "name": f"enfilade {folder.resolve().name}"[:128],
@@ -88,8 +88,8 @@ def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
     }
 
 
-class Task:
-    """A command line as submitit runs it; one that is out of time, or gives way to others, is queued again.
+class Command:
+    """A command line for submitit; it is queued again if it runs out of time or is preempted.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Task:
         self.line = line
 
     def __call__(self) -> None:
-        """Run it, here; what it says goes into the job's logs.
+        """Run it; its output goes to the job's logs.
 
         Raises
         ------
@@ -113,14 +113,14 @@ class Task:
                 for text in process.stderr or ():
                     sys.stderr.write(text)
                     last.append(text)
-            except BaseException:  # submitit ends the job from within a signal
+            except BaseException:  # submitit ends the job from within a signal handler
                 process.kill()
                 raise
         if process.returncode:
             raise EnfiladeError("".join(last).strip() or f"it ended with exit code {process.returncode}")
 
     def checkpoint(self) -> Any:
-        """The same again: what is in the run folder is not done again."""
+        """The same again: finished tasks of the run are not done again."""
         import submitit
 
         return submitit.helpers.DelayedSubmission(self)
@@ -129,29 +129,29 @@ class Task:
 def submit(
     folder: Path, cluster: str, shards: int | None, options: dict[str, Any], tell: Callable[[str], object]
 ) -> list[str]:
-    """Give a run that was begun to Slurm, step by step, each after the one before.
+    """Submit a run that was begun to Slurm, step by step, each after the one before.
 
-    A step that fails takes those after it out of the queue.
+    A step that fails removes the later ones from the queue.
 
     Parameters
     ----------
     folder
         The run.
     cluster
-        ``slurm``, or ``local``: processes of this machine, one after the other, waited for.
+        ``slurm``, or ``local``: processes of this machine, one after the other.
     shards
-        Shards of a pass; None: one for each 16 frames. Where Slurm takes fewer in an array, they
-        come as several arrays.
+        Shards of a pass; None: one for each 16 frames. They are submitted as several arrays if Slurm limits
+        the size of an array.
     options
-        More parameters of submitit's executor, such as ``slurm_partition``, ``timeout_min`` and
-        ``cpus_per_task``, which is 8 where none says otherwise.
+        Parameters of submitit's executor, such as ``slurm_partition``, ``timeout_min`` and ``cpus_per_task``,
+        by default 8.
     tell
-        Takes a line on each job as soon as it is submitted.
+        Receives a line on each job as soon as it is submitted.
 
     Returns
     -------
     list of str
-        Numbers of the jobs; of an array, the one that stands for all its tasks.
+        Numbers of the jobs; one for each array.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def submit(
     previous: list[str] = []
     most = 1 if cluster == "local" else _most_tasks()  # one by one: each takes all cores, and memory
     for step in template(folder, shards)["steps"]:
-        tasks = [Task(line) for line in _lines(step, folder)]
+        tasks = [Command(line) for line in _lines(step, folder)]
         groups = [tasks[first : first + most] for first in range(0, len(tasks), most)]
         ids: list[str] = []
         for group in groups:
@@ -179,7 +179,7 @@ def submit(
                 with executor.batch():
                     jobs = [executor.submit(task) for task in group]
                 ids.append(jobs[0].job_id.partition("_")[0])
-            except RuntimeError as error:  # all that submitit says of sbatch
+            except RuntimeError as error:  # of sbatch
                 raise EnfiladeError(_refused(step["name"], error, made)) from error
             made.append(ids[-1])
             tell(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
@@ -190,7 +190,7 @@ def submit(
 
 
 def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any], previous: list[str]) -> Any:
-    """What takes the tasks of a step, after jobs of the step before."""
+    """The executor of the tasks of a step, after jobs of the step before."""
     given = {"timeout_min": TIMEOUT_MIN, **options}
     timeouts = given.pop("slurm_max_num_timeout", TIMEOUTS)
     if cluster == "slurm":
@@ -218,7 +218,7 @@ def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any]
 def _refused(step: str, error: Exception, made: list[str]) -> str:
     numbers = " ".join(made)
     after = (
-        f"jobs {numbers} are in the queue: they do the steps before; `scancel {numbers}` takes them out"
+        f"jobs {numbers} of the steps before are in the queue; `scancel {numbers}` removes them"
         if made
         else "nothing is in the queue"
     )
@@ -226,13 +226,13 @@ def _refused(step: str, error: Exception, made: list[str]) -> str:
 
 
 def _most_tasks() -> int:
-    """How many tasks Slurm takes in an array."""
+    """Largest number of tasks in an array of Slurm."""
     scontrol = shutil.which("scontrol")
     if scontrol is None:
         return MOST_TASKS
     line = [scontrol, "show", "config"]
-    said = subprocess.run(line, capture_output=True, text=True, check=False).stdout  # noqa: S603
-    found = re.search(r"^MaxArraySize\s*=\s*(\d+)", said, re.MULTILINE)
+    output = subprocess.run(line, capture_output=True, text=True, check=False).stdout  # noqa: S603
+    found = re.search(r"^MaxArraySize\s*=\s*(\d+)", output, re.MULTILINE)
     return max(int(found[1]), 1) if found else MOST_TASKS
 
 

@@ -74,7 +74,8 @@ class RunFolder:
         Raises
         ------
         RunFolderError
-            The folder holds another run, or something else, or can't be written; another command is writing it.
+            The folder holds another run, or something else, or can't be written; another command is writing
+            it.
         NoSpaceError
         """
         wanted: dict[str, Any] = json.loads(json.dumps(identity, allow_nan=False))
@@ -238,7 +239,7 @@ class RunFolder:
         return found
 
     def forget(self, name: str) -> None:
-        """Remove a damaged file, so that its task counts as not done; it stays if it was made again meanwhile.
+        """Remove a damaged file, so that its task counts as not done; one that was made again meanwhile stays.
 
         Raises
         ------

@@ -15,9 +15,9 @@ Gate = tuple[str, str, int]  # "barrier", its pass and shot: never equal to the 
 class TaskGraph:
     """Tasks with their needs.
 
-    A worker stays in its block of frames as long as tasks are ready there; then it takes a block that no other
-    worker is in. In a block later passes come first, so that frames are finished early and records are read while
-    they are still in memory.
+    A worker stays in its block of frames as long as tasks are ready there; then it takes a block that no
+    other worker is in. In a block later passes come first, so that frames are finished early and records are
+    read while they are still in memory.
 
     Parameters
     ----------

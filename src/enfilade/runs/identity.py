@@ -62,7 +62,8 @@ def identity_of(folder: Path) -> dict[str, Any]:
         raise RunFolderError(f"{file} is damaged; run the command that made it again, or delete {folder}")
     if value.get("format") != FORMAT:
         raise RunFolderError(
-            f"{file} has format {value.get('format')!r}, this version reads format {FORMAT}; choose another --out"
+            f"{file} has format {value.get('format')!r}, this version reads format {FORMAT}; choose another "
+            "--out"
         )
     identity: dict[str, Any] = value["identity"]
     return identity

@@ -22,8 +22,8 @@ LOCK_FILE = "run.lock"
 class Lock:
     """A claim on a run folder, until :meth:`release` or the end of the process.
 
-    The kernel holds it (``flock``), so that it ends with the process. The file stays: removing it would let two
-    processes lock two files of one name.
+    The kernel holds it (``flock``), so that it ends with the process. The file stays: removing it would let
+    two processes lock two files of one name.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ class Lock:
             if not isinstance(error, BlockingIOError):
                 raise RunFolderError(f"can't lock {file}: {error.strerror}") from error
             raise RunFolderError(
-                f"another command is writing {folder}{_named(holder_of(folder))}; wait for it, stop it, or choose "
-                "another --out"
+                f"another command is writing {folder}{_named(holder_of(folder))}; wait for it, stop it, or "
+                "choose another --out"
             ) from error
         if not is_shared:
             self.sign(1)
@@ -89,8 +89,8 @@ def holder_of(folder: Path) -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        ``host``, ``pid``, ``started`` (ISO 8601) and ``workers``; None where the process is gone, which can't be
-        seen of another host.
+        ``host``, ``pid``, ``started`` (ISO 8601) and ``workers``; None where the process is gone, which can't
+        be seen of another host.
     """
     try:
         name = json.loads((folder / LOCK_FILE).read_bytes())

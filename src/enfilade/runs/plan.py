@@ -128,8 +128,8 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
 def forecast(lines: Iterable[Mapping[str, Any]], counts: Mapping[str, float]) -> tuple[float, float]:
     """Wall and CPU seconds of so many tasks of each pass, from the ledger of an excerpt.
 
-    The median task of a pass counts, so that the first one, which compiles kernels, does not. Tasks of the excerpt's
-    passes cost as much at any place of the path.
+    The median task of a pass counts, so that the first one, which compiles kernels, does not. Tasks of the
+    excerpt's passes cost as much at any place of the path.
     """
     spent: dict[str, list[tuple[float, float]]] = {}
     for line in lines:

@@ -45,15 +45,15 @@ class _Child:
 class Processes:
     """Worker processes, started when they are needed.
 
-    They are spawned, not forked: a device or a kernel of this process is not theirs. When this process dies, the
-    kernel ends them.
+    They are spawned, not forked: a device or a kernel of this process is not theirs. When this process dies,
+    the kernel ends them.
 
     Parameters
     ----------
     run
     limits
-        ``task_timeout_s``: a process that has not finished its task after this time, counted from the beginning of
-        the task, is killed; loading the scene may take ``preflight_s`` more. 0: never.
+        ``task_timeout_s``: a process that has not finished its task after this time, counted from the
+        beginning of the task, is killed; loading the scene may take ``preflight_s`` more. 0: never.
     device
         ``cpu`` or ``gpu``.
     workers
@@ -177,7 +177,8 @@ class Processes:
         child = self._children[slot]
         child.process.kill()
         self._end(slot)
-        text = f"its worker was killed: it took more than {self._limits.task_timeout_s:g} s ([limits] task_timeout_s)"
+        limit_s = self._limits.task_timeout_s
+        text = f"its worker was killed: it took more than {limit_s:g} s ([limits] task_timeout_s)"
         return Ended(slot, Failure(FailureKind.ERROR, text, _tail(child.log)))
 
     def _deadline(self, more_s: float = 0.0) -> float | None:

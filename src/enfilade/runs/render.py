@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import resource
 from collections.abc import Sequence
 from contextlib import suppress
@@ -38,8 +37,8 @@ def render(
 ) -> dict[str, Any]:
     """Render a walkthrough into a run folder, or go on with one.
 
-    Finished tasks are not done again. Killed at any moment, the same call ends with the same frames, whatever the
-    workers.
+    Finished tasks are not done again. Killed at any moment, the same call ends with the same frames, whatever
+    the workers.
 
     Parameters
     ----------
@@ -50,8 +49,8 @@ def render(
     workers
         By default this process.
     is_verified
-        Compare every file with its checksum first, and make damaged ones again. Otherwise sizes are compared now,
-        and a checksum when its file is used.
+        Compare every file with its checksum first, and make damaged ones again. Otherwise sizes are compared
+        now, and a checksum when its file is used.
     has_preflight
         Load the scene in a process of its own, with limits, before a new run begins.
 
@@ -181,8 +180,8 @@ def _of_shard(job: Job, run: RunFolder, tasks: Sequence[Task], shard: Shard) -> 
 
 def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedError:
     return UnfinishedError(
-        f"{run.folder}: pass {pass_name!r} is not finished{which}; run `enfilade work {run.folder} --pass {pass_name}` "
-        "first"
+        f"{run.folder}: pass {pass_name!r} is not finished{which}; first run `enfilade work {run.folder} "
+        f"--pass {pass_name}`"
     )
 
 
@@ -192,8 +191,6 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         check_place(folder)
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise RunFolderError(f"can't write in {folder}; choose another --out")
         if has_preflight and not (folder / LEDGER_FILE).exists():
             job.preflight()
         run = RunFolder.create(folder, job.identity())

@@ -20,12 +20,12 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``table1``: pixels traced, percent of those
-        of the finished frames, by reason. ``table2``: wall and CPU seconds, in total, by frame of the path and by
-        stage, over all sessions that worked on the run. ``per_frame``: provenance of the pixels of each finished
-        frame, percent, with the mean velocity (or None). ``rays``: per pixel and frame of the path, by kind;
-        ``rays_per_frame``: of each frame. ``segments``: the metric's result for each segment. ``dropped_samples``: NaN
-        or infinite samples that were left out.
+        ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``table1``: pixels traced, percent
+        of those of the finished frames, by reason. ``table2``: wall and CPU seconds, in total, by frame of
+        the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of the
+        pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
+        frame of the path, by kind; ``rays_per_frame``: of each frame. ``segments``: the metric's result for
+        each segment. ``dropped_samples``: NaN or infinite samples that were left out.
     """
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
