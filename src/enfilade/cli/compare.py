@@ -287,7 +287,7 @@ def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.reports.tables import comparison_table, verdict
+    from enfilade.reports.tables import comparison_table, result_line
 
-    click.echo(verdict(found))
+    click.echo(result_line(found))
     Console().print(comparison_table(found))
