@@ -133,7 +133,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     """By kind: what makes a sound file in a folder, and what reads it."""
     from enfilade.camera import load_path
     from enfilade.images import read_exr
-    from enfilade.images.pictures import picture_pixels
+    from enfilade.images.stills import image_pixels
     from enfilade.pipeline.job import read_job
     from enfilade.scene.analytic_scene import read_scene
     from enfilade.scene.scenecheck import check_scene
@@ -142,7 +142,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     return {
         "exr": (make_exr, read_exr),
         "exr of a run": (lambda folder: make_exr(folder, is_portable=False), read_exr),
-        "exr header": (make_exr, picture_pixels),
+        "exr header": (make_exr, image_pixels),
         "path": (make_path, load_path),
         "analytic": (make_analytic, read_scene),
         "scene": (make_scene, lambda file: check_scene(file, LimitSettings())),

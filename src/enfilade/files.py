@@ -1,7 +1,7 @@
-"""Files that appear whole or not at all: written beside, flushed to the disk, renamed.
+"""Atomic file writes: files are written under a temporary name, flushed to the disk and renamed.
 
-A process killed at any moment leaves the old file, or none, under the final name; what it leaves beside
-is a hidden file with :data:`MARK` in its name, which :func:`sweep` removes.
+A killed process leaves the older file or none under the final name, and possibly a temporary file
+``.NAME.writing-HOST-PID-RANDOM.SUFFIX``, which :func:`sweep` removes.
 """
 
 from __future__ import annotations
@@ -9,123 +9,108 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import secrets
+import socket
+import stat
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 
 __all__ = [
-    "MARK",
-    "flush",
-    "is_full",
-    "is_passing",
-    "json_bytes",
-    "read_json",
-    "sweep",
-    "unwritable",
-    "whole_file",
+    "MARK", "flush", "is_full", "is_passing", "json_bytes", "read_json", "sweep", "unwritable", "whole_file",
     "write_json",
-]
+]  # fmt: skip
 
-MARK = ".writing-"  # in the name of every file that isn't finished
+MARK = ".writing-"  # in the name of every temporary file
+WRITER = re.compile(re.escape(MARK) + r"(?P<host>.+)-(?P<pid>\d+)-[0-9a-f]{8}(\.[^.]*)?$")
+ABANDONED_S = 86_400.0  # a day without a write
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 LASTING = FULL | {
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.EPERM, errno.EROFS,
 }  # fmt: skip
-NO_FLUSH = frozenset({errno.EINVAL, errno.ENOTSUP})  # folders: 9p, folders shared with virtual machines
+NO_FLUSH = frozenset({errno.EINVAL, errno.ENOTSUP})  # folders on 9p and other shares of virtual machines
 
 
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
-    """Give a path beside `file` to write to; it becomes `file` when the block ends without an error.
+    """Write a file under a temporary name, and rename it when the block ends without an error.
 
     Parameters
     ----------
     file
-        The final name. Its folder is made where it is missing; a file that stands there is replaced.
+        The final name. A missing folder is made; an existing file is replaced.
 
     Yields
     ------
     Path
-        In the same folder, with the same suffix. It need not be created before the block ends: nothing
-        written is an error.
+        Temporary name in the same folder, with the same suffix. The block has to create it.
 
     Raises
     ------
     RunFolderError, NoSpaceError
-        The folder or the file can't be written, or the disk is full. Nothing is left beside it.
+        The folder or the file can't be written, or the disk is full. No temporary file is left.
     """
-    beside = file.with_name(f".{file.stem}{MARK}{os.getpid()}-{secrets.token_hex(4)}{file.suffix}")
+    writer = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
+    temporary = file.with_name(f".{file.stem}{MARK}{writer}{file.suffix}")
     try:
-        _make(file.parent)
-        yield beside
-        flush(beside)
-        beside.replace(file)
+        if not file.parent.is_dir():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            flush(file.parent.parent)
+        yield temporary
+        flush(temporary)
+        temporary.replace(file)
         flush(file.parent)
     except OSError as error:
         raise unwritable(file, error) from error
     finally:
-        _remove(beside)
+        with suppress(OSError):  # the folder can't be written: the error being raised says so
+            temporary.unlink(missing_ok=True)
 
 
 def sweep(folder: Path) -> list[Path]:
-    """Remove unfinished files that a killed process left in a folder and those in it.
+    """Remove abandoned temporary files in a folder and those in it; returns them, sorted.
 
-    Only for the one process that may write there: what another is writing would go too.
-
-    Parameters
-    ----------
-    folder
-
-    Returns
-    -------
-    list of Path
-        What was removed, sorted.
+    A file is abandoned if its process on this host has ended, or if nothing was written to it for a day.
     """
-    left = sorted(f for f in folder.rglob(f".*{MARK}*") if f.is_file() and not f.is_symlink())
-    for file in left:
-        file.unlink(missing_ok=True)
-    return left
+    removed = []
+    for file in sorted(folder.rglob(f".*{MARK}*")):
+        with suppress(FileNotFoundError):  # its writer has just renamed it
+            if _is_abandoned(file):
+                file.unlink()
+                removed.append(file)
+    return removed
+
+
+def _is_abandoned(file: Path) -> bool:
+    status = file.lstat()
+    if not stat.S_ISREG(status.st_mode):
+        return False
+    writer = WRITER.search(file.name)
+    if writer and writer["host"] == socket.gethostname() and not Path("/proc", writer["pid"]).exists():
+        return True
+    return time.time() - status.st_mtime > ABANDONED_S
 
 
 def write_json(file: Path, value: Any) -> None:
-    """Write a value as JSON, indented, keys in the order given: the same value, the same bytes.
-
-    Parameters
-    ----------
-    file
-    value
-        Of dicts, lists, strings, finite numbers, booleans and None.
-
-    Raises
-    ------
-    RunFolderError
-        The file can't be written.
-    ValueError, TypeError
-        The value holds a NaN, an infinity, or something that JSON has no word for.
-    """
+    """Write a value as JSON, see :func:`json_bytes` and :func:`whole_file`."""
     data = json_bytes(value)
-    with whole_file(file) as beside:
-        beside.write_bytes(data)
+    with whole_file(file) as temporary:
+        temporary.write_bytes(data)
 
 
 def json_bytes(value: Any) -> bytes:
-    """What :func:`write_json` writes."""
+    """Encode a value as indented JSON; ValueError or TypeError for a NaN and other values JSON lacks."""
     return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def read_json(file: Path) -> Any:
-    """Read what :func:`write_json` wrote.
-
-    Raises
-    ------
-    RunFolderError
-        The file can't be read or is no JSON.
-    """
+    """Read a JSON file; RunFolderError if it can't be read or is damaged."""
     try:
         return json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -134,58 +119,27 @@ def read_json(file: Path) -> Any:
         raise RunFolderError(f"{file} is damaged ({error}); delete it or its folder") from error
 
 
-def unwritable(file: Path, reason: OSError | str) -> EnfiladeError:
-    """Describe a file that can't be written, and what to do.
-
-    Parameters
-    ----------
-    file
-    reason
-        What the operating system or a library said.
-
-    Returns
-    -------
-    NoSpaceError or RunFolderError
-    """
-    if isinstance(reason, OSError) and is_passing(reason):
-        return RunFolderError(
-            f"can't write {file}: {reason.strerror}; look at its disk, then run the same command again: what "
-            "is finished stays"
-        )
-    text = reason.strerror or str(reason) if isinstance(reason, OSError) else reason
-    if isinstance(reason, OSError) and is_full(reason):
-        return NoSpaceError(
-            f"can't write {file}: no room on the disk ({text}); what is finished stays: make room, then run "
-            "the same command again"
-        )
-    return RunFolderError(
-        f"can't write {file}: {text}; make room or choose another folder, then run the same command "
-        "again: what is finished stays"
-    )
+def unwritable(file: Path, error: OSError) -> EnfiladeError:
+    """Make the error for a file that can't be written: a RunFolderError, or a NoSpaceError on a full disk."""
+    reason, again = error.strerror or str(error), "then run the same command again: finished files are kept"
+    if is_full(error):
+        return NoSpaceError(f"can't write {file}: no room on the disk ({reason}); make room, {again}")
+    remedy = "check its disk" if is_passing(error) else "make room or choose another folder"
+    return RunFolderError(f"can't write {file}: {reason}; {remedy}, {again}")
 
 
 def is_passing(error: OSError) -> bool:
-    """Whether the same may succeed a little later: a disk or a network did not answer as it should.
-
-    Not so where a file is missing, in the way, or forbidden, nor where the disk is full.
-    """
+    """Whether the operation may succeed later: the disk or the network failed, not the name or the room."""
     return error.errno in errno.errorcode and error.errno not in LASTING
 
 
 def is_full(error: OSError) -> bool:
-    """Whether there is no room on the disk, or no more of it for this user."""
+    """Whether the disk is full or the quota exhausted."""
     return error.errno in FULL
 
 
 def flush(path: Path) -> None:
-    """Wait until the disk has a file's bytes, or a folder's names.
-
-    A file system that can't do it for folders need not.
-
-    Raises
-    ------
-    OSError
-    """
+    """Wait until the disk has the bytes of a file or the names in a folder; OSError if it fails."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -194,16 +148,3 @@ def flush(path: Path) -> None:
             raise
     finally:
         os.close(handle)
-
-
-def _make(folder: Path) -> None:
-    if not folder.is_dir():
-        folder.mkdir(parents=True, exist_ok=True)
-        flush(folder.parent)
-
-
-def _remove(beside: Path) -> None:
-    try:
-        beside.unlink(missing_ok=True)
-    except OSError:  # its folder is a file, or has become read-only: the error on its way says so
-        return

@@ -22,7 +22,6 @@ from typing import Any
 from enfilade.comparison.measures import JUDGES, SCALES, why_missing
 from enfilade.device import Choice
 from enfilade.errors import RunFolderError, SceneError, SettingsError
-from enfilade.images.interpolate import why_no_interpolation
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Monitor
 from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job, path_identity
@@ -31,6 +30,7 @@ from enfilade.scene.scenefile import fingerprint
 from enfilade.settings import Settings
 from enfilade.store import Run
 from studies.bench.contestants import FAMILIES, Contestant
+from studies.bench.interpolate import why_no_interpolation
 from studies.bench.judging import judge, without_silent
 from studies.bench.machine import machine, versions
 from studies.bench.race import race

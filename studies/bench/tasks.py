@@ -16,7 +16,6 @@ import numpy as np
 
 from enfilade.camera.path import CameraPath
 from enfilade.images import exact_fps, write_exr, write_result
-from enfilade.images.interpolate import interpolate
 from enfilade.kernels.estimate import PASS
 from enfilade.methods.denoise import denoise, denoiser_name
 from enfilade.monitor import Monitor, Silence
@@ -30,6 +29,7 @@ from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.settings import LAYERS
 from enfilade.store import Run
 from studies.bench.guides import guides
+from studies.bench.interpolate import interpolate
 
 __all__ = ["EveryFrame", "Interpolated", "Own", "Task", "part_of"]
 

@@ -10,7 +10,7 @@ from PIL import Image
 from enfilade.cli.compare import DEPARTURES, FLOWS, IMAGES
 from enfilade.comparison import FlowChoice
 from enfilade.images import encode_video, open_sequence, write_exr
-from enfilade.images.stored import SUFFIXES
+from enfilade.images.imagefiles import SUFFIXES
 from enfilade.metric import MetricOptions
 from enfilade.reports.heatmap import HeatmapPainter
 from enfilade.settings import VideoSettings

@@ -11,7 +11,7 @@ from comparisons import SIZE, Notes, judged, terms, textured, write_run
 from enfilade.comparison import compare
 from enfilade.errors import ImageError
 from enfilade.images import encode_video
-from enfilade.images.stored import ImageFiles
+from enfilade.images.imagefiles import ImageFiles
 from enfilade.settings import VideoSettings
 
 
@@ -159,15 +159,10 @@ def test_transparent_frames_are_named(tmp_path):
 
 def test_each_frame_is_read_once(sequence, monkeypatch):
     read = []
-    from enfilade.comparison import pairs
-    from enfilade.images import open_sequence
-    from enfilade.images import stored as images
+    from enfilade.images import imagefiles as images
 
     original = images.read_exr
     monkeypatch.setattr(images, "read_exr", lambda file: read.append(file.name) or original(file))
-    monkeypatch.setattr(
-        pairs, "FencedSequence", lambda source, _limits, layer: open_sequence(source, layer=layer)
-    )
     test, reference = sequence("t", [textured()] * 5), sequence("r", [textured(0.5)] * 5, flow_px=1.0)
     judged(test, reference)
     later = [name for name in read if name != "0001.exr"]  # the first also tells size and layers
@@ -194,7 +189,7 @@ def _peak_bytes(sequences, flow):
 
     opened = iter(sequences)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pairs, "FencedSequence", lambda *_, **__: next(opened))
+        patch.setattr(pairs, "open_sequence", lambda *_, **__: next(opened))
         tracemalloc.start()
         try:
             compare("test", "reference", terms(mode="paper", flow=flow), Notes())

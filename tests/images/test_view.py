@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from enfilade.errors import SettingsError
-from enfilade.images.view import open_view
+from enfilade.images.view import open_view, view_identity
 from enfilade.settings import VideoSettings
 
 CONFIG = """ocio_profile_version: 2
@@ -44,28 +45,28 @@ def test_srgb_has_the_numbers_of_the_standard():
 
 
 @pytest.mark.parametrize(("display", "transfer"), [("sRGB", 13), ("Rec.1886 Rec.709 - Display", 1)])
-def test_opencolorio_gives_what_the_configuration_says(tmp_path, display, transfer):
+def test_opencolorio_gives_the_view_of_the_configuration(tmp_path, display, transfer):
     pytest.importorskip("PyOpenColorIO")
     linear = np.random.default_rng(0).random((5, 7, 3), np.float32)
-    before = linear.copy()
-    view = open_view(VideoSettings(ocio=config(tmp_path, display)), 1.0)
+    before, file = linear.copy(), config(tmp_path, display)
+    view = open_view(VideoSettings(ocio=file), 1.0)
     expected = open_view(VideoSettings(), 1.0).encode(linear)
     np.testing.assert_allclose(view.encode(linear), expected, atol=1e-3)
     np.testing.assert_array_equal(linear, before)
     assert view.transfer == transfer
-    raw = open_view(VideoSettings(ocio=config(tmp_path, display), view="Raw"), 0.0)
+    raw = open_view(VideoSettings(ocio=file, view="Raw"), 0.0)
     np.testing.assert_allclose(raw.encode(linear), linear, atol=1e-6)
+    identity = view_identity(VideoSettings(ocio=file))
+    assert identity.keys() == {"opencolorio", "processor"}
+    assert identity != view_identity(VideoSettings(ocio=file, view="Raw"))
+    assert view_identity(VideoSettings()) == {}
 
 
 def test_a_display_by_its_name(tmp_path):
     pytest.importorskip("PyOpenColorIO")
-    file = tmp_path / "config.ocio"
-    file.write_text(
-        CONFIG.format(display="sRGB", linear="lin_rec709").replace(
-            "active_displays",
-            "  Rec.1886:\n    - !<View> {name: Raw, colorspace: raw}\n  P3: []\nactive_displays",
-        )
-    )
+    more = "  Rec.1886:\n    - !<View> {name: Raw, colorspace: raw}\n  P3: []\nactive_displays"
+    file = Path(config(tmp_path))
+    file.write_text(file.read_text().replace("active_displays", more))
     linear = np.full((1, 1, 3), 0.25, np.float32)
     view = open_view(VideoSettings(ocio=str(file), display="Rec.1886"), 0.0)
     assert view.transfer == 1
@@ -76,21 +77,17 @@ def test_a_display_by_its_name(tmp_path):
         open_view(VideoSettings(display="sRGB"), 0.0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "view", "message"),
-    [
-        ({}, "Filmic", "no view 'Filmic' of 'sRGB'; it has: Plain, Raw"),
-        ({"display": "P3 HDR"}, "", "no display for sRGB or Rec.709; it has: P3 HDR"),
-        ({"linear": "acescg"}, "", "OpenColorIO can't use|no colour space"),
-    ],
-)
-def test_what_the_configuration_lacks_is_said(tmp_path, changes, view, message):
+def test_a_configuration_that_lacks_something(tmp_path):
     pytest.importorskip("PyOpenColorIO")
-    with pytest.raises(SettingsError, match=message):
-        open_view(VideoSettings(ocio=config(tmp_path, **changes), view=view), 0.0)
+    with pytest.raises(SettingsError, match="no view 'Filmic' of 'sRGB'; it has: Plain, Raw"):
+        open_view(VideoSettings(ocio=config(tmp_path), view="Filmic"), 0.0)
+    with pytest.raises(SettingsError, match=r"no display for sRGB or Rec\.709; it has: P3 HDR"):
+        open_view(VideoSettings(ocio=config(tmp_path, "P3 HDR")), 0.0)
+    with pytest.raises(SettingsError, match=r"OpenColorIO can't use|no colour space"):
+        open_view(VideoSettings(ocio=config(tmp_path, linear="acescg")), 0.0)
 
 
-def test_opencolorio_that_is_not_installed_is_said(tmp_path, monkeypatch):
+def test_opencolorio_that_is_not_installed(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
     with pytest.raises(SettingsError, match=r"pip install 'enfilade\[ocio\]'"):
         open_view(VideoSettings(ocio=config(tmp_path)), 0.0)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import shlex
+import socket
 
 import numpy as np
 import pytest
@@ -108,8 +109,9 @@ class Meanwhile(Silence):
 def test_who_has_the_folder_to_himself_leaves_what_is_being_encoded(made):
     _, run = made
     identity, notes = Run.existing(run).identity, []
-    (run / ".lost.writing-1-a.mkv").write_text("of one that was killed")
-    (run / "frames" / ".0001.writing-1-a.exr").write_text("of one that was killed")
+    killed = f"{socket.gethostname()}-99999999-01234567"  # no such process
+    (run / f".lost.writing-{killed}.mkv").write_text("x")
+    (run / "frames" / f".0001.writing-{killed}.exr").write_text("x")
 
     def open_it():
         with Run.open(run, identity) as sole:
@@ -119,7 +121,7 @@ def test_who_has_the_folder_to_himself_leaves_what_is_being_encoded(made):
     assert len(open_sequence(run / "meanwhile.mkv")) == FRAMES
     (run / "meanwhile.mkv").unlink()
     open_it()
-    assert notes == ["removed 1 unfinished files of a run that was interrupted"] * 2
+    assert notes == ["removed 2 unfinished files of a run that was interrupted"]
     assert not list(run.rglob(".*writing*"))
 
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 from types import SimpleNamespace
 
 import pytest
@@ -14,13 +15,12 @@ from enfilade.pipeline import crew, finish, worker
 from enfilade.pipeline.crew import Crew
 from enfilade.pipeline.walkthrough import render
 from enfilade.store import Run
-from enfilade.store.guest import guest
 from scenes_analytic import room, room_walk
 from small_runs import Told, Watcher, children, job_of
 
 COUNT = 6
 DAMAGED = "frames/0001.exr"
-PARTIAL = "frames/.0001.writing-1-a.exr"
+PARTIAL = f"frames/.0001.writing-{socket.gethostname()}-99999999-01234567.exr"  # no such process
 
 
 @pytest.fixture
@@ -130,20 +130,19 @@ def test_files_of_workers_that_died_while_they_wrote_are_removed(folder, trace, 
     assert not (folder / PARTIAL).exists()
 
 
-def test_files_that_a_guest_is_writing_stay(folder, trace):
+def test_files_that_a_living_process_is_writing_stay(folder, trace):
+    living = folder / f".encoded.writing-{socket.gethostname()}-{os.getpid()}-01234567.mp4"
     with Run.open(folder, {}) as run:
 
         def do(number):
             (folder / PARTIAL).write_text("x")
-            (folder / ".encoded.writing-1-a.mp4").write_text("x")
+            living.write_text("x")
             finished(run, number)
 
-        with guest(folder):
-            trace(run, do)
+        trace(run, do)
     assert not (folder / PARTIAL).exists()
-    assert (folder / ".encoded.writing-1-a.mp4").exists()
     Run.open(folder, {}).close()
-    assert not (folder / ".encoded.writing-1-a.mp4").exists()
+    assert living.exists()
 
 
 @pytest.mark.parametrize(("after", "tries"), [(3, 1), (None, 4)])

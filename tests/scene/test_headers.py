@@ -8,7 +8,7 @@ from PIL import Image
 
 from enfilade.device import active
 from enfilade.errors import ImageError, SceneError
-from enfilade.images.pictures import picture_pixels
+from enfilade.images.stills import image_pixels
 from enfilade.scene.headers import mesh_elements, pixels
 from enfilade.scene.scenecheck import check_scene
 from enfilade.settings import LimitSettings
@@ -119,7 +119,7 @@ def test_a_picture_has_as_many_pixels_as_mitsuba_finds(tmp_path, name, data, cou
         (b"PFx4294967295 1 1 -1\n", "header is damaged"),
         (b"\0\0\2\0\1\0" + targa(65535, 65535)[6:], "4294.84 million pixels"),  # also a cursor's header
         (b"PF\n40000 30000\n-1.0\n\0", "1200 million pixels"),
-        (b"P6\n40000 30000\n255\n\0", "1200 million pixels|no picture that can be read"),
+        (b"P6\n40000 30000\n255\n\0", "1200 million pixels|can't read"),
     ],
 )
 def test_pictures_are_known_by_what_is_in_them(named, name, data, words):
@@ -129,14 +129,14 @@ def test_pictures_are_known_by_what_is_in_them(named, name, data, words):
 def test_the_kinds_of_pictures_are_those_that_mitsuba_reads(tmp_path):
     for kind in ("PNG", "BMP", "JPEG", "PPM", "TGA"):
         Image.new("RGB", (4, 3)).save(tmp_path / "a.png", kind)
-        assert picture_pixels(tmp_path / "a.png") == 12
+        assert image_pixels(tmp_path / "a.png") == 12
     for kind in ("TIFF", "ICO", "GIF"):
         Image.new("RGB", (16, 16)).save(tmp_path / "a.png", kind)
-        with pytest.raises(ImageError, match="no picture that can be read"):
-            picture_pixels(tmp_path / "a.png")
+        with pytest.raises(ImageError, match="can't read"):
+            image_pixels(tmp_path / "a.png")
     (tmp_path / "a.png").write_bytes(RADIANCE + b"\n-Y 2 +X 3\n")  # left to `pixels`
-    with pytest.raises(ImageError, match="no picture that can be read"):
-        picture_pixels(tmp_path / "a.png")
+    with pytest.raises(ImageError, match="can't read"):
+        image_pixels(tmp_path / "a.png")
 
 
 def test_a_large_picture_by_another_name(named):

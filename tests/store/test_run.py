@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -303,11 +304,12 @@ def test_a_full_disk_leaves_the_ledger_as_it_was(folder, monkeypatch):
 
 
 HOLDER = """
-import sys, time
+import os, socket, sys, time
 from pathlib import Path
 from enfilade.store import Run
 run = Run.open(Path(sys.argv[1]), {})
-(Path(sys.argv[1]) / ".0001.writing-1-a.exr").write_text("x")
+name = f".0001.writing-{socket.gethostname()}-{os.getpid()}-01234567.exr"
+(Path(sys.argv[1]) / name).write_text("x")
 print("held", flush=True)
 time.sleep(60)
 """
@@ -334,7 +336,9 @@ def test_a_lock_names_its_live_holder_and_goes_with_a_dead_one(folder):
 def test_a_run_killed_before_it_had_an_identity_begins_anew(folder):
     folder.mkdir(parents=True)
     (folder / "run.lock").write_text("")
-    (folder / ".run.writing-77-aa.json").write_text("{")
+    (folder / f".run.writing-{socket.gethostname()}-99999999-01234567.json").write_text(
+        "{"
+    )  # no such process
     with Run.open(folder, IDENTITY) as run:
         assert "1 unfinished" in run.notes[0]
     assert sorted(f.name for f in folder.iterdir()) == ["ledger.jsonl", "run.json", "run.lock"]

@@ -35,7 +35,7 @@ DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would l
     "transient",
 )
 IMAGES = frozenset(  # frames of which a heat map takes the name: `SUFFIXES`, which --help can't ask either
-    {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp", ".ppm"}
+    {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"}
 )
 
 
@@ -118,7 +118,7 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @json_option
 @quiet_option
 @debug_option
-@settings_options("viewing", "metric", "limits.trial_mb", "limits.trial_s")
+@settings_options("viewing", "metric")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -134,7 +134,7 @@ def command(
 ) -> None:
     """Judge TEST against REFERENCE with the animation quality metric.
 
-    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP, PPM), a pattern such
+    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), a pattern such
     as frames/%04d.exr, or a video.
 
     The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical, 1
@@ -200,7 +200,6 @@ def _terms(
         fps=fps,
         exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
         has_kernels=device != "none",
-        limits=settings.limits,
         layers=(layers[0], layers[-1]) if layers else (None, None),
     )
 

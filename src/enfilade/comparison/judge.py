@@ -17,7 +17,7 @@ from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Comparison, MetricOptions, Pursuit, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
-from enfilade.settings import LimitSettings, MetricSettings, ViewingSettings
+from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
 __all__ = ["JudgedFrame", "Terms", "compare", "kernels_serve", "metric_options"]
@@ -74,8 +74,6 @@ class Terms:
     has_kernels
         Whether the modern mode's per-pixel part runs in Dr.Jit kernels, on the device that is active; see
         :func:`kernels_serve`.
-    limits
-        Memory and time of the processes that decode.
     layers
         Of the test's and of the reference's OpenEXR frames: the layer or part that is the picture.
     """
@@ -88,7 +86,6 @@ class Terms:
     fps: float | None = None
     exposure_ev: float | None = None
     has_kernels: bool = False
-    limits: LimitSettings = field(default_factory=LimitSettings)
     layers: tuple[str | None, str | None] = (None, None)
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
@@ -133,9 +130,7 @@ def compare(
         A sequence can't be read, the two differ in length, size or frame rate, they are runs of other
         frames, or pixels are NaN or infinite. The message names the frame.
     """
-    pairs = open_pairs(
-        test, reference, terms.limits, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers
-    )
+    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers)
     conditions = terms.conditions(pairs.size, pairs.fps)
     motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
     monitor.say(motion.text)

@@ -11,11 +11,10 @@ import numpy as np
 
 from enfilade.errors import ImageError
 from enfilade.files import read_json
-from enfilade.images import FencedSequence, Sequence
+from enfilade.images import Sequence, open_sequence
 from enfilade.kernels.tone import display_luminance, srgb_encode
 from enfilade.monitor import Monitor
 from enfilade.records import F32
-from enfilade.settings import LimitSettings
 from enfilade.viewing import Viewing
 
 __all__ = ["Pair", "Pairs", "open_pairs"]
@@ -142,20 +141,17 @@ class Pairs:
 def open_pairs(
     test: Path | str,
     reference: Path | str,
-    limits: LimitSettings,
     *,
     fps: float | None,
     exposure_ev: float | None,
     layers: tuple[str | None, str | None] = (None, None),
 ) -> Pairs:
-    """Open two sequences to be compared, each decoded by a process of its own.
+    """Open two sequences to be compared.
 
     Parameters
     ----------
     test, reference
         Whatever :func:`enfilade.images.open_sequence` reads.
-    limits
-        Memory and time of those processes.
     fps, exposure_ev
         See :class:`Pairs`.
     layers
@@ -168,7 +164,7 @@ def open_pairs(
         rate, or are runs of other frames or of different exposure.
     """
     sides = zip((test, reference), layers, strict=True)
-    sequences = [FencedSequence(source, limits, layer=layer) for source, layer in sides]
+    sequences = [open_sequence(source, layer=layer) for source, layer in sides]
     if any(layers) and not any(_is_exr(sequence) for sequence in sequences):
         raise ImageError(
             f"neither {sequences[0].name(0)} nor {sequences[1].name(0)} has layers; leave out --layer, which "

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from enfilade.images.codecs import video_suffix
-from enfilade.images.encode import check_encodable, encode_video, exact_fps, join_videos
+from enfilade.images.encode import check_encodable, encode_video, exact_fps
 from enfilade.images.exr import read_attributes, read_exr, write_exr
-from enfilade.images.fence import FencedSequence
+from enfilade.images.join import join_videos
 from enfilade.images.sequence import Sequence, files_of, open_sequence
 
 __all__ = [
-    "FencedSequence",
     "Sequence",
     "check_encodable",
     "encode_video",

@@ -1,4 +1,4 @@
-"""Which layer of an OpenEXR file is the picture; renderers and compositing programs name it differently."""
+"""The beauty layer of an OpenEXR file, which renderers and compositing programs name differently."""
 
 from __future__ import annotations
 
@@ -11,44 +11,47 @@ from enfilade.errors import ImageError
 from enfilade.images.exr import color_layers
 from enfilade.records import F32
 
-__all__ = ["choose_layer", "picture_in"]
+__all__ = ["beauty", "choose_layer"]
 
-PICTURES = ("rgb", "rgba", "beauty", "c", "combined")  # last word of a name, the best first
-ASK = "say by --layer which is the picture (once for both sequences, or for the test, then the reference)"
+BEAUTY_NAMES = {
+    "rgb": 0,
+    "rgba": 1,
+    "beauty": 2,
+    "c": 3,
+    "combined": 4,
+}  # by the last word
+ADVICE = "choose the beauty layer with --layer (once for both sequences, or for the test, then the reference)"
 
 
 def choose_layer(file: Path, wanted: str | None = None) -> tuple[str, str]:
-    """Choose a layer by the headers of a file.
+    """Choose the beauty layer from the headers of a file.
 
     Parameters
     ----------
     file
     wanted
-        A layer or part, whole or its last word (`Combined` of `View Layer.Combined`), in any case.
-        By default R G B without a name, else what is called rgba, beauty, C or Combined, else the only one
-        of three channels.
+        A layer or part, by its whole name or the last word (`Combined` of `View Layer.Combined`), in any
+        case. By default R G B without a name, else rgba, beauty, C or Combined, else the only layer of R G B.
 
     Returns
     -------
-    name : str
-        Of the layer; empty where the file has none of R G B.
-    note : str
-        What was chosen where that is not plain; else empty.
+    name, note : str
+        Of the layer, empty if the file has no R G B; and a note on the choice, where it is not obvious.
 
     Raises
     ------
     ImageError
-        There is no such layer, or nothing tells which of several is the picture.
+        There is no such layer, or there are several candidates.
     """
     names = color_layers(file)
     if wanted is not None:
         return _named(file, names, wanted), ""
     if not names:
         return "", ""
-    ranks = [_rank(name) for name in names]
-    best = [name for name, rank in zip(names, ranks, strict=True) if rank == min(ranks)]
+    ranks = {name: BEAUTY_NAMES.get(_last_word(name), len(BEAUTY_NAMES)) for name in names}
+    best = [name for name in names if ranks[name] == min(ranks.values())]
     if len(best) > 1:
-        raise ImageError(f"{file} has the colour layers {', '.join(best)}; {ASK}")
+        raise ImageError(f"{file} has the colour layers {', '.join(best)}; {ADVICE}")
     (name,) = best
     if len(names) == 1 or name == "RGB":
         return name, ""
@@ -56,21 +59,15 @@ def choose_layer(file: Path, wanted: str | None = None) -> tuple[str, str]:
     return name, f"colours: the layer {name} of {file}; --layer chooses another: {others}"
 
 
-def picture_in(file: Path, layers: dict[str, Any], name: str) -> F32:
-    """Colours of a layer, or of the luminance channel `Y`, linear Rec.709.
+def beauty(file: Path, layers: dict[str, Any], name: str) -> F32:
+    """Colours of a layer as (H, W, 3) float32, or of the luminance channel `Y` if its name is empty.
 
     Parameters
     ----------
     file
         For messages.
-    layers
-        From :func:`~enfilade.images.read_exr`.
-    name
-        From :func:`choose_layer`.
-
-    Returns
-    -------
-    (H, W, 3) float32
+    layers, name
+        From :func:`~enfilade.images.read_exr` and :func:`choose_layer`.
 
     Raises
     ------
@@ -93,18 +90,11 @@ def picture_in(file: Path, layers: dict[str, Any], name: str) -> F32:
 def _named(file: Path, names: tuple[str, ...], wanted: str) -> str:
     if wanted in names:
         return wanted
-    alike = [n for n in names if wanted.lower() in (n.lower(), _last_word(n))]
+    alike = [name for name in names if wanted.lower() in (name.lower(), _last_word(name))]
     if len(alike) == 1:
         return alike[0]
-    if alike:
-        raise ImageError(f"{file} has several colour layers {wanted}: {', '.join(alike)}; {ASK}")
-    listed = f"the colour layers {', '.join(names)}" if names else "no layer of R G B"
-    raise ImageError(f"{file} has no colour layer {wanted}; it has {listed}; {ASK}")
-
-
-def _rank(name: str) -> int:
-    word = _last_word(name)
-    return PICTURES.index(word) if word in PICTURES else len(PICTURES)
+    problem = f"several colour layers {wanted}" if alike else f"no colour layer {wanted}"
+    raise ImageError(f"{file} has {problem}; it has the colour layers {', '.join(names) or 'none'}; {ADVICE}")
 
 
 def _last_word(name: str) -> str:

@@ -1,4 +1,4 @@
-"""The codecs that a video can be encoded with, and what each is told."""
+"""The codecs of encoded videos, with their containers and encoder options."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from enfilade.errors import SettingsError
 
-__all__ = ["Codec", "codec_named", "odd_size_note", "video_suffix"]
+__all__ = ["CODECS", "Codec", "codec_named", "odd_size_note", "video_suffix"]
 
 
 @dataclass(frozen=True)
@@ -18,68 +18,48 @@ class Codec:
     ----------
     encoder : str
         FFmpeg's name.
-    container, suffix : str
-    pixels : str
-        FFmpeg's pixel format.
+    suffix : str
+        Of the file; it determines the container.
     bits : int
         Of a sample.
-    odd_pixels : str
-        Pixel format where width or height is odd; empty where that can't be encoded.
-    least : int
-        Smallest width and height.
-    worst_quality : int
-        Largest rate factor; 0 where there is none to choose.
+    pixel_format : str
+        FFmpeg's name.
+    odd_pixel_format : str
+        Pixel format for an odd width or height; empty if the codec can't encode one.
+    min_side : int
+        Smallest width and height, pixels.
+    max_quality : int
+        Largest rate factor; 0 if the codec has none.
     options : mapping of str to str
-        For the encoder.
+        Of the encoder.
     """
 
     encoder: str
-    container: str
     suffix: str
-    pixels: str
     bits: int
-    odd_pixels: str
-    least: int
-    worst_quality: int
+    pixel_format: str
+    odd_pixel_format: str
+    min_side: int
+    max_quality: int
     options: Mapping[str, str]
 
-    def pixels_for(self, width: int, height: int) -> str:
-        """Pixel format for an image of that size.
-
-        Raises
-        ------
-        SettingsError
-            The codec can't encode it.
-        """
-        if min(width, height) < self.least:
-            raise SettingsError(
-                f"{self.encoder} can't encode {width}x{height} pixels, {self.least} is its least; "
-                "choose another [video] codec"
-            )
-        if not (width % 2 or height % 2):
-            return self.pixels
-        if not self.odd_pixels:
-            raise SettingsError(
-                f"{self.encoder} can't encode {width}x{height} pixels; choose an even size or another "
-                "[video] codec"
-            )
-        return self.odd_pixels
+    def pixel_format_for(self, width: int, height: int) -> str:
+        """Pixel format for an image size; SettingsError if the codec can't encode it."""
+        problem = f"{self.encoder} can't encode {width}x{height} pixels"
+        if min(width, height) < self.min_side:
+            raise SettingsError(f"{problem}: {self.min_side} is its least; choose another [video] codec")
+        chosen = self.odd_pixel_format if width % 2 or height % 2 else self.pixel_format
+        if not chosen:
+            raise SettingsError(f"{problem}; choose an even size or another [video] codec")
+        return chosen
 
     def options_for(self, quality: int) -> dict[str, str]:
-        """Options of the encoder for a rate factor.
-
-        Raises
-        ------
-        SettingsError
-            The factor is out of the codec's range.
-        """
-        if not self.worst_quality:
+        """Options of the encoder for a rate factor; SettingsError if it is out of range."""
+        if not self.max_quality:
             return dict(self.options)
-        if quality > self.worst_quality:
-            raise SettingsError(
-                f"[video] quality = {quality} is out of range for {self.encoder}: it must be between 0 and "
-                f"{self.worst_quality}"
-            )
+        if quality > self.max_quality:
+            known = f"between 0 and {self.max_quality} for {self.encoder}"
+            raise SettingsError(f"[video] quality = {quality} is out of range: it must be {known}")
         return {**self.options, "crf": str(quality)}
 
 
@@ -88,7 +68,7 @@ CODECS = {
     # one type of CPU, whatever the number of threads. Short look-aheads bound the frames
     # held: at 1920x1080 memory stops growing after 30 frames of H.264 (0.5 GB), 100 of AV1 (1.1 GB).
     "h264": Codec(
-        "libx264", "mp4", ".mp4", "yuv420p", 8, "yuv444p", 2, 51,
+        "libx264", ".mp4", 8, "yuv420p", "yuv444p", 2, 51,
         {
             "preset": "medium",
             "threads": "1",
@@ -96,58 +76,33 @@ CODECS = {
         },
     ),
     "ffv1": Codec(
-        "ffv1", "matroska", ".mkv", "gbrp12le", 12, "gbrp12le", 1, 0,
+        "ffv1", ".mkv", 12, "gbrp12le", "gbrp12le", 1, 0,
         {"level": "3", "slicecrc": "1", "slices": "4", "coder": "1"},
     ),
     "av1": Codec(
-        "libsvtav1", "mp4", ".mp4", "yuv420p10le", 10, "", 64, 63,
+        "libsvtav1", ".mp4", 10, "yuv420p10le", "", 64, 63,
         {"preset": "6", "svtav1-params": "lp=1:lookahead=16"},
     ),
-    "prores": Codec("prores_ks", "mov", ".mov", "yuv444p10le", 10, "yuv444p10le", 2, 0, {"profile": "4444"}),
+    "prores": Codec("prores_ks", ".mov", 10, "yuv444p10le", "yuv444p10le", 2, 0, {"profile": "4444"}),
 }  # fmt: skip
 
 
 def codec_named(name: str) -> Codec:
-    """Codec of a setting.
-
-    Raises
-    ------
-    SettingsError
-        There is none of that name.
-    """
+    """Codec of a setting; SettingsError if there is none of that name."""
     if name not in CODECS:
         raise SettingsError(f"unknown [video] codec {name!r}; known are: {', '.join(CODECS)}")
     return CODECS[name]
 
 
 def video_suffix(codec: str) -> str:
-    """Suffix of a video file, with its dot, by the codec's name in the settings.
-
-    Raises
-    ------
-    SettingsError
-        There is none of that name.
-    """
+    """Suffix of a video file, with its dot; SettingsError if there is no such codec."""
     return codec_named(codec).suffix
 
 
 def odd_size_note(codec: str, width: int, height: int) -> str:
-    """Say where few players show a video because its width or height is odd; empty where it is not so.
-
-    Parameters
-    ----------
-    codec
-        Its name in the settings.
-    width, height
-        Pixels.
-
-    Returns
-    -------
-    str
-        With the even size next below.
-    """
+    """Note that few players show a video of odd width or height, with the next smaller even size; or ""."""
     known = codec_named(codec)
-    if known.pixels_for(width, height) == known.pixels:
+    if known.pixel_format_for(width, height) == known.pixel_format:
         return ""
     return (
         f"{width}x{height} pixels: of odd sizes {codec} makes 4:4:4 video, which QuickTime, Safari, Firefox "

@@ -18,12 +18,8 @@ __all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "open_view", "view_identit
 BT709_TRANSFER = 1  # ITU-T H.273, table 3
 SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
 LINEAR_REC709 = (
-    "Linear Rec.709 (sRGB)",
-    "lin_rec709",
-    "Linear Rec.709",
-    "lin_srgb",
-    "Utility - Linear - sRGB",
-)
+    "Linear Rec.709 (sRGB)", "lin_rec709", "Linear Rec.709", "lin_srgb", "Utility - Linear - sRGB",
+)  # fmt: skip
 DISPLAYS = (("srgb", SRGB_TRANSFER), ("rec.1886", BT709_TRANSFER), ("rec.709", BT709_TRANSFER))
 
 
@@ -36,7 +32,7 @@ class View:
     encode : callable
         (H, W, 3) float32 scene-linear Rec.709 -> encoded values, 0..1, Rec.709 primaries.
     transfer : int
-        What the encoded values are tagged with, ITU-T H.273, table 3.
+        Colour tag of the encoded values, ITU-T H.273, table 3.
     """
 
     encode: Callable[[F32], F32]
@@ -49,9 +45,8 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     Parameters
     ----------
     settings
-        ``ocio``, ``display`` and ``view`` choose; without a view, the default one of the display. The display
-        is one for sRGB, Rec.1886 or Rec.709, unnamed the first one of these: wide-gamut and HDR displays
-        aren't encoded.
+        ``ocio``, ``display`` and ``view`` count. By default the display is the first one for sRGB, Rec.1886
+        or Rec.709, and the view its default one; wide-gamut and HDR displays are not supported.
     exposure_ev
         Stops, before the transform.
 
@@ -59,12 +54,12 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     ------
     SettingsError
         OpenColorIO is not installed, or the configuration has no such view, no usable display, or no
-        name for linear Rec.709.
+        colour space for linear Rec.709.
     """
     gain = np.float32(2.0**exposure_ev)
     if not settings.ocio:
-        for name in ("view", "display"):
-            if value := getattr(settings, name):
+        for name, value in (("view", settings.view), ("display", settings.display)):
+            if value:
                 raise SettingsError(f"[video] {name} = {value!r} needs a configuration: set [video] ocio too")
         return View(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
     processor, transfer = _open_ocio(settings)
@@ -79,23 +74,7 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
 
 
 def view_identity(settings: VideoSettings) -> dict[str, str]:
-    """What makes the values of an OpenColorIO view what they are; empty for sRGB.
-
-    Parameters
-    ----------
-    settings
-
-    Returns
-    -------
-    dict
-        ``opencolorio``, its version, and ``processor``, its hash of all steps of the view with the tables in
-        them, wherever the files lie.
-
-    Raises
-    ------
-    SettingsError
-        As of :func:`open_view`.
-    """
+    """Version of OpenColorIO and hash of the view with its tables; empty for sRGB; errors as above."""
     if not settings.ocio:
         return {}
     processor, _ = _open_ocio(settings)
@@ -106,7 +85,7 @@ def view_identity(settings: VideoSettings) -> dict[str, str]:
 
 def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
     """OpenColorIO's processor for a view, and the transfer of its display."""
-    file, view = settings.ocio, settings.view
+    file = settings.ocio
     try:
         import PyOpenColorIO
     except ImportError as error:
@@ -116,19 +95,18 @@ def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
     try:
         config = PyOpenColorIO.Config.CreateFromFile(file)
         display, transfer = _display(config, settings)
-        views = list(config.getViews(display))
-        chosen = view or config.getDefaultView(display)
-        if chosen not in views:
-            raise SettingsError(f"{file} has no view {chosen!r} of {display!r}; it has: {', '.join(views)}")
-        processor = config.getProcessor(
-            _linear_rec709(config, file), display, chosen, PyOpenColorIO.TRANSFORM_DIR_FORWARD
-        )
+        views, view = list(config.getViews(display)), settings.view or config.getDefaultView(display)
+        if view not in views:
+            raise SettingsError(f"{file} has no view {view!r} of {display!r}; it has: {', '.join(views)}")
+        linear, forward = _linear_rec709(config, file), PyOpenColorIO.TRANSFORM_DIR_FORWARD
+        processor = config.getProcessor(linear, display, view, forward)
     except (PyOpenColorIO.Exception, PyOpenColorIO.ExceptionMissingFile) as error:
         raise SettingsError(f"OpenColorIO can't use {file}: {error}") from error
     return processor, transfer
 
 
 def _display(config: Any, settings: VideoSettings) -> tuple[str, int]:
+    """Name and transfer of the display."""
     names = list(config.getDisplays())
     for start, transfer in DISPLAYS:
         for name in names:
@@ -142,7 +120,6 @@ def _display(config: Any, settings: VideoSettings) -> tuple[str, int]:
 
 def _linear_rec709(config: Any, file: str) -> str:
     for name in LINEAR_REC709:
-        space = config.getColorSpace(name)
-        if space is not None:
+        if (space := config.getColorSpace(name)) is not None:
             return str(space.getName())
     raise SettingsError(f"{file} has no colour space for linear Rec.709, such as {LINEAR_REC709[0]!r}")

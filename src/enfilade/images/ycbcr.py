@@ -1,23 +1,31 @@
-"""R'G'B' <-> Y'CbCr (ITU-T H.273, 8.3), by ourselves: the same bytes on any machine.
+"""R'G'B' <-> Y'CbCr (ITU-T H.273, 8.3), and planes of samples <-> FFmpeg's frames.
 
-FFmpeg's converter takes BT.601 where it is not told otherwise, rounds as its SIMD does, and repeats chroma.
+FFmpeg's own converter repeats chroma, and its rounding depends on the processor; this one gives the same
+bytes on every machine.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import av
 import numpy as np
 import numpy.typing as npt
 
 from enfilade.records import F32
 
-__all__ = ["BT601", "BT709", "DITHER", "planes_from_rgb", "quantized", "rgb_from_planes"]
+__all__ = [
+    "BT601", "BT709", "DITHER", "FULL_RANGE", "LIMITED_RANGE", "MATRICES", "Plane", "frame_of",
+    "planes_from_rgb", "planes_of", "quantized", "rgb_from_planes",
+]  # fmt: skip
 
 Plane = npt.NDArray[Any]
 
 BT709 = (0.2126, 0.0722)  # K_R, K_B, ITU-R BT.709-6, item 3.2
 BT601 = (0.299, 0.114)  # K_R, K_B, ITU-R BT.601-7, 2.5.1
+MATRICES = {1: BT709, 5: BT601, 6: BT601}  # ITU-T H.273, table 4
+LIMITED_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVColorRange
 
 
 def _bayer(levels: int) -> F32:
@@ -30,8 +38,8 @@ def _bayer(levels: int) -> F32:
     return thresholds
 
 
-# Bayer, ICC 1973. As large as the blocks that H.264 transforms: what can be said of them in few numbers, x264
-# keeps at CRF 16. Blue noise it takes away, and smooth walls have their bands again.
+# Bayer, ICC 1973. As large as the transform blocks of H.264: few coefficients describe it, and x264 keeps it
+# at CRF 16. Blue noise is removed by the encoder, and smooth walls show bands again.
 DITHER = _bayer(3)
 
 
@@ -47,11 +55,11 @@ def planes_from_rgb(
     bits
         Of a sample: 8 (uint8 planes) to 16 (uint16).
     is_halved
-        Whether chroma has half the columns and rows (4:2:0), placed on the left luma column between two
-        rows, as H.264 and AV1 take it where nothing is said.
+        4:2:0: chroma has half the columns and rows, sited on the left luma column between two rows, the
+        default of H.264 and AV1.
     is_dithered
-        Whether :data:`DITHER` is added before rounding, mirrored for each chroma. What lies between two codes
-        is then a mixture of both, which is right in the mean; what is a code stays what it is.
+        Add :data:`DITHER` before rounding, mirrored for each chroma. Values between two codes become a
+        mixture of both with the right mean; values that are codes do not change.
 
     Returns
     -------
@@ -66,7 +74,9 @@ def planes_from_rgb(
         blue, red = _halved(blue), _halved(red)
     unit = 2.0 ** (bits - 8)
     y, cb, cr = (
-        quantized(values * scale + zero + is_dithered * _tiled(pattern, values) / unit, bits, unit=unit)
+        quantized(
+            values * scale + zero + (_tiled(pattern, values) / unit if is_dithered else 0.0), bits, unit=unit
+        )
         for values, scale, zero, pattern in (
             (luma, 219.0, 16.0, DITHER),
             (blue, 224.0, 128.0, DITHER[::-1]),
@@ -77,14 +87,14 @@ def planes_from_rgb(
 
 
 def rgb_from_planes(
-    planes: tuple[Plane, Plane, Plane], *, bits: int, weights: tuple[float, float], is_full_range: bool
+    planes: Sequence[Plane], *, bits: int, weights: tuple[float, float], is_full_range: bool
 ) -> F32:
     """Decode Y', Cb, Cr to encoded R'G'B', the inverse of :func:`planes_from_rgb`.
 
     Parameters
     ----------
-    planes : tuple of (H, W), (H', W'), (H', W')
-        Chroma of full or half columns and rows; half columns lie on the left luma column.
+    planes : sequence of (H, W), (H', W'), (H', W')
+        Chroma of full or half columns and rows, sited as there.
     bits
         Of a sample.
     weights
@@ -121,10 +131,28 @@ def quantized(values: F32, bits: int, *, unit: float) -> Plane:
     return integers
 
 
+def frame_of(planes: Sequence[Plane], pixel_format: str) -> Any:
+    """A frame of FFmpeg's planar `pixel_format` (little-endian), of the size of the first plane."""
+    height, width = planes[0].shape
+    frame = av.VideoFrame(width, height, pixel_format)
+    for target, samples in zip(frame.planes, planes, strict=True):
+        rows = np.zeros((target.height, target.line_size), np.uint8)
+        raw = np.ascontiguousarray(samples).view(np.uint8)
+        rows[:, : raw.shape[1]] = raw
+        target.update(rows)
+    return frame
+
+
+def planes_of(frame: Any) -> list[Plane]:
+    """The first three planes of a frame of FFmpeg in a planar little-endian format, not copied."""
+    kind = np.dtype("<u2") if frame.format.components[0].bits > 8 else np.dtype(np.uint8)
+    rows = [np.frombuffer(p, kind).reshape(p.height, p.line_size // kind.itemsize) for p in frame.planes[:3]]
+    return [samples[:, : p.width] for samples, p in zip(rows, frame.planes, strict=False)]
+
+
 def _tiled(pattern: F32, values: F32) -> F32:
     height, width = values.shape
-    rows, columns = pattern.shape
-    tiled: F32 = np.tile(pattern, (-(-height // rows), -(-width // columns)))[:height, :width]
+    tiled: F32 = np.tile(pattern, (height // len(pattern) + 1, width // len(pattern) + 1))[:height, :width]
     return tiled
 
 
@@ -140,8 +168,8 @@ def _halved(plane: F32) -> F32:
 
 def _doubled(plane: F32, height: int, width: int) -> F32:
     if plane.shape[1] < width:
-        nxt = np.pad(plane, ((0, 0), (0, 1)), mode="edge")[:, 1:]
-        plane = np.stack([plane, 0.5 * (plane + nxt)], axis=2).reshape(plane.shape[0], -1)[:, :width]
+        following = np.pad(plane, ((0, 0), (0, 1)), mode="edge")[:, 1:]
+        plane = np.stack([plane, 0.5 * (plane + following)], axis=2).reshape(plane.shape[0], -1)[:, :width]
     if plane.shape[0] < height:
         around = np.pad(plane, ((1, 1), (0, 0)), mode="edge")
         above, below = 0.25 * around[:-2] + 0.75 * plane, 0.25 * around[2:] + 0.75 * plane

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from enfilade.errors import ImageError, SceneError
 from enfilade.images.exr import MAGIC
-from enfilade.images.pictures import PICTURES, picture_pixels
+from enfilade.images.stills import MITSUBA_SUFFIXES, image_pixels
 
 __all__ = ["check_volume", "mesh_elements", "pixels"]
 
@@ -41,10 +41,10 @@ def pixels(file: Path) -> int:
     if start.startswith((b"PF", b"Pf")) and not start[2:3].isspace():
         raise ImageError(f"{file} is a portable float map whose header is damaged")
     if start.startswith(KINDS):
-        return picture_pixels(file)
+        return image_pixels(file)
     if end == TARGA_END and len(start) >= TARGA.size:
         return prod(TARGA.unpack_from(start))
-    return picture_pixels(file) if file.suffix.lower() in PICTURES else 0
+    return image_pixels(file) if file.suffix.lower() in MITSUBA_SUFFIXES else 0
 
 
 def check_volume(file: Path) -> None:

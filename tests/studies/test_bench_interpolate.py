@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from enfilade.images.interpolate import interpolate, why_no_interpolation
+from studies.bench.interpolate import interpolate, why_no_interpolation
 
 pytestmark = pytest.mark.skipif(bool(why_no_interpolation()), reason="this FFmpeg lacks minterpolate")
 HEIGHT, WIDTH = 48, 64

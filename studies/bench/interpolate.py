@@ -1,4 +1,4 @@
-"""Frames made up between others by FFmpeg's ``minterpolate``: motion estimated from the images alone."""
+"""Frame interpolation by FFmpeg's ``minterpolate``, which estimates motion from the images alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import av.filter
 import numpy as np
 
 from enfilade.errors import SettingsError
-from enfilade.images.ycbcr import BT709, planes_from_rgb, rgb_from_planes
+from enfilade.images.ycbcr import BT709, frame_of, planes_from_rgb, planes_of, rgb_from_planes
 from enfilade.kernels.tone import srgb_decode, srgb_encode
 from enfilade.records import F32
 
@@ -19,27 +19,27 @@ __all__ = ["interpolate", "why_no_interpolation"]
 
 FILTER = "minterpolate"
 OPTIONS = (
-    "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # its best: overlapped blocks of any size
+    "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # the best: overlapped blocks of any size
 )
-PIXELS = "yuv444p"  # the filter knows 8 bits only
-MARGIN = 4  # repeats of the first and the last frame: the filter looks at two frames on either side
+PIXELS = "yuv444p"  # the filter supports 8 bits only
+MARGIN = 4  # repeats of the first and the last frame: the filter uses two frames on either side
 
 
 def interpolate(keyframes: Mapping[int, F32], fps: Fraction) -> Iterator[tuple[int, F32]]:
-    """Make up the frames between keyframes.
+    """Interpolate the frames between keyframes.
 
     Parameters
     ----------
     keyframes : mapping of int to (H, W, 3) float32
-        Linear Rec.709, by the number of the frame, two or more, rising.
+        Linear Rec.709, two or more, by frame number.
     fps
-        Frames per second; only the distances of the keyframes count.
+        Frames per second.
 
     Yields
     ------
     int, (H, W, 3) float32
         Number and image of each frame from the first keyframe to the last, keyframes included; all of
-        them rounded to 8 bits on the way, as FFmpeg's filter takes them.
+        them rounded to 8 bits, the format of FFmpeg's filter.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def interpolate(keyframes: Mapping[int, F32], fps: Fraction) -> Iterator[tuple[i
 
 
 def why_no_interpolation() -> str:
-    """Why nothing can be interpolated here; empty where it can."""
+    """Reason why the filter is missing; empty if it is there."""
     if FILTER in av.filter.filters_available:
         return ""
     return f"the FFmpeg inside PyAV {av.__version__} was built without its filter {FILTER}"
@@ -94,17 +94,8 @@ def _made(graph: Any, first: int, last: int) -> Iterator[tuple[int, F32]]:
 
 def _picture(linear: F32) -> Any:
     encoded = srgb_encode(np.clip(linear, 0.0, 1.0)).astype(np.float32)
-    picture = av.VideoFrame(linear.shape[1], linear.shape[0], PIXELS)
-    for plane, values in zip(picture.planes, planes_from_rgb(encoded, bits=8, is_halved=False), strict=True):
-        rows = np.zeros((plane.height, plane.line_size), np.uint8)
-        rows[:, : values.shape[1]] = values
-        plane.update(rows)
-    return picture
+    return frame_of(planes_from_rgb(encoded, bits=8, is_halved=False), PIXELS)
 
 
 def _linear(picture: Any) -> F32:
-    rows = (np.frombuffer(p, np.uint8).reshape(p.height, p.line_size)[:, : p.width] for p in picture.planes)
-    y, cb, cr = rows
-    return srgb_decode(rgb_from_planes((y, cb, cr), bits=8, weights=BT709, is_full_range=False)).astype(
-        np.float32
-    )
+    return srgb_decode(rgb_from_planes(planes_of(picture), bits=8, weights=BT709, is_full_range=False))
