@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import JudgedFrame, Terms, compare
+from enfilade.comparison import ComparedFrame, Terms, compare
 from enfilade.images import open_sequence
 from enfilade.images.stills import encode_webp, resized
 from enfilade.images.view import View
 from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Monitor, Silence
 from enfilade.records import F32, U8
-from enfilade.reports.layers import LAYERS, ComparedFrame, Layer, painted
+from enfilade.reports.layers import LAYERS, Comparison, Layer, painted
 from enfilade.reports.run import ReportedRun
 from enfilade.viewing import Viewing
 
@@ -112,7 +112,7 @@ class Film:
         run, indices = self._run, {number: index for index, number in enumerate(self._run.numbers)}
         exposure_ev = run.viewing_settings.exposure_ev
 
-        def show(judged: Iterator[JudgedFrame], _viewing: Viewing) -> None:
+        def show(judged: Iterator[ComparedFrame], _viewing: Viewing) -> None:
             others = open_sequence(reference)
             # Frames of a video are as shown; those of a renderer are not exposed yet.
             other_ev = exposure_ev if others.name(0).lower().endswith(".exr") else 0.0
@@ -122,16 +122,16 @@ class Film:
                 if index in kept:
                     ours = _shown(run.frame(index).color, exposure_ev)
                     percent = np.float32(100.0) * np.abs(ours - _shown(other, other_ev)).mean(axis=2)
-                    self._add(index, ComparedFrame(found.jnd, found.grey, percent))
+                    self._add(index, Comparison(found.jnd, found.grey, percent))
 
         terms = Terms(viewing=run.viewing_settings, exposure_ev=exposure_ev)
         return compare(run.folder, reference, terms, Silence(), show=show).to_dict()
 
-    def _add(self, index: int, compared: ComparedFrame | None = None) -> None:
+    def _add(self, index: int, compared: Comparison | None = None) -> None:
         layers = self._encoded(index, compared)
         self.frames.append({"number": self._run.numbers[index], "index": index, "layers": layers})
 
-    def _encoded(self, index: int, compared: ComparedFrame | None = None) -> dict[str, str]:
+    def _encoded(self, index: int, compared: Comparison | None = None) -> dict[str, str]:
         pictures = painted(self._run.frame(index), compared, self._view, self._run.viewing)
         return {layer.name: self._webp(layer, pictures) for layer in LAYERS if layer.name in pictures}
 

@@ -16,14 +16,14 @@ from enfilade.reports.run import DeliveredFrame
 from enfilade.reports.scales import DIFFERENCE, VELOCITY, VISIBLE, Scale
 from enfilade.viewing import Viewing
 
-__all__ = ["LAYERS", "ComparedFrame", "Layer", "painted"]
+__all__ = ["LAYERS", "Comparison", "Layer", "painted"]
 
 QUALITY = 92  # of WebP
 LEGEND_STEPS = 33  # colours
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedFrame:
+class Comparison:
     """A frame beside the same frame of a reference.
 
     Attributes
@@ -71,7 +71,7 @@ class Layer:
 
 
 def painted(
-    frame: DeliveredFrame, compared: ComparedFrame | None, view: View, viewing: Viewing
+    frame: DeliveredFrame, compared: Comparison | None, view: View, viewing: Viewing
 ) -> dict[str, U8]:
     """Paint all layers of a frame for which there is data.
 
