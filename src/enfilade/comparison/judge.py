@@ -145,7 +145,6 @@ def compare(
             "--display names others"
         )
     judge = _Judge(conditions, terms)
-    monitor.stage("compare", len(pairs))
     found: list[FrameDifference] = []
 
     def judged() -> Iterator[JudgedFrame]:
@@ -153,7 +152,7 @@ def compare(
             frame = judge.frame(pair, moved)
             found.append(frame.difference)
             yield frame
-            monitor.advance()
+            monitor.progress("compare", len(found), len(pairs))
 
     if show is None:
         deque(judged(), maxlen=0)
