@@ -189,17 +189,14 @@ def one_of(kind: str, trial: Trial, number: int, folder: Path, seed: int) -> tup
 
 def analytic_work(folder: Path) -> Work:
     """A noisy walk through a room with a mirror, in closed form, by the paper's method."""
+    from analytic import BALL, RENDERER, WALL, AnalyticScene, Material, Sphere, write_scene
     from enfilade.records import SurfaceClass
-    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
 
-    wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
-    ball = Sphere((0.5, 0.0, 1.0), 0.5, Material((0.7, 0.2, 0.15)), "ball")
     mirror = Sphere((-0.7, 0.3, 0.8), 0.4, Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR), "mirror")
-    scene = folder / "wall.analytic.json"
-    scene.write_text(scene_text(AnalyticScene((wall, ball, mirror), noise=0.1)))
+    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL, mirror), noise=0.1))
     path = walk(folder / "path.json")
     flags = ("--method", "paper", "--spp", "4", "--keyframes-spacing", "12", "--viewing-diagonal-m", "0.0125")
-    return made(folder, "analytic", (str(scene), "--path", str(path), *flags))
+    return made(folder, "analytic", (str(scene), *RENDERER, "--path", str(path), *flags))
 
 
 def mitsuba_work(folder: Path) -> Work:
@@ -489,11 +486,13 @@ def alone() -> tuple[str, ...]:
 
 def cluster_trial(folder: Path, kills: int, spp: int) -> Trial:
     """Ray, whose workers are killed one after the other while 50 units are done."""
-    scene = folder / "wall.analytic.json"
+    from analytic import RENDERER
+
+    scene = folder / "wall.analytic"
 
     def trial(_number: int, place: Path, _chance: random.Random) -> str | None:
         path = walk(place / "fifty.json", 50)
-        inputs = (str(scene), "--path", str(path), "--method", "reference", "--spp", str(spp))
+        inputs = (str(scene), *RENDERER, "--path", str(path), "--method", "reference", "--spp", str(spp))
         work, out = made(place, "whole", inputs), place / "run"
         process = start([*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")])
         ledger, killed, done = out / "ledger.jsonl", 0, 0

@@ -135,8 +135,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     from enfilade.images import read_exr
     from enfilade.images.stills import image_pixels
     from enfilade.pipeline.job import read_job
-    from enfilade.scene.analytic_scene import read_scene
-    from enfilade.scene.scenecheck import check_scene
+    from enfilade.scene.mitsuba.files import check_scene
     from enfilade.settings import LimitSettings
 
     return {
@@ -144,7 +143,6 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
         "exr of a run": (lambda folder: make_exr(folder, is_portable=False), read_exr),
         "exr header": (make_exr, image_pixels),
         "path": (make_path, load_path),
-        "analytic": (make_analytic, read_scene),
         "scene": (make_scene, lambda file: check_scene(file, LimitSettings())),
         "run": (lambda folder: make_run(folder) / "run.json", read_run),
         "ledger": (lambda folder: make_run(folder) / "ledger.jsonl", read_run),
@@ -175,15 +173,6 @@ def make_path(folder: Path) -> Path:
     return folder / "path.json"
 
 
-def make_analytic(folder: Path) -> Path:
-    """A wall."""
-    from enfilade.scene.analytic_scene import AnalyticScene, Plane, Sphere, scene_text
-
-    scene = AnalyticScene((Plane((0, 0, 0), (0, 0, 1)), Sphere((0, 0, 1), 0.5)), noise=0.1)
-    (folder / "wall.analytic.json").write_text(scene_text(scene))
-    return folder / "wall.analytic.json"
-
-
 def make_scene(folder: Path) -> Path:
     """A Mitsuba scene with an image, a film and parameters."""
     make_exr(folder)
@@ -205,7 +194,7 @@ def make_run(folder: Path) -> Path:
 
     out = folder / "run"
     if not out.exists():
-        job = Job(make_analytic(folder), load_path(make_path(folder)), Settings(), "paper")
+        job = Job(make_scene(folder), load_path(make_path(folder)), Settings(), "paper")
         (folder / IDENTITY).write_text(json.dumps(job.identity()))
         with Run.open(out, job.identity()) as run:
             run.write_json("job.json", job.to_json())

@@ -51,7 +51,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     from enfilade.camera import load_path
     from enfilade.kernels.estimate import Estimate
     from enfilade.monitor import Silence
-    from enfilade.pipeline.job import Job, open_renderer
+    from enfilade.pipeline.job import Job
     from enfilade.pipeline.light import LightTable
     from enfilade.pipeline.survey import survey_path
     from enfilade.pipeline.units import segments_of
@@ -65,7 +65,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     path = load_path(folder / "scene" / "camera_path.json", size=(width, height), frames=frames)
     settings = Settings.from_tables({"light": {"spacing": SPACING, "paths": 4}})
     job = Job(folder / "scene" / "scene.xml", path, settings, "decoupled")
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     times: list[float] = []
     with Run.open(folder / "run", job.identity(renderer)) as run:
         workshop = Workshop(job, renderer, run, Silence())

@@ -38,27 +38,19 @@ def main() -> None:
 
 def render(folder: Path, size: str, count: int) -> dict:
     """Render `count` frames in a process of its own; returns the run's summary."""
-    scene, path = folder / "wall.analytic.json", folder / "path.json"
-    scene.write_text(scene_text())
+    from analytic import BALL, RENDERER, WALL, AnalyticScene, write_scene
+
+    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL)))
+    path = folder / "path.json"
     width, height = size.split("x")
     eyes = {at / FPS: [0.02 * at, 0.0, 4.0] for at in (0, count - 1)}
     keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
     walk = {"format": "enfilade-path", "fps": FPS, "size": [int(width), int(height)], "keys": keys}
     path.write_text(json.dumps(walk))
     command = [sys.executable, "-m", "enfilade", "render", scene, "--path", path, "--out", folder / "run"]
-    flags = ["--method", "paper", "--spp", "4", "--quiet"]
+    flags = [*RENDERER, "--method", "paper", "--spp", "4", "--quiet"]
     subprocess.run([*map(str, command), *flags], check=True, stdout=subprocess.DEVNULL)
     return json.loads((folder / "run" / "summary.json").read_text())
-
-
-def scene_text() -> str:
-    """A wall and a ball, as a file of the analytic backend."""
-    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
-    from enfilade.scene.analytic_scene import scene_text as text_of
-
-    wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
-    ball = Sphere((0.5, 0.0, 1.0), 0.5, Material((0.7, 0.2, 0.15)), "ball")
-    return text_of(AnalyticScene((wall, ball)))
 
 
 if __name__ == "__main__":

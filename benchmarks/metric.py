@@ -1,9 +1,8 @@
-"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5] [--workers 1] [--device gpu]`.
+"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5] [--workers 1]`.
 
-One table: CPU and wall time of a pair, set-up included once beside it, and the peak memory of a
-process that does nothing else. Each row runs in a process of its own. All sizes have 27.93 px/deg;
-The modern mode comes twice, with NumPy and with Dr.Jit kernels;
-"sequence" adds image flow and the change since the last frame to what moves.
+One table: CPU and wall time of a pair, of the first pair with the set-up, and the peak memory of the
+process. Each row runs in a process of its own. All sizes have 27.93 px/deg; "sequence" adds motion vectors
+and the change since the last frame.
 """
 
 import argparse
@@ -16,19 +15,16 @@ import time
 from pathlib import Path
 
 SIZES = ((640, 480), (1920, 1080), (3840, 2160))
-MODES = ("paper", "modern", "kernels")  # the last is the modern mode in Dr.Jit kernels
+MODES = ("paper", "modern")
 CASES = ("still", "moving", "moving and noisy", "sequence")
 KIB_PER_MIB = 1024
 
 
-def measure(
-    width: int, height: int, mode: str, case: str, repeats: int, workers: int, device: str
-) -> dict[str, float]:
+def measure(width: int, height: int, mode: str, case: str, repeats: int, workers: int) -> dict[str, float]:
     """Compare one pair `repeats` times; the best time counts, since others use the machine too."""
     import numpy as np
 
-    from enfilade.device import activate
-    from enfilade.metric import MetricOptions, SequenceAqm
+    from enfilade.metric import Aqm, SequenceAqm
     from enfilade.viewing import Viewing
 
     rng = np.random.default_rng(1)
@@ -44,20 +40,14 @@ def measure(
 
     started = time.process_time()
     viewing = Viewing(640, 480).cropped(width, height)
-    has_kernels = mode == "kernels"
-    if has_kernels:
-        activate(device)
-        import drjit as dr
-
-        dr.set_thread_count(workers - 1)  # besides the one that asks
-    options = MetricOptions.paper() if mode == "paper" else MetricOptions.modern()
-    judge = SequenceAqm(viewing, options=options, workers=workers, has_kernels=has_kernels)
+    aqm = (Aqm.paper if mode == "paper" else Aqm.modern)(viewing, workers=workers)
+    sequence = SequenceAqm(aqm)
 
     def pair() -> None:
         if case == "sequence":
-            judge.judge(test, reference, backward_flow_px=-viewing.flow_px(maps["velocity"]))
+            sequence.compare(test, reference, backward_flow_px=-viewing.flow_px(maps["velocity"]))
         else:
-            judge.aqm.compare(test, reference, **maps)
+            aqm.compare(test, reference, **maps)
 
     pair()
     first = time.process_time() - started
@@ -79,12 +69,11 @@ def main() -> None:
     """Run every row in a process of its own and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--workers", type=int, default=1, help="threads of the FFT and of kernels")
-    parser.add_argument("--device", default="cpu", help="where kernels run: cpu or gpu")
+    parser.add_argument("--workers", type=int, default=1, help="threads of the FFT")
     parser.add_argument("--row", type=json.loads, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.row is not None:
-        print(json.dumps(measure(*options.row, options.repeats, options.workers, options.device)))
+        print(json.dumps(measure(*options.row, options.repeats, options.workers)))
         return
     print(
         f"{'size':>10}  {'mode':<7}  {'case':<16}  {'CPU s':>7}  {'wall s':>7}  {'first CPU s':>11}  peak MiB"
@@ -94,7 +83,6 @@ def main() -> None:
             command = [sys.executable, str(Path(__file__).resolve())]
             command += ["--row", json.dumps([width, height, mode, case])]
             command += ["--repeats", str(options.repeats), "--workers", str(options.workers)]
-            command += ["--device", options.device]
             output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
             row = json.loads(output)
             print(

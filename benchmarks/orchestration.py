@@ -100,15 +100,15 @@ def look(pid: int, ledger: Path) -> tuple[int, float, int] | None:
 
 def analytic(folder: Path, frames: int) -> list[str]:
     """Command of a run of small frames in closed form."""
-    from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves, scene_text
+    from analytic import BALL, RENDERER, WALL, AnalyticScene, write_scene
 
-    wall = Plane((0, 0, 0), (0, 0, 1), Material(Waves((0.2, 0.3, 0.5), (0.9, 0.7, 0.4), period=1.3)), "wall")
-    scene, path = folder / "wall.analytic.json", folder / "path.json"
-    scene.write_text(scene_text(AnalyticScene((wall, Sphere((0.5, 0.0, 1.0), 0.5)), noise=0.1)))
+    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL), noise=0.1))
+    path = folder / "path.json"
     eyes = {at / 30: [0.02 * at, 0.0, 4.0] for at in (0, frames - 1)}
     keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
     path.write_text(json.dumps({"format": "enfilade-path", "fps": 30, "size": [32, 24], "keys": keys}))
     flags = [
+        *RENDERER,
         "--method",
         "paper",
         "--spp",

@@ -27,8 +27,8 @@ def main() -> None:
     arguments = parser.parse_args()
     activate("auto")
     from enfilade.camera import load_path
-    from enfilade.pipeline.job import open_renderer
     from enfilade.renderer import Purpose, RandomKey
+    from enfilade.scene.opener import open_renderer
     from enfilade.settings import TraceSettings
     from studies.scenes import write_scene
 

@@ -8,7 +8,7 @@ from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.decoupled import LightCache, Shader
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from enfilade.scene.mitsuba import MitsubaRenderer
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.settings import TraceSettings
 
 PIXEL_ANGLE = 0.02  # radians

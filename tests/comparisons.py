@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import FlowChoice, SequenceDifference, Terms, compare, metric_options
+from enfilade.comparison import FlowChoice, SequenceDifference, Terms, compare
 from enfilade.images import write_exr
 from enfilade.monitor import Silence
 from enfilade.settings import MetricSettings
@@ -82,7 +82,7 @@ def terms(
     **fields: Any,
 ) -> Terms:
     metric = MetricSettings.from_table({"metering": metering, "mask_slope": mask_slope})
-    return Terms(metric=metric, options=metric_options(mode), flow=FlowChoice(flow), **fields)
+    return Terms(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
 
 
 def judged(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:

@@ -1,8 +1,15 @@
 """The device is chosen before any test module imports a kernel: Dr.Jit binds its array types at import."""
 
+import os
+from pathlib import Path
+
 import hypothesis
 
 from enfilade.device import activate
+
+# Worker processes import the analytic renderer, too.
+TESTS = str(Path(__file__).parent)
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [TESTS, os.environ.get("PYTHONPATH")]))
 
 activate("auto")
 hypothesis.settings.register_profile("enfilade", deadline=None)  # a busy machine is no failure

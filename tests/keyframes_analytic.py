@@ -8,8 +8,8 @@ from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
 from enfilade.records import Geometry, Keyframe, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from enfilade.scene.analytic import AnalyticRenderer
-from enfilade.scene.analytic_scene import AnalyticScene, Plane, Quad, Sphere
+from support.analytic import AnalyticRenderer
+from support.analytic_scene import AnalyticScene, Plane, Quad, Sphere
 
 
 def geometry_of(scene: AnalyticScene, camera: Camera) -> Geometry:

@@ -7,7 +7,7 @@ import math
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.records import SurfaceClass
-from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad, Sphere, Waves
+from support.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad, Sphere, Waves
 
 WHITE = (0.8, 0.8, 0.8)
 RED = (0.7, 0.2, 0.15)

@@ -14,12 +14,13 @@ from enfilade.images import read_exr
 from enfilade.monitor import Silence
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.walkthrough import render
-from enfilade.scene.analytic_scene import AnalyticScene, scene_text
 from enfilade.settings import Settings
 from enfilade.store import Run
+from support.analytic_scene import AnalyticScene, write_scene
 
 # A screen of 96 x 72 px, 3 cm wide, seen from half a metre: the paper's 28 pixels a degree, so that a
 # pixel a frame is 1.07 deg/s. Keyframes every 6 frames, never split unless a test is about that.
+RENDERER = "support.analytic:load"
 TABLES: dict[str, dict[str, Any]] = {
     "viewing": {"diagonal_m": 0.0375},
     "keyframes": {"spacing": 6},
@@ -31,10 +32,9 @@ TABLES: dict[str, dict[str, Any]] = {
 def job_of(
     folder: Path, scene: AnalyticScene, path: CameraPath, *, method: str = "paper", **tables: dict[str, Any]
 ) -> Job:
-    file = folder / "scene.analytic.json"
-    file.write_text(scene_text(scene))
+    file = write_scene(folder / "scene.analytic", scene)
     merged = {name: TABLES.get(name, {}) | tables.get(name, {}) for name in {*TABLES, *tables}}
-    return Job(file, path, Settings.from_tables(merged), method)
+    return Job(file, path, Settings.from_tables(merged), method, RENDERER)
 
 
 def rendered(folder: Path, job: Job, name: str = "run", monitor: Any = None) -> tuple[dict[str, Any], Path]:

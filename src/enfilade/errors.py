@@ -1,33 +1,33 @@
-"""What can go wrong, as one tree.
+"""The errors of this package, as one tree.
 
 ::
 
-    EnfiladeError                 anything this package raises on purpose; the command exits with 1
-    ├── InputError                what the user gave can't be used; the command exits with 2
-    │   ├── SceneError            a scene file: missing, malformed, or refused by the renderer
+    EnfiladeError                 every error that is raised on purpose; the command exits with 1
+    ├── InputError                unusable input; the command exits with 2
+    │   ├── SceneError            a scene: missing, malformed, or refused by the renderer
     │   ├── CameraPathError       a camera path: malformed, not rigid, empty
     │   ├── SettingsError         a setting: unknown, or out of range
     │   ├── ImageError            an image, a sequence or a video that can't be read or compared
-    │   └── RunFolderError        a run folder: holds another run, damaged, can't be written
-    │       └── DamagedFileError  a file of it that is missing, or isn't what was written
-    ├── DeviceError               no usable LLVM or CUDA on this machine
-    ├── NoSpaceError              the disk is full; what is finished stays
-    └── UnfinishedError           parts of a run that failed again and again, and were left out
+    │   └── RunFolderError        a run folder: of another run, damaged, not writable
+    │       └── DamagedFileError  a file of it that is missing, or differs from its checksum
+    ├── DeviceError               no usable LLVM or CUDA
+    ├── NoSpaceError              the disk is full; finished tasks stay
+    └── UnfinishedError           tasks of a run failed again and again, and were set aside
 
 A message says what is wrong, where, and what to do next.
 """
 
 
 class EnfiladeError(Exception):
-    """Anything this package raises on purpose."""
+    """Every error that is raised on purpose."""
 
 
 class InputError(EnfiladeError, ValueError):
-    """What the user gave can't be used."""
+    """Unusable input."""
 
 
 class SceneError(InputError):
-    """A scene file that is missing, malformed, or refused by the renderer."""
+    """A scene that is missing, malformed, or refused by the renderer."""
 
 
 class CameraPathError(InputError):
@@ -43,15 +43,16 @@ class ImageError(InputError):
 
 
 class RunFolderError(InputError):
-    """A run folder that holds another run, is damaged, or can't be written."""
+    """A run folder that holds another run, is damaged, or is not writable."""
 
 
 class DamagedFileError(RunFolderError):
-    """A file of a run folder that is missing, or isn't what was written.
+    """A file of a run folder that is missing, or differs from its checksum.
 
     Attributes
     ----------
     file : str
+        Its name in the run folder.
     """
 
     def __init__(self, message: str, file: str) -> None:
@@ -59,27 +60,27 @@ class DamagedFileError(RunFolderError):
         self.file = file
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle with all that the constructor takes: errors pass from one process to another."""
+        """Pickle with all arguments of the constructor: errors pass from process to process."""
         return type(self), (str(self), self.file), self.__dict__
 
 
 class DeviceError(EnfiladeError):
-    """No usable LLVM or CUDA on this machine."""
+    """No usable LLVM or CUDA."""
 
 
 class NoSpaceError(EnfiladeError):
-    """The disk is full; what is finished stays."""
+    """The disk is full; finished tasks stay."""
 
 
 class UnfinishedError(EnfiladeError):
-    """Parts of a run that failed again and again, and were left out.
+    """Tasks of a run that failed again and again, and were set aside.
 
     Attributes
     ----------
-    units : tuple of str
+    tasks : tuple of str
         Their names.
     """
 
-    def __init__(self, message: str, units: tuple[str, ...] = ()) -> None:
+    def __init__(self, message: str, tasks: tuple[str, ...] = ()) -> None:
         super().__init__(message)
-        self.units = units
+        self.tasks = tasks

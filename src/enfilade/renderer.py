@@ -1,7 +1,7 @@
-"""What the stages ask of a renderer: the seam between enfilade and whatever traces the paths.
+"""The renderer protocol: everything that the methods require of a renderer.
 
-A backend is any class with these methods. Lanes are Dr.Jit arrays, so that a camera ray, its surface
-query and the arithmetic on the answer become one kernel; lists of pixels and images are NumPy.
+A renderer is any class with these methods. Lanes are Dr.Jit arrays, so that camera rays, their intersections
+and the shading of the hits become one kernel. Lists of pixels and images are NumPy arrays.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ import numpy.typing as npt
 from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, U32, Shading
 
+MAX_PATH_DEPTH = 4  # greatest path depth at which an estimate may begin
+
 
 class Purpose(IntEnum):
-    """What random numbers are drawn for: each purpose has a stream of its own."""
+    """Use of random numbers: each purpose has a stream of its own."""
 
     REFERENCE = 0
     KEYFRAME = 1
@@ -35,15 +37,16 @@ class Purpose(IntEnum):
 
 @dataclass(frozen=True)
 class RandomKey:
-    """What random numbers depend on, beside the pixel and the number of the path.
+    """Key of a stream of random numbers, beside the pixel and the index of the path.
 
     Attributes
     ----------
     seed
         Of the run, 32 bits.
     frame
-        Number of the frame; its lowest 24 bits count.
+        Number of the frame, of which the lowest 24 bits count.
     purpose
+        Of the random numbers.
     """
 
     seed: int
@@ -52,7 +55,7 @@ class RandomKey:
 
 
 class PixelFilter(IntEnum):
-    """Where in the image the paths of a pixel begin."""
+    """Distribution of camera rays over the image plane."""
 
     CENTRE = 0  # all through the pixel's centre: the paper's ray tracer, antialiased later (§5)
     BOX = 1  # uniform over the pixel
@@ -61,12 +64,12 @@ class PixelFilter(IntEnum):
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays in the world, as lanes.
+    """Rays in world space, as lanes.
 
     Attributes
     ----------
     origin, direction : Array3f
-        Directions need not have unit length: a hit's `distance` counts in their lengths.
+        Directions need not have unit length: the distance of a hit is in lengths of its direction.
     """
 
     origin: Any
@@ -75,7 +78,7 @@ class Rays:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """First hits of rays, as lanes. Nothing is said of the fields where `is_hit` is false.
+    """First hits of rays, as lanes. All other fields are undefined where `is_hit` is false.
 
     Attributes
     ----------
@@ -83,11 +86,11 @@ class Surfaces:
     distance : Float
         Along the ray, in lengths of its direction.
     normal : Array3f
-        Shading normal in the world, unit length, on the side of the ray's origin.
+        Shading normal in world space, unit length, in the hemisphere of the ray's origin.
     albedo : Array3f
-        Diffuse reflectance seen from there, a coat included, 0..1.
+        Diffuse reflectance in the direction of the ray, including a coat, 0..1.
     shape_index : UInt
-        Number of the shape, from 1.
+        Index of the shape, from 1.
     surface : UInt
         ``records.SurfaceClass``.
     """
@@ -102,20 +105,20 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class ShadingPoint:
-    """First hits of rays with what shading them takes, as lanes.
+    """First hits of rays with the data for shading them, as lanes.
 
     Attributes
     ----------
     surfaces : Surfaces
     position : Array3f
-        Of the hit, in the world.
+        Of the hit, world space.
     emission : Array3f
-        Radiance towards the ray's origin of what emits: the surface, or the environment where nothing is
-        hit. Where lights were already sampled at the ray's origin, weighted against that.
+        Radiance emitted towards the ray's origin by the surface, or by the environment for a miss. Weighted
+        against next-event estimation at the ray's origin if the ray continues a path.
     has_specular : Bool
-        Whether the surface does anything but scatter diffusely.
+        Whether the BSDF has lobes other than the diffuse one.
     native : Any
-        The backend's own record of the hit.
+        The renderer's own record of the hit.
     """
 
     surfaces: Surfaces
@@ -127,16 +130,16 @@ class ShadingPoint:
 
 @dataclass(frozen=True)
 class Bounce:
-    """Where rays come from that a lobe sent: what weights the light they find, as lanes.
+    """The previous vertex of a path, for multiple importance sampling of the emission hit next; as lanes.
 
     Attributes
     ----------
     position : Array3f
         On the surface.
     pdf : Float
-        Density of the direction, per steradian.
+        Density of the sampled direction, per steradian.
     is_delta : Bool
-        Whether it was the only one possible, so that sampling lights could not have found it.
+        Whether the direction comes from a delta lobe, which next-event estimation can't sample.
     """
 
     position: Any
@@ -146,16 +149,17 @@ class Bounce:
 
 @dataclass(frozen=True)
 class BsdfSample:
-    """One bounce off the diffuse lobe, or off everything else, as lanes.
+    """One sampled direction of the diffuse lobe, or of the specular lobes, as lanes.
 
     Attributes
     ----------
     rays : Rays
+        That continue the paths.
     bounce : Bounce
     throughput : Array3f
-        Of the bounce; may be negative where a lobe is what remains after the diffuse one.
+        Weight of the sample. It may be negative where the specular part is a BSDF minus its diffuse lobe.
     direct : Array3f
-        Radiance that the lobe sends back from sampled lights.
+        Radiance reflected by the lobe from sampled emitters (next-event estimation).
     is_alive : Bool
     """
 
@@ -168,12 +172,12 @@ class BsdfSample:
 
 @dataclass(frozen=True, eq=False)
 class Emitters:
-    """Points all over the surfaces that emit.
+    """Points distributed over all emitting surfaces.
 
     Attributes
     ----------
     position : (N, 3) float32
-        In the world.
+        World space.
     shape_index : (N,) uint32
     """
 
@@ -183,35 +187,32 @@ class Emitters:
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What a scene says about itself.
+    """Facts of a loaded scene.
 
     Attributes
     ----------
     renderer : str
-        Name and version of what traces.
+        Name and version of the renderer.
     variant : str
-        Of the renderer: what runs its kernels.
+        Backend of its kernels.
     shapes : tuple of str
-        Name of shape 1, 2, ...
-    fingerprint : str
-        SHA-256 over the scene's files: the same scene, the same letters.
+        Names of shapes 1, 2, ...
     """
 
     renderer: str
     variant: str
     shapes: tuple[str, ...]
-    fingerprint: str
 
 
 class Renderer(Protocol):
-    """A renderer that the paper's method can drive."""
+    """A renderer for the methods `reference` and `paper`."""
 
     def describe(self) -> SceneFacts:
-        """Say what is rendered, and by what."""
+        """Facts of the scene and the renderer."""
         ...
 
     def surfaces(self, rays: Rays) -> Surfaces:
-        """Find the first surface along each ray, looking through what lets everything pass."""
+        """Find the first surface along each ray, beyond null interactions."""
         ...
 
     def trace(
@@ -223,7 +224,7 @@ class Renderer(Protocol):
         spp: int,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
-        """Path trace a list of pixels, at a cost in proportion to the list.
+        """Path trace a list of pixels, at a cost in proportion to its length.
 
         Parameters
         ----------
@@ -231,12 +232,12 @@ class Renderer(Protocol):
         pixels : (N,) uint32
             Flat indices ``y * width + x``.
         random
-            The random numbers of a pixel depend on this, on the pixel and on the path's number, and
-            on nothing else: not on the list, the chunking or the worker.
+            The random numbers of a path depend on this key, the pixel and the index of the path alone: not on
+            the list, the chunk size or the worker.
         spp
-            Paths a pixel.
+            Paths traced for a pixel.
         pixel_filter
-            Where in the image the paths of a pixel begin.
+            Distribution of the camera rays.
 
         Returns
         -------
@@ -246,92 +247,90 @@ class Renderer(Protocol):
         ...
 
 
-MAX_PATH_DEPTH = 4  # that a path may have behind it when the path tracer is asked for the rest of it
-
-
 @runtime_checkable
 class LobeRenderer(Renderer, Protocol):
-    """A renderer that can also be asked for the light apart from the surfaces it falls on.
+    """A renderer for the method `decoupled`, which treats diffuse and specular lobes apart.
 
-    Every BSDF is a sum: albedo times a diffuse lobe, and the rest. Exactly: what ``estimate_diffuse``
-    estimates, times the albedo, plus what ``sample_specular`` finds, plus the emission, is what ``trace``
-    converges to.
+    Every BSDF is split into albedo times a diffuse lobe, and specular lobes: all others. The emission plus
+    the albedo times ``estimate_diffuse`` plus ``estimate_specular`` converges to the result of ``trace``.
     """
 
     @property
     def why_inseparable(self) -> str:
-        """Why this scene's light can't be told from its surfaces after all; empty where it can."""
+        """Reason why the lobes of this scene can't be estimated apart; empty if they can."""
         ...
 
     @property
     def state(self) -> Any:
-        """All arrays that the other methods read: what a kernel that is recorded once must be told of."""
+        """All arrays that the methods below read, as inputs of a recorded (frozen) kernel."""
         ...
 
     @property
     def emitters(self) -> Emitters:
-        """Where light comes from; few camera rays would miss what is small in the image."""
+        """Points on all emitters: few camera rays hit an emitter that is small in the image."""
         ...
 
     def intersect(
         self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False
     ) -> ShadingPoint:
-        """Find the first surface along rays, and the light it emits.
+        """Find the first surface along each ray, and its emission.
 
         Parameters
         ----------
         rays
         bounce
-            Where the rays come from; None for camera rays.
+            Previous vertex of the path; None for camera rays.
         active : Bool
-            Rays that are traced; others hit nothing.
+            Rays to trace; the others miss.
         opaque_only
-            Take surfaces for wholly there or not at all, as :meth:`surfaces` does: for camera rays whose
-            light belongs to a G-buffer. Otherwise what is let through a surface is a lobe of it.
+            Take surfaces as either opaque or absent, as :meth:`surfaces` does, so that the point matches the
+            G-buffer. Otherwise the transparency of a surface is one of its specular lobes.
         """
         ...
 
     def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
-        """Estimate the radiance that the diffuse lobe would send if the albedo were one.
+        """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
-        One path, with lights sampled at its first vertex: irradiance over pi, as the material's own
-        diffuse lobe weights it.
+        Of a Lambertian surface this is irradiance over pi.
 
         Parameters
         ----------
         point
         rng : PCG32
         path_depth
-            How many lead from the camera to the surface, 1 to ``MAX_PATH_DEPTH``: they count where the scene
+            Path segments from the camera to the surface, 1 to ``MAX_PATH_DEPTH``. They count where the scene
             limits the length of paths.
 
         Returns
         -------
         direct, indirect : Array3f
-            By light straight from emitters, and by all other.
+            Light directly from emitters, and all other light.
         """
         ...
 
     def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
-        """Estimate the radiance that everything but the diffuse lobe sends; see :meth:`estimate_diffuse`."""
+        """Estimate the radiance scattered by the specular lobes; see :meth:`estimate_diffuse`."""
         ...
 
     def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
-        """Sample one bounce off the diffuse lobe, as if the albedo were one.
-
-        The estimate of :meth:`estimate_diffuse` is its direct light, and its throughput times what its rays
-        find.
-        """
+        """Sample a direction of the diffuse lobe, divided by the albedo."""
         ...
 
     def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
-        """Sample one bounce off everything but the diffuse lobe.
+        """Sample a direction of the specular lobes.
 
         Parameters
         ----------
         point
         rng : PCG32
         choice : Float
-            In [0, 1): which of several lobes, those that let light through last. None leaves it to chance.
+            Selects the lobe, in [0, 1), transmission last; random by default.
         """
         ...
+
+
+def why_inseparable(renderer: Renderer) -> str:
+    """Reason why a renderer can't estimate the lobes of its scene apart; empty if it can."""
+    if isinstance(renderer, LobeRenderer):
+        return renderer.why_inseparable
+    return f"the renderer {renderer.describe().renderer!r} does not estimate lobes apart"

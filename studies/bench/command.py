@@ -11,14 +11,14 @@ import click
 
 from enfilade.cli.flags import SettingsCommand, settings_of, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import Size, json_option, quiet_option
+from enfilade.cli.inputs import Size, json_option, quiet_option, renderer_option
 from enfilade.device import Choice, activate
 
 if TYPE_CHECKING:
     from enfilade.pipeline.job import Job
     from studies.bench.contestants import Contestant
 
-JOB_INPUTS = ("scene", "path_file", "size", "frames", "fps")
+JOB_INPUTS = ("scene", "renderer", "path_file", "size", "frames", "fps")
 SECTIONS = ("viewing", "metric", "keyframes", "warp", "masks", "antialias", "light", "limits")
 JUDGES = ("aqm", "flip", "psnr", "temporal", "cvvdp")  # `judges.JUDGES`; to ask it would load NumPy
 
@@ -47,6 +47,7 @@ class Counts(click.ParamType[tuple[int, ...]]):
     "bench", cls=SettingsCommand, short_help="Our methods and their rivals: quality over CPU time."
 )
 @click.argument("scene", type=click.Path(path_type=Path))
+@renderer_option
 @click.option(
     "--path",
     "path_file",
@@ -170,6 +171,7 @@ def _job(
     ctx: click.Context,
     *,
     scene: Path,
+    renderer: str | None,
     path_file: Path,
     size: tuple[int, int] | None,
     frames: str | None,
@@ -181,7 +183,7 @@ def _job(
 
     selected = None if frames is None else parse_frames(frames)
     path = load_path(path_file, size=size, frames=selected, fps=fps)
-    return Job(scene=scene, path=path, settings=settings, method="reference")
+    return Job(scene=scene, path=path, settings=settings, method="reference", renderer=renderer)
 
 
 def _lineup(

@@ -21,7 +21,7 @@ from enfilade.methods.denoise import denoise, denoiser_name
 from enfilade.monitor import Monitor, Silence
 from enfilade.pipeline.cost import Costs
 from enfilade.pipeline.finish import delivered_layers
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import initial_segments, survey_path
 from enfilade.pipeline.views import Views
 from enfilade.records import F32, Provenance
@@ -77,7 +77,7 @@ class EveryFrame:
     def run(self, folder: Path, monitor: Monitor) -> None:
         """Make the frames that the folder does not hold."""
         self.job.check_scene()
-        renderer = open_renderer(self.job.scene, self.job.settings.trace)
+        renderer = self.job.open_renderer()
         with Run.open(folder, self._identity(renderer)) as run:
             for note in run.notes:
                 monitor.say(note)
@@ -154,7 +154,7 @@ class Interpolated:
         """Make the shots that the folder does not hold."""
         job = self.job
         job.check_scene()
-        renderer = open_renderer(job.scene, job.settings.trace)
+        renderer = job.open_renderer()
         views = Views(renderer, job.path, job.viewing, Costs())
         shots = initial_segments(
             job.path, survey_path(views, job.path, job.settings, Silence()), job.settings

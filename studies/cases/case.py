@@ -18,7 +18,7 @@ from enfilade.errors import RunFolderError
 from enfilade.files import read_json, write_json
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import Survey, survey_path
 from enfilade.pipeline.versions import code_digest, makers
 from enfilade.pipeline.views import Views
@@ -97,7 +97,7 @@ class Case:
     @cached_property
     def renderer(self) -> Renderer:
         """The scene, loaded."""
-        return open_renderer(self.whole.scene, self.whole.settings.trace)
+        return self.whole.open_renderer()
 
     @cached_property
     def survey(self) -> Survey:

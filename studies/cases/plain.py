@@ -44,7 +44,7 @@ class PlainlyLit:
     def describe(self) -> SceneFacts:
         """Say what is rendered, and by what."""
         facts = self._renderer.describe()
-        return SceneFacts(f"{facts.renderer}, plainly lit", facts.variant, facts.shapes, facts.fingerprint)
+        return SceneFacts(f"{facts.renderer}, plainly lit", facts.variant, facts.shapes)
 
     def surfaces(self, rays: Rays) -> Surfaces:
         """Find the first surface along each ray."""

@@ -22,7 +22,7 @@ from enfilade.methods.paper import spatial_support_px
 from enfilade.methods.paper.masks import slow_pixels
 from enfilade.monitor import Monitor
 from enfilade.pipeline.cost import Costs
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
 from enfilade.pipeline.walkthrough import LEAST_SPP
@@ -154,7 +154,7 @@ def calibrate_job(
             f"--light traced needs --spp {LEAST_SPP} or more: the spread of a pixel's paths tells the metric "
             "what is noise and what is a difference"
         )
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, monitor)
     source: Renderer = PlainlyLit(renderer) if is_plain else renderer

@@ -17,20 +17,8 @@ if TYPE_CHECKING:
 
     from studies.observers.validate import Validation
 
-ABLATED = {  # columns of the ablation's table, by the figure's name
-    "ModelFest": "ModelFest dB",
-    "Foley masking": "Foley dB",
-    "Robson 1966": "Robson dB",
-    "Laird 2006": "Laird dB",
-    "moving texture, 54 conditions": "texture, 54",
-    "moving texture, 36 conditions": "texture, 36",
-    "ModelFest Gabors": "Gabors dB",
-    "flicker against blur": "flicker / blur",
-}
-
 
 @click.command("validate", short_help="The metric against what people saw.")
-@click.option("--ablation", is_flag=True, help="Take each departure from the paper by itself instead.")
 @click.option(
     "--plots",
     "folder",
@@ -41,20 +29,18 @@ ABLATED = {  # columns of the ablation's table, by the figure's name
 @quiet_option
 @debug_option
 @click.pass_context
-def command(
-    ctx: click.Context, /, *, ablation: bool, folder: Path | None, as_json: bool, quiet: bool
-) -> None:
+def command(ctx: click.Context, /, *, folder: Path | None, as_json: bool, quiet: bool) -> None:
     """Judge the metric by what people saw: thresholds, masking, moving textures, flicker.
 
     Both modes of the metric are shown the stimuli of published experiments. The exit status is 1 where
     a figure of the modern mode misses what is asked of it. What was fitted is fitted again with a part of
-    the data left out. About five minutes; with --ablation half an hour, and nothing is asked.
+    the data left out. About five minutes.
     """
     from enfilade.cli.progress import watch
-    from studies.observers.validate import ablate, validate
+    from studies.observers.validate import validate
 
     with watch(quiet=quiet) as monitor:
-        found = ablate(monitor) if ablation else validate(monitor)
+        found = validate(monitor)
     if folder is not None:
         from studies.observers.charts import plot_people
 
@@ -63,9 +49,8 @@ def command(
     if as_json:
         click.echo(json.dumps(found.to_dict(), indent=2))
     else:
-        _show(_ablation_table(found) if ablation else _table(found))
-        if found.fits:
-            _show(_fits_table(found))
+        _show(_table(found))
+        _show(_fits_table(found))
     if found.missed:
         names = ", ".join(figure.name.strip() for figure in found.missed)
         click.echo(f"Missed: {names}.", err=True)
@@ -111,18 +96,4 @@ def _fits_table(found: Validation) -> Table:
         asked = listed(fit.least) if fit.least == fit.most else f"{listed(fit.least)} to {listed(fit.most)}"
         figures = f"{fit.rms_db:.3f}", f"{fit.left_out_rms_db:.3f}"
         table.add_row(fit.name, fit.data, listed(fit.chosen), asked, *figures)
-    return table
-
-
-def _ablation_table(found: Validation) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title="What each departure earns", title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column("mode", no_wrap=True)
-    for heading in ABLATED.values():
-        table.add_column(heading, justify="right")
-    for mode in found.modes:
-        values = {figure.name: figure.value for figure in mode.figures()}
-        table.add_row(mode.mode, *(f"{values[name]:.2f}" for name in ABLATED))
     return table

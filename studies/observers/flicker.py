@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.ndimage
 
-from enfilade.metric import sequence_score
+from enfilade.metric import SequenceAqm, sequence_score
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
@@ -136,7 +136,7 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
         Is told of each example.
     """
     monitor.stage(f"flicker, {mode.name}", len(EXAMPLES))
-    found = {}
+    pairs = {}
     for example, (_, pan_px) in EXAMPLES.items():
         viewing = screen(SIZE_PX, PIXELS_PER_DEGREE, fps=FPS)
         flow_px = np.zeros((SIZE_PX, SIZE_PX, 2), dtype=np.float32)
@@ -144,9 +144,9 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
         frames = sequences(example)
         scores = []
         for kind in (1, 2):
-            judge = mode.sequence_judge(viewing)
-            judged = [judge.judge(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames]
-            scores.append(sequence_score(comparison.score for comparison in judged))
-        found[example] = Pair(*scores)
+            metric = SequenceAqm(mode.aqm(viewing))
+            found = (metric.compare(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames)
+            scores.append(sequence_score(comparison.score for comparison in found))
+        pairs[example] = Pair(*scores)
         monitor.advance()
-    return found
+    return pairs

@@ -82,7 +82,7 @@ def measure(mode: Mode, monitor: Monitor) -> Masking:
     monitor : Monitor
         Is told of each mask.
     """
-    observer = mode.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     gabor, sine = gabor_and_sine()
     _, people = read_columns("foley.csv", "mask_db", "threshold_db")
     monitor.stage(f"masking, {mode.name}", len(people["mask_db"]) + 1)

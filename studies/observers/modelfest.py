@@ -188,7 +188,7 @@ def measure(mode: Mode, monitor: Monitor) -> Thresholds:
     Thresholds
         In the order of the targets' numbers.
     """
-    observer = mode.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     _, people = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
     numbers = people["target"].astype(np.int64)
     chosen = ~np.isin(numbers, IMAGES)

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.stats
 
-from enfilade.metric import sequence_score
+from enfilade.metric import SequenceAqm, sequence_score
 from enfilade.monitor import Monitor
 from enfilade.viewing import Viewing
 from studies.observers.mode import Mode
@@ -217,11 +217,11 @@ def score(condition: Condition, texture: Float32Array, mode: Mode) -> float:
         The metric.
     """
     height, width = texture[ROWS].shape
-    judge = mode.sequence_judge(DISPLAYS[condition.display].viewing(width, height))
+    metric = SequenceAqm(mode.aqm(DISPLAYS[condition.display].viewing(width, height)))
     flow_px = np.zeros((height, width, 2), dtype=np.float32)
     flow_px[..., 0] = -step_px(condition)
     found = (
-        judge.judge(coarse, full, backward_flow_px=flow_px) for coarse, full in frames(condition, texture)
+        metric.compare(coarse, full, backward_flow_px=flow_px) for coarse, full in frames(condition, texture)
     )
     return sequence_score(comparison.score for comparison in found)
 

@@ -1,34 +1,33 @@
-"""The whole validation: both modes over all that is known of people, and what each departure earns."""
+"""The whole validation: both modes over all measurements of observers, and the fits with data left out."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from enfilade.metric import MetricOptions
 from enfilade.monitor import Monitor
 from studies.observers import fits, flicker, foley, modelfest, moving_texture, sensitivity
 from studies.observers.figures import Figure, Measured
 from studies.observers.fits import Fit
 from studies.observers.mode import MODERN, PAPER, Mode
 
-__all__ = ["Validation", "ablate", "measure", "validate"]
+__all__ = ["Validation", "measure", "validate"]
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What was measured.
+    """Measurements of both modes.
 
     Attributes
     ----------
     modes : tuple of Measured
-        The paper's and the modern mode, or those of an ablation.
+        The paper's and the modern mode.
     fits : tuple of Fit
-        What was fitted, judged by data left out; none for an ablation.
+        Fitted constants, assessed by data left out.
     """
 
     modes: tuple[Measured, ...]
-    fits: tuple[Fit, ...] = ()
+    fits: tuple[Fit, ...]
 
     @property
     def missed(self) -> tuple[Figure, ...]:
@@ -82,28 +81,4 @@ def validate(monitor: Monitor) -> Validation:
         Is told of each stimulus.
     """
     modes = (measure(PAPER, monitor, is_bound=False), measure(MODERN, monitor, is_bound=True))
-    return Validation(modes, fits.measure(MODERN, monitor))
-
-
-def ablate(monitor: Monitor) -> Validation:
-    """The paper's mode with each departure alone, the modern mode without each. Nothing is asked.
-
-    Parameters
-    ----------
-    monitor : Monitor
-        Is told of each stimulus.
-    """
-    return Validation(tuple(measure(mode, monitor, is_bound=False) for mode in ablations()))
-
-
-def ablations() -> tuple[Mode, ...]:
-    """The modes of `ablate`, in the order of the departures."""
-    names = MetricOptions.departures()
-    added = (Mode(f"paper + {name}", _with(name)) for name in names)
-    taken = (Mode(f"modern - {name}", MODERN.options.without(name)) for name in names)
-    return (PAPER, *added, MODERN, *taken)
-
-
-def _with(departure: str) -> MetricOptions:
-    value: Any = getattr(MODERN.options, departure)
-    return replace(PAPER.options, **{departure: value})
+    return Validation(modes, fits.measure(monitor))

@@ -7,19 +7,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from enfilade.cli.compare import DEPARTURES, FLOWS, IMAGES
+from enfilade.cli.compare import FLOWS, IMAGES
 from enfilade.comparison import FlowChoice
 from enfilade.images import encode_video, open_sequence, write_exr
-from enfilade.images.imagefiles import SUFFIXES
-from enfilade.metric import MetricOptions
-from enfilade.reports.heatmap import HeatmapPainter
+from enfilade.images.stored import SUFFIXES
+from enfilade.report.heatmap import HeatmapPainter
 from enfilade.settings import VideoSettings
 from enfilade.viewing import DISPLAYS
 
 KEYS = {  # docs/compare.md
     "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
     "worst_frame", "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2",
-    "persistence", "mode", "departures", "flow", "bands_cpd", "per_frame",
+    "persistence", "mode", "flow", "bands_cpd", "per_frame",
 }  # fmt: skip
 FRAME_KEYS = {
     "name", "number", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
@@ -115,7 +114,6 @@ def test_as_json(run, folders):
     assert all(set(frame) == FRAME_KEYS for frame in found["per_frame"])
     assert (found["frames"], found["size"], found["fps"], found["flow"]) == (FRAMES, [60, 40], 24.0, "none")
     assert found["mode"] == "modern"
-    assert found["departures"] == list(DEPARTURES)
     assert found["peak_cd_m2"] == 450.0
     assert found["per_frame"][0]["score_jnd"] == 0.0
     assert found["per_frame"][1]["percent_visible"] > 0.0
@@ -123,23 +121,15 @@ def test_as_json(run, folders):
     assert found["score_jnd"] > found["transient_jnd"] > 0.0
 
 
-def test_the_paper_and_departures_by_name(run, folders):
-    def mode(*options):
-        found = json.loads(run("compare", *folders, "--json", "--quiet", *options).stdout)
-        return found["mode"], found["departures"]
-
-    assert mode("--mode", "paper") == ("paper", [])
-    assert mode("--mode", "paper", "--with", "csf", "--with", "transient") == ("custom", ["csf", "transient"])
-    kept = [name for name in DEPARTURES if name != "transient"]
-    assert mode("--without", "transient") == ("custom", kept)
-    result = run("compare", *folders, "--without", "colour")
-    assert result.exit_code == 2
-    assert "unknown departure 'colour'; known are: csf" in result.stderr
+def test_both_modes(run, folders):
+    for mode in ("paper", "modern"):
+        found = json.loads(run("compare", *folders, "--json", "--quiet", "--mode", mode).stdout)
+        assert found["mode"] == mode
+        assert (found["transient_jnd"] > 0) == (mode == "modern")
 
 
 def test_what_help_lists_is_what_there_is(run):
     # --help loads no NumPy, so it can't ask
-    assert MetricOptions.departures() == DEPARTURES
     assert tuple(choice.value for choice in FlowChoice) == FLOWS
     assert IMAGES == SUFFIXES
     output = " ".join(run("compare", "--help").output.split())
@@ -216,9 +206,6 @@ def test_nothing_to_compare_is_wrong_input(run, folders, tmp_path, what):
         (("--graph", "graph.pdf"), "it is written as .png"),
         (("--fps", "0"), "fps"),
         (("--layer", "a", "--layer", "b", "--layer", "c"), "--layer is given 3 times"),
-        (("--device", "cpu", "--mode", "paper"), "--device cpu says nothing to this metric"),
-        (("--device", "auto", "--without", "transducer"), "transducer and spatial_pooling; leave it out"),
-        (("--device", "cpu", "--without", "spatial_pooling"), "says nothing to this metric"),
     ],
 )
 def test_wrong_options_are_refused_before_anything_is_judged(run, folders, options, message):
@@ -258,15 +245,6 @@ def test_hdr_video_is_refused(run, folders, tmp_path, transfer, name):
     assert "hdr.mp4" in result.stderr
     assert name in result.stderr
     assert "convert" in result.stderr
-
-
-def test_kernels_say_the_same(run, folders):
-    found = [
-        json.loads(run("compare", *folders, "--json", "--device", device).stdout)
-        for device in ("none", "cpu")
-    ]
-    assert found[0]["score_jnd"] > 1.0
-    assert found[1]["score_jnd"] == pytest.approx(found[0]["score_jnd"], rel=1e-3)
 
 
 def contents(folder):

@@ -10,11 +10,8 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from comparisons import SIZE, Notes, judged, terms, textured
-from enfilade.comparison import compare, kernels_serve, metric_options
+from enfilade.comparison import compare
 from enfilade.errors import ImageError, InputError
-from enfilade.metric import MetricOptions
-from enfilade.metric.decision import Masking
-from enfilade.metric.options import Fitted
 from enfilade.viewing import display_named
 
 
@@ -127,7 +124,7 @@ def test_a_run_is_shown_at_its_own_exposure(sequence, tmp_path):
     assert judged(brighter, same, exposure_ev=0.0).psnr_db == math.inf
 
 
-def test_the_slope_of_masking_counts_where_thresholds_are_elevated(sequence):
+def test_the_slope_of_masking_counts_in_the_papers_mode(sequence):
     random = np.random.default_rng(3)
     texture = random.uniform(0.1, 0.9, (*SIZE, 1)).repeat(3, axis=2).astype(np.float32)
     folder, other = sequence("a", [texture]), sequence("b", [np.roll(texture, 1, axis=0)])
@@ -179,26 +176,6 @@ def test_what_the_metric_refuses_names_the_frame(sequence, monkeypatch):
     def refuse(*_arguments, **_options):
         raise InputError("metric: no")
 
-    monkeypatch.setattr("enfilade.comparison.judge.SequenceAqm.judge", refuse)
+    monkeypatch.setattr("enfilade.comparison.judge.SequenceAqm.compare", refuse)
     with pytest.raises(ImageError, match=r"0001\.exr can't be judged: metric: no"):
         judged(folder, folder)
-
-
-def test_departures_by_name():
-    assert metric_options("modern") == MetricOptions.modern()
-    assert metric_options("paper") == MetricOptions.paper()
-    one = metric_options("paper", include=["csf", "transient"])
-    assert (one.csf, one.transient, one.ripple_free) == ("castle", True, False)
-    assert metric_options("modern", leave_out=["transient"]) == MetricOptions.modern().without("transient")
-    for options in ({"include": ["cfs"]}, {"leave_out": ["cfs"]}):
-        with pytest.raises(InputError, match=r"unknown departure 'cfs'; known are: csf, .*transient"):
-            metric_options("paper", **options)
-    with pytest.raises(InputError, match="unknown mode 'new'"):
-        metric_options("new")
-
-
-def test_kernels_serve_where_the_metric_hands_them_something():
-    modern = MetricOptions.modern()
-    for options in (modern, MetricOptions.paper(), *map(modern.without, modern.departures())):
-        masking = Masking(options, Fitted(), mask_slope=0.7, channel_exponent=2.0)
-        assert kernels_serve(options) == masking.weighs_gathered

@@ -1,7 +1,4 @@
-"""Images and viewing conditions for the metric."""
-
-import importlib.util
-from pathlib import Path
+"""Images, viewing conditions and both modes of the metric."""
 
 import numpy as np
 import pytest
@@ -17,8 +14,19 @@ def viewing():
 
 
 @pytest.fixture(scope="session")
-def metric(viewing):
-    return Aqm(viewing)
+def paper(viewing):
+    return Aqm.paper(viewing)
+
+
+@pytest.fixture(scope="session")
+def modern(viewing):
+    return Aqm.modern(viewing)
+
+
+@pytest.fixture(params=["paper", "modern"])
+def aqm(request, paper, modern):
+    """Either mode."""
+    return paper if request.param == "paper" else modern
 
 
 @pytest.fixture(scope="session")
@@ -30,13 +38,3 @@ def textured():
         grain = sum(np.roll(grain, shift, axis) for shift in (-2, -1, 0, 1, 2)) / 5
     panels = 35.0 + 15.0 * (np.arange(160) // 40 % 2) + 8.0 * (np.arange(128) // 32 % 2)[:, None]
     return (panels + 20.0 * grain).clip(2.0).astype(np.float32)
-
-
-@pytest.fixture(scope="session")
-def twin():
-    """The slow metric of `tests/twins/metric.py`."""
-    path = Path(__file__).parents[1] / "twins" / "metric.py"
-    spec = importlib.util.spec_from_file_location("metric_twin", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

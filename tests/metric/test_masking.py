@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enfilade.metric.masking import masked_difference_squared, threshold_elevation
+from enfilade.metric.masking import threshold_elevation
 
 # Foley 1994, observer KMF: a 2 cpd Gabor on a sine of the same orientation, dB re contrast 1.
 FOLEY_UNMASKED_DB = -31.67
@@ -23,13 +23,10 @@ def test_foley():
     assert error == pytest.approx(2.6, abs=0.1)
 
 
-def test_formula_at_one_mask():
+def test_formula():
     k1, k2 = 6 ** (1 - 1 / 0.3), 6 ** (1 / 0.3)
     expected = (1 + (k1 * (k2 * 5.0) ** 0.7) ** 4) ** 0.25
     assert threshold_elevation(np.float32([5.0]))[0] == pytest.approx(expected, rel=1e-5)
-
-
-def test_no_mask_no_elevation():
     assert threshold_elevation(np.zeros(2, np.float32)).tolist() == [1.0, 1.0]
 
 
@@ -37,10 +34,3 @@ def test_no_mask_no_elevation():
 def test_elevation_rises(one, other, slope):
     low, high = threshold_elevation(np.float32(sorted((one, other))), slope)
     assert 1.0 <= low <= high * (1 + 1e-6)
-
-
-def test_squared_difference():
-    difference, masker = np.float32([0.0, 2.0, 50.0]), np.float32([3.0, 0.0, 40.0])
-    expected = (difference / threshold_elevation(masker)) ** 2
-    got = masked_difference_squared(difference.copy(), masker)
-    np.testing.assert_allclose(got, expected, rtol=1e-5)

@@ -1,11 +1,9 @@
-"""Probability, share, pooling."""
+"""Probability, percentages, pooling over channels and sizes."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from enfilade.metric.pooling import detection_probability, percent_visible, raised, root
+from enfilade.metric.pooling import Pool, detection_probability, percent_visible, raised
 
 
 def test_calibration():
@@ -13,17 +11,31 @@ def test_calibration():
     assert detection_probability(np.float32([0, 1, 2])).tolist() == pytest.approx([0, 0.75, 0.9375])
 
 
-@given(st.floats(2**-10, 1024, width=32))
-def test_one_channel_is_itself(jnd):
-    assert root(raised(np.float32([jnd]) ** 2))[0] == pytest.approx(jnd, rel=1e-5)
-
-
 def test_channels_pool_with_exponent_3_5():
-    pooled = root(raised(np.float32([1.0])) + raised(np.float32([1.0])))
-    assert pooled[0] == pytest.approx(2 ** (1 / 3.5))
+    valid = np.ones((5, 6), bool)
+    pool = Pool(2, valid, 3.5)
+    for jnd in (1.0, 3.0):
+        pool.add(1, raised(np.full((5, 6), jnd**2, np.float32)), 1)
+    pool.add(2, raised(np.full((3, 4), 2.0**2, np.float32)), 2)
+    found = pool.comparison()
+    expected = (1 + 3**3.5 + 2**3.5) ** (1 / 3.5)
+    np.testing.assert_allclose(found.jnd, expected, rtol=1e-5)
+    assert found.score == found.steady.score == pytest.approx(expected, rel=1e-5)
+    assert found.band_jnd == pytest.approx(((1 + 3**3.5) ** (1 / 3.5), 2.0), rel=1e-5)
+    assert found.transient.score == 0.0
 
 
-def test_percent_counts_judged_pixels_only():
+def test_steady_and_transient_parts_add_up():
+    pool = Pool(1, np.ones((4, 4), bool), 1.0)
+    pool.add(1, np.full((4, 4), 2.0, np.float32), 1)
+    pool.add(1, np.full((4, 4), 0.5, np.float32), 1, is_transient=True)
+    found = pool.comparison()
+    scores = found.steady.score, found.transient.score, found.score
+    assert scores == pytest.approx((2.0, 0.5, 2.5), rel=1e-5)
+    assert found.band_jnd == pytest.approx((2.5,))
+
+
+def test_percent_counts_valid_pixels_only():
     jnd = np.float32([[0.5, 2.0], [1.0, 3.0]])
     assert percent_visible(jnd, np.ones((2, 2), bool)) == 50.0
     assert percent_visible(jnd, np.array([[True, True], [True, False]])) == pytest.approx(100 / 3)

@@ -1,37 +1,38 @@
-"""The change of an error that moves by fractions of a pixel."""
+"""The change of an error along the motion, and the sensitivity to it."""
 
 import numpy as np
-import pytest
 
-from enfilade.metric import SequenceAqm
-from enfilade.viewing import Viewing
-
-SHAPE = (128, 160)
-VIEWING = Viewing(640, 480).cropped(SHAPE[1], SHAPE[0])
+from enfilade.metric.transient import error_change, flicker_sensitivity, moved
 
 
-def transient_jnd(judge, period_px, step_px):
-    """Transient part of a grating of 4 cd/m2 on 40 that sticks to a surface which moves to the right."""
-    reference = np.full(SHAPE, 40.0, np.float32)
-    flow = np.zeros((*SHAPE, 2), np.float32)
-    flow[..., 0] = -step_px
-    for frame in range(3):
-        x = np.arange(SHAPE[1]) - frame * step_px
-        test = reference + 4.0 * np.sin(2.0 * np.pi * x / period_px)
-        found = judge.judge(test.astype(np.float32), reference, backward_flow_px=flow, is_cut=frame == 0)
-    return found.transient.score
+def test_moved_is_exact_on_a_ramp():
+    ramp = np.add.outer(2.0 * np.arange(9), 3.0 * np.arange(12)).astype(np.float32)
+    flow = np.full((9, 12, 2), (0.25, -0.5), np.float32)
+    found, is_inside = moved(ramp, flow)
+    np.testing.assert_allclose(found[is_inside], (ramp + 0.75 - 1.0)[is_inside], rtol=1e-5)
+    assert not is_inside[0].any()
+    assert not is_inside[:, -1].any()
+    assert is_inside[1:, :-1].all()
 
 
-@pytest.fixture(scope="module")
-def judge():
-    return SequenceAqm(VIEWING)
+def test_change_follows_the_surface():
+    error, valid = np.zeros((6, 8), np.float32), np.ones((6, 8), bool)
+    error[3, 4] = 1.0
+    flow = np.zeros((6, 8, 2), np.float32)
+    flow[..., 0] = -1.0
+    here, right = (error, valid), (np.roll(error, 1, axis=1), valid)
+    assert not error_change(right, here, flow).any()
+    assert error_change(here, right, flow).min() == -1.0
+    assert np.count_nonzero(error_change(right, here, None)) == 2
+    # A surface that was not valid, in part or whole, has no change.
+    hole = valid.copy()
+    hole[3, 4] = False
+    assert not error_change((2 * right[0], valid), (np.where(hole, error, 0), hole), flow).any()
+    assert not error_change((2 * right[0], valid), (error, hole), flow + np.float32([0.5, 0]))[3, 4:6].any()
 
 
-@pytest.mark.parametrize(("period_px", "most_jnd"), [(4, 0.35), (6, 0.13), (12, 0.02)])
-def test_between_pixels_a_fine_steady_error_changes_a_little(judge, period_px, most_jnd):
-    # what bilinear samples lose of a sine half way between pixels: 29 % at 4 pixels a period, 3 % at 12
-    assert 0.0 < transient_jnd(judge, period_px, 1.5) < most_jnd
-
-
-def test_at_whole_pixels_it_does_not(judge):
-    assert transient_jnd(judge, 4, 2.0) < 1e-3
+def test_flicker_is_seen_best_at_low_spatial_frequency():
+    light = np.array([10.0, 100.0])
+    coarse, fine = (flicker_sensitivity(cpd, 30.0, light) for cpd in (1.0, 16.0))
+    assert (coarse > 5 * fine).all()
+    assert coarse[1] > coarse[0]

@@ -134,8 +134,8 @@ def test_lost_fills_are_traced_by_workers_as_they_were(decoupled):
     assert Run.existing(folder).digest() == digest
 
 
-def test_a_renderer_without_light_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match="needs a Mitsuba scene"):
+def test_a_renderer_that_does_not_split_lobes_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="'analytic' does not estimate lobes apart"):
         rendered(tmp_path, job_of(tmp_path, wall(), slide(3), method="decoupled"))
 
 

@@ -9,7 +9,7 @@ from enfilade.errors import DamagedFileError
 from enfilade.methods.decoupled import light_of
 from enfilade.monitor import Silence
 from enfilade.pipeline.decoupled import DecoupledFrames
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.kept import either_side
 from enfilade.pipeline.light import LEAST_HOLES, LEAST_SHARE, LightTable
 from enfilade.pipeline.survey import survey_path
@@ -30,7 +30,7 @@ def lit(tmp_path_factory):
     path = load_path(files.path, size=(96, 72), frames=FRAMES)
     settings = Settings.from_tables({"light": {"spacing": 7, "paths": 4}, "keyframes": {"adaptation": 0.0}})
     job = Job(files.scene, path, settings, "decoupled")
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     with Run.open(folder / "run", job.identity(renderer)) as run:
         yield _begun(job, renderer, run)
 
@@ -111,7 +111,7 @@ def test_a_denoiser_takes_the_place_of_smoothing(tmp_path):
     def light(paths, denoiser):
         settings = Settings.from_tables({"light": {"paths": paths, "denoiser": denoiser}})
         job = Job(files.scene, path, settings, "decoupled")
-        renderer = open_renderer(job.scene, job.settings.trace)
+        renderer = job.open_renderer()
         with Run.open(tmp_path / f"{paths}-{denoiser}", job.identity(renderer)) as run:
             _, table = _begun(job, renderer, run)
             for segment in table.segments:
@@ -134,7 +134,7 @@ def test_nothing_is_compiled_after_the_first_frames(tmp_path):
     path = load_path(files.path, size=(64, 48), frames=tuple(range(20, 36)))
     settings = Settings.from_tables({"light": {"spacing": 5, "paths": 4}})
     job = Job(files.scene, path, settings, "decoupled")
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     with Run.open(tmp_path / "run", job.identity(renderer)) as run:
         workshop, table = _begun(job, renderer, run)
         for segment in table.segments:

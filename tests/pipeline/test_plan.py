@@ -6,7 +6,6 @@ from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import InputError, SettingsError
 from enfilade.monitor import Silence
-from enfilade.pipeline import plan as module
 from enfilade.pipeline import rehearsal
 from enfilade.pipeline.job import Job
 from enfilade.pipeline.kept import nearest
@@ -39,7 +38,7 @@ def test_too_few_paths_to_know_their_noise_are_refused(tmp_path):
 )
 def test_what_render_would_refuse_is_refused(tmp_path, monkeypatch, size, tables, words):
     opened = []
-    monkeypatch.setattr(module, "open_renderer", lambda *_: opened.append(1))
+    monkeypatch.setattr(Job, "open_renderer", lambda _: opened.append(1))
     job = job_of(tmp_path, wall(), slide(3, size=size), **tables)
     with pytest.raises(InputError, match=words):
         plan(job, Silence())

@@ -21,6 +21,7 @@ from enfilade.store import Run
 from enfilade.store.lock import Lock
 from scenes_analytic import room, room_walk
 from small_runs import Told, Watcher, children, job_of
+from support.analytic_scene import write_scene
 
 NOISY = dataclasses.replace(room(specular=True), noise=0.05)
 OPENJD = Path(sys.executable).with_name("openjd")
@@ -264,8 +265,7 @@ def test_a_damaged_line_of_another_task_is_mended_by_the_command_that_is_named(w
 
 
 def test_a_scene_that_has_changed_is_refused(begun):
-    scene = begun.parent / "scene.analytic.json"
-    scene.write_text(scene.read_text().replace('"noise": 0.05', '"noise": 0.06'))
+    write_scene(begun.parent / "scene.analytic", dataclasses.replace(NOISY, noise=0.06))
     with pytest.raises(RunFolderError, match="not the one with which the run began"):
         share(begun, "plan")
 

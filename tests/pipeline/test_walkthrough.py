@@ -16,17 +16,17 @@ from enfilade.images import read_exr
 from enfilade.methods.paper.masks import slow_pixels
 from enfilade.monitor import Silence
 from enfilade.pipeline.inbetween import make_keyframe, read_raw
-from enfilade.pipeline.job import Job, open_renderer
+from enfilade.pipeline.job import Job
 from enfilade.pipeline.plan import plan
 from enfilade.pipeline.walkthrough import kept, prepare, render
 from enfilade.pipeline.workshop import Workshop
 from enfilade.records import Provenance, SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
 from enfilade.store import Run
 from keyframes_analytic import psnr
 from scenes_analytic import ball, room, room_walk, slide, wall
 from small_runs import colors, frame_bytes, job_of, part_of, rendered, units, with_cut
+from support.analytic_scene import AnalyticScene, Material, Plane, Sphere, Waves
 
 PATH = part_of(room_walk(30), range(13))
 
@@ -417,7 +417,7 @@ def test_what_is_warped_from_a_rest_goes_through_the_pixels_centres(tmp_path):
     walk = room_walk(24)
     path = CameraPath(tuple(walk.cameras[max(i, 0)] for i in range(-8, 9)), tuple(range(1, 18)), 30.0)
     job = job_of(tmp_path, room(), path, trace={"spp": 4})
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     with Run.open(tmp_path / "run", job.identity(renderer)) as run:
         workshop = Workshop(job, renderer, run, Silence())
         assert slow_pixels(workshop.views[0].speed_deg_s, job.settings.masks).all()

@@ -168,12 +168,12 @@ def test_who_can_not_take_part_is_named(held, tmp_path, monkeypatch):
     assert judges == [reason for reason in reasons.values() if reason]
     assert denoised == "path tracing, denoised does not take part: no denoiser here"
     assert light.startswith("decoupled does not take part:")
-    assert "no light to ask for" in light
+    assert "does not estimate lobes apart" in light
     assert told.said[: len(judges) + 2] == found["left_out"]
     assert list(found["judges"]) == ["psnr"]
     with pytest.raises(SettingsError, match="no flip here"):
         bench(job, everybody, Terms(64, judges=("flip",)), tmp_path / "other", told)
-    with pytest.raises(SettingsError, match=r"nobody can take part.*no light to ask for"):
+    with pytest.raises(SettingsError, match=r"nobody can take part.*does not estimate lobes apart"):
         bench(job, everybody[-2:-1], TERMS, tmp_path / "other", told)
     assert not (tmp_path / "other").exists()
 
@@ -208,7 +208,7 @@ def test_a_contestant_that_fails_says_why(held, tmp_path):
     settings = dataclasses.replace(job.settings.trace, spp=1)
     bad = dataclasses.replace(job, settings=dataclasses.replace(job.settings, trace=settings))
     everybody = lineup(bad, traced=(), denoised=(), presets=(Preset("light", "decoupled"),))
-    with pytest.raises(SettingsError, match="needs a Mitsuba scene"):
+    with pytest.raises(SettingsError, match="does not estimate lobes apart"):
         bench(bad, everybody, TERMS, tmp_path / "bench", Silence())
 
 

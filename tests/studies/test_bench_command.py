@@ -7,17 +7,16 @@ import pytest
 from enfilade.camera import load_path
 from enfilade.comparison.measures import JUDGES
 from scenes_analytic import room
-from small_runs import TABLES, scene_text
+from small_runs import RENDERER, TABLES
 from studies.bench.command import JUDGES as LISTED
+from support.analytic_scene import write_scene
 
 ARGUMENTS = ("--spp", "1,2", "--denoised-spp", "none", "--reference-spp", "8", "--quiet")
 
 
 @pytest.fixture
 def scene(tmp_path):
-    file = tmp_path / "room.analytic.json"
-    file.write_text(scene_text(room()))
-    return file
+    return write_scene(tmp_path / "room.analytic", room())
 
 
 def test_the_listed_judges_are_those_there_are():
@@ -25,8 +24,16 @@ def test_the_listed_judges_are_those_there_are():
 
 
 def test_from_arguments_to_files(run, tmp_path, scene, camera_path):
-    line = ("bench", scene, "--path", camera_path, "--out", tmp_path / "bench", *ARGUMENTS)
-    line += ("--only", "traced-*", "--judge", "psnr", "--viewing-diagonal-m", TABLES["viewing"]["diagonal_m"])
+    line = ("bench", scene, "--renderer", RENDERER, "--path", camera_path, "--out", tmp_path / "bench")
+    line += (
+        *ARGUMENTS,
+        "--only",
+        "traced-*",
+        "--judge",
+        "psnr",
+        "--viewing-diagonal-m",
+        TABLES["viewing"]["diagonal_m"],
+    )
     result = run(*line, "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)

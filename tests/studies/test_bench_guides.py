@@ -5,12 +5,11 @@ import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
-from enfilade.pipeline.job import open_renderer
-from enfilade.scene.analytic import load
-from enfilade.scene.analytic_scene import scene_text
+from enfilade.scene.opener import open_renderer
 from enfilade.settings import TraceSettings
 from scenes_analytic import room, room_walk
 from studies.bench.guides import guides
+from support.analytic import AnalyticRenderer
 
 CHUNK = 1 << 20
 MIRROR = """<scene version="3.0.0">
@@ -28,10 +27,8 @@ MIRROR = """<scene version="3.0.0">
 </scene>"""
 
 
-def test_they_are_those_of_the_pixels_where_nothing_changes_within_one(tmp_path):
-    file = tmp_path / "room.analytic.json"
-    file.write_text(scene_text(room()))
-    renderer, camera = load(file, chunk=CHUNK), room_walk(1).cameras[0]
+def test_they_are_those_of_the_pixels_where_nothing_changes_within_one():
+    renderer, camera = AnalyticRenderer(room(), chunk=CHUNK), room_walk(1).cameras[0]
     albedo, normal = guides(renderer, camera, seed=0, frame=1, chunk=CHUNK)
     seen = find_geometry(renderer, camera)
     inner = np.zeros(seen.shape_index.shape, bool)

@@ -5,18 +5,18 @@ import json
 import pytest
 
 from enfilade.errors import RunFolderError
-from enfilade.scene.analytic_scene import scene_text
 from scenes_analytic import room
+from small_runs import RENDERER
 from studies.__main__ import main
 from studies.cases import charts as cases
 from studies.cases import threshold
+from support.analytic_scene import write_scene
 
 
 @pytest.fixture
 def inputs(tmp_path):
     """An analytic scene, and a path of ten frames along its front."""
-    scene = tmp_path / "scene.analytic.json"
-    scene.write_text(scene_text(room()))
+    scene = write_scene(tmp_path / "scene.analytic", room())
 
     def pose(x):
         return [1, 0, 0, x, 0, 1, 0, 1.4, 0, 0, 1, 3.5, 0, 0, 0, 1]
@@ -27,8 +27,8 @@ def inputs(tmp_path):
     file.write_text(json.dumps({**values, "seconds": 1 / 3, "camera_path": cameras}))
     return [
         str(scene),
-        "--path",
-        str(file),
+        *("--renderer", RENDERER),
+        *("--path", str(file)),
         "--viewing-diagonal-m",
         "0.025",
         "--probes",
@@ -62,7 +62,7 @@ def test_a_curve_that_cannot_be_drawn_is_told(run, inputs, tmp_path, monkeypatch
 
     monkeypatch.setattr(cases, "draw_threshold", draw)
     monkeypatch.chdir(tmp_path)
-    line = ("calibrate", "threshold", "scene.analytic.json", *inputs[1:], "--device", "cpu", *flags)
+    line = ("calibrate", "threshold", "scene.analytic", *inputs[1:], "--device", "cpu", *flags)
     result = run(*line, "--plot", "curve.png")
     assert result.exit_code == 2
     assert "0.5" in result.stdout
@@ -105,7 +105,7 @@ def test_a_scene_that_reaches_for_other_files_is_refused(run, inputs, tmp_path):
     scene = tmp_path / "scene.xml"
     mesh = '<shape type="ply"><string name="filename" value="/elsewhere/mesh.ply"/></shape>'
     scene.write_text(f'<scene version="3.0.0">{mesh}</scene>')
-    result = run("calibrate", "threshold", scene, *inputs[1:], "--device", "cpu")
+    result = run("calibrate", "threshold", scene, *inputs[3:], "--device", "cpu")
     assert result.exit_code == 2
     assert "--allow /elsewhere" in result.stderr
 

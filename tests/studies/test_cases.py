@@ -10,7 +10,6 @@ from enfilade.gbuffer import find_geometry, image_flow
 from enfilade.methods.keyframes import place_keyframes
 from enfilade.monitor import Silence
 from enfilade.pipeline.cost import Costs
-from enfilade.pipeline.job import open_renderer
 from enfilade.pipeline.plan import hole_percent
 from enfilade.pipeline.survey import survey_path
 from enfilade.pipeline.views import Views
@@ -31,7 +30,7 @@ from studies.cases.windows import Windows, probes_of
 
 def windows_of(folder, *, specular=False, count=24, is_plain=True, **tables):
     job = job_of(folder, room(specular=specular), room_walk(count, size=(64, 48)), **tables)
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, Silence())
     source = PlainlyLit(renderer) if is_plain else renderer
@@ -87,7 +86,7 @@ def test_plain_light_shows_what_mirrors_reflect(shiny):
 def test_the_virtual_image_of_a_plane_mirror_stands_still(tmp_path):
     """A mirror as back wall: the reflected room is a room behind it, whose flow is that of its points."""
     from enfilade.camera.pinhole import Camera, look_at
-    from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
+    from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 
     mirror = Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR)
     checks = Material(Checker((0.8, 0.8, 0.8), (0.2, 0.2, 0.2), 0.5))
@@ -101,7 +100,7 @@ def test_the_virtual_image_of_a_plane_mirror_stands_still(tmp_path):
         folder = tmp_path / name
         folder.mkdir()
         job = job_of(folder, of, room_walk(2, size=(32, 24)))
-        renderer = open_renderer(job.scene, job.settings.trace)
+        renderer = job.open_renderer()
         return renderer, find_geometry(renderer, cameras[0])
 
     renderer, geometry = geometry_of(scene, "real")
@@ -355,14 +354,14 @@ def test_outlines_by_hand():
 
 def test_the_flow_of_the_reflection_keeps_what_the_mirror_shows(tmp_path):
     """Along a plane mirror: its own flow blurs the reflection, that of the virtual image does not."""
-    from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
+    from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 
     mirror = Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR)
     checks = Material(Checker((0.9, 0.9, 0.9), (0.1, 0.1, 0.1), 2.4))
     back = Quad((-3, 0, -1), (6, 0, 0), (0, 3, 0), mirror, "mirror")
     front = Quad((-20, -10, 8), (0, 20, 0), (40, 0, 0), checks, "wall")
     job = job_of(tmp_path, AnalyticScene((back, front)), room_walk(24, size=(64, 48), turn_deg=0.0))
-    renderer = open_renderer(job.scene, job.settings.trace)
+    renderer = job.open_renderer()
     views = Views(renderer, job.path, job.viewing, Costs())
     survey = survey_path(views, job.path, job.settings, Silence())
     windows = Windows(job, PlainlyLit(renderer), survey, None, Silence(), views, 64)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from enfilade.metric import Fitted
+from enfilade.metric import Transducer
+from enfilade.metric.aperture import APERTURE_SIGMA_DEG
 from studies.observers.fits import APERTURES_DEG, TRANSDUCERS, fit
 
 CANDIDATES = ((1.0,), (2.0,))
@@ -27,9 +28,9 @@ def test_the_gain_is_the_others():
 
 
 def test_what_the_metric_has_is_among_the_candidates():
-    has = Fitted()
-    assert (has.neighbour_share, has.semi_saturation) in TRANSDUCERS
-    assert has.aperture_sigma_deg in APERTURES_DEG
+    has = Transducer()
+    assert (has.neighbour_fraction, has.semi_saturation) in TRANSDUCERS
+    assert APERTURE_SIGMA_DEG in APERTURES_DEG
     # And not at the end of what was tried, where the best could lie beyond.
-    assert has.neighbour_share not in {TRANSDUCERS[0][0], TRANSDUCERS[-1][0]}
+    assert has.neighbour_fraction not in {TRANSDUCERS[0][0], TRANSDUCERS[-1][0]}
     assert has.semi_saturation not in {TRANSDUCERS[0][1], TRANSDUCERS[-1][1]}

@@ -33,7 +33,7 @@ def test_the_table_has_ten_masks():
 
 
 def test_a_strong_mask_raises_the_threshold():
-    observer = PAPER.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = PAPER.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     gabor, sine = gabor_and_sine()
     alone = threshold_contrast(observer, gabor, 32.0)
     masked = threshold_contrast(observer, gabor, 32.0, mask=0.3 * sine)

@@ -108,7 +108,7 @@ def test_one_gain_is_taken_off():
 
 
 def test_a_threshold_is_where_the_response_is_1_jnd():
-    observer = PAPER.image_judge(screen(SIZE_PX, PIXELS_PER_DEGREE))
+    observer = PAPER.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     pattern = target(4)
     contrast = threshold_contrast(observer, pattern, 30.0, guess=0.2)
     background = np.full(pattern.shape, 30.0, np.float32)

@@ -1,4 +1,4 @@
-"""``enfilade compare``: what a viewer sees of the difference between two sequences."""
+"""``enfilade compare``: the visible difference between two sequences."""
 
 from __future__ import annotations
 
@@ -10,31 +10,17 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
-from enfilade.cli.flags import SettingsCommand, given_in, settings_of, settings_options
 from enfilade.cli.group import debug_option
-from enfilade.cli.inputs import json_option, quiet_option
-from enfilade.cli.outcome import check_png
+from enfilade.cli.options import check_png, given_in, json_option, quiet_option, settings_of, settings_options
 from enfilade.errors import SettingsError
+from enfilade.settings import SECTIONS, MetricSettings, ViewingSettings
 
 if TYPE_CHECKING:
-    from enfilade.comparison import JudgedFrame, Terms
-    from enfilade.comparison.judge import Show
+    from enfilade.comparison import ComparedFrame, Show, Terms
     from enfilade.reports.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
-FLOWS = ("auto", "layers", "estimate", "none")
-DEPARTURES = (  # `MetricOptions.departures`, which --help can't ask: it would load NumPy
-    "csf",
-    "luminance_adaptive",
-    "hold_blur",
-    "csf_within_bands",
-    "ripple_free",
-    "transducer",
-    "broad_masking",
-    "spatial_pooling",
-    "transient",
-)
-IMAGES = frozenset(  # frames of which a heat map takes the name: `SUFFIXES`, which --help can't ask either
+IMAGES = frozenset(  # `images.imagefiles.SUFFIXES`, which would load NumPy here
     {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"}
 )
 
@@ -53,72 +39,63 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
     return value
 
 
-@click.command(
-    "compare", cls=SettingsCommand, short_help="What a viewer sees of the difference of two sequences."
-)
+@click.command("compare", short_help="The visible difference between two sequences.")
 @click.argument("test")
 @click.argument("reference")
 @click.option(
     "--display",
-    metavar="NAME",
+    "display",
+    metavar="DISPLAY",
     callback=_list_displays,
     is_eager=True,
-    help="A screen on which images stand pixel for pixel: paper, desktop-24-fhd, desktop-27-4k, laptop-14, "
-    "phone, tv-55-4k, cinema; list shows them. Numbers of [viewing] win over its own.  "
-    "[default: the numbers of [viewing], on a screen that the image fills]",
+    help="A display on which images stand pixel for pixel: paper, desktop-24-fhd, desktop-27-4k, "
+    "laptop-14, phone, tv-55-4k, cinema; list describes them. Numbers of [viewing] win over its own.  "
+    "[default: the numbers of [viewing], on a display that the image fills]",
 )
-@click.option("--fps", type=float, help="Frames per second that are shown.  [default: the sequences', or 30]")
+@click.option("--fps", type=float, help="Frames per second shown.  [default: the sequences', or 30]")
 @click.option(
     "--mode",
     type=click.Choice(("modern", "paper")),
     default="modern",
     show_default=True,
-    help="The metric as published, or with all departures.",
+    help="The metric with later models of vision, or as published.",
 )
 @click.option(
-    "--with",
-    "include",
-    metavar="NAME",
+    "--measure",
+    "measures",
     multiple=True,
-    help=f"Add a departure to the mode: {', '.join(DEPARTURES)}.",
+    type=click.Choice(("psnr", "flip", "cvvdp")),
+    help="A further measure; as often as wanted.",
 )
-@click.option("--without", "leave_out", metavar="NAME", multiple=True, help="Take a departure away.")
 @click.option(
     "--flow",
-    type=click.Choice(FLOWS),
+    type=click.Choice(("auto", "layers", "estimate", "none")),
     default="auto",
     show_default=True,
-    help="Image flow: from layers of OpenEXR frames, estimated, or none; auto estimates where there are no "
-    "layers.",
+    help="Motion vectors: from layers of OpenEXR frames, estimated, or none; auto estimates where there are "
+    "no layers.",
 )
 @click.option(
     "--layer",
     "layers",
     metavar="NAME",
     multiple=True,
-    help="Layer or part of OpenEXR frames that is the picture: once for both sequences, or twice, the test's "
-    "and then the reference's.  [default: R G B without a name, else rgba, beauty, C or Combined, else the "
-    "only one of three channels]",
-)
-@click.option(
-    "--device",
-    type=click.Choice(("none", "auto", "cpu", "gpu")),
-    default="none",
-    show_default=True,
-    help="Where the modern mode's per-pixel part runs: in NumPy (none), or in Dr.Jit kernels, which are "
-    "faster and take a second to start; auto is the GPU where there is one. They need the departures "
-    "transducer and spatial_pooling.",
+    help="Layer or part of OpenEXR frames that is compared: once for both sequences, or twice, for the test "
+    "and the reference.  [default: R G B without a name, else rgba, beauty, C or Combined, else the only one "
+    "of three channels]",
 )
 @click.option(
     "--heatmap",
     type=click.Path(path_type=Path),
     help="Write heat maps: a video (.mp4, .mkv, .mov), or a folder of PNGs.",
 )
-@click.option("--graph", type=click.Path(path_type=Path, dir_okay=False), help="Draw the time graph (.png).")
+@click.option(
+    "--graph", type=click.Path(path_type=Path, dir_okay=False), help="Draw the scores over time (.png)."
+)
+@settings_options("--exposure-ev", default="the runs', or 0")
 @json_option
 @quiet_option
 @debug_option
-@settings_options("viewing", "metric")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -132,14 +109,15 @@ def command(
     quiet: bool,
     **choices: Any,
 ) -> None:
-    """Judge TEST against REFERENCE with the animation quality metric.
+    """Compare TEST with REFERENCE by the animation quality metric.
 
-    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), a pattern such
-    as frames/%04d.exr, or a video.
+    Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), a pattern such as
+    frames/%04d.exr, or a video.
 
-    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical, 1
-    a difference that three viewers of four find when they look for it, everywhere and all the time. What is
-    small or brief has a lower score than its own JND; where that is visible, the largest is said, too.
+    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical; 1
+    is a difference that three of four observers find when they look for it, everywhere and all the time. A
+    small or brief difference has a lower score than its own JND; where it is visible, the largest value is
+    printed, too.
     """
     check_png("--graph", graph)
     show = None if heatmap is None else _painted(heatmap)
@@ -169,46 +147,33 @@ def _terms(
     display: str | None,
     fps: float | None,
     mode: str,
-    include: tuple[str, ...],
-    leave_out: tuple[str, ...],
+    measures: tuple[str, ...],
     flow: str,
     layers: tuple[str, ...],
-    device: str,
 ) -> Terms:
-    from enfilade.comparison import FlowChoice, Terms, kernels_serve, metric_options
+    from enfilade.comparison import FlowChoice, Terms
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
-    settings = settings_of(ctx)
-    options = metric_options(mode, include=include, leave_out=leave_out)
-    if device != "none":
-        if not kernels_serve(options):
-            raise SettingsError(
-                f"--device {device} says nothing to this metric: the kernels need the departures transducer "
-                "and spatial_pooling; leave it out, or have both"
-            )
-        from enfilade.device import activate
-
-        if note := activate(cast('Literal["auto", "cpu", "gpu"]', device)).note:
-            click.echo(f"note    judged on the CPU: {note}", err=True)
+    settings = settings_of(ctx, SECTIONS)
+    viewing = settings[ViewingSettings]
     return Terms(
-        viewing=settings.viewing,
-        metric=settings.metric,
-        display=None if display is None else _display(ctx, display),
-        options=options,
+        viewing=viewing,
+        metric=settings[MetricSettings],
+        display=None if display is None else _display(ctx, display, viewing),
+        mode=cast('Literal["modern", "paper"]', mode),
         flow=FlowChoice(flow),
         fps=fps,
-        exposure_ev=settings.viewing.exposure_ev if "exposure_ev" in given_in(ctx, "viewing") else None,
-        has_kernels=device != "none",
+        exposure_ev=viewing.exposure_ev if "exposure_ev" in given_in(ctx, ViewingSettings) else None,
         layers=(layers[0], layers[-1]) if layers else (None, None),
+        measures=measures,
     )
 
 
-def _display(ctx: click.Context, name: str) -> Display:
+def _display(ctx: click.Context, name: str, viewing: ViewingSettings) -> Display:
     from enfilade.viewing import display_named
 
-    viewing = settings_of(ctx).viewing
-    numbers = given_in(ctx, "viewing") - {"exposure_ev"}
+    numbers = given_in(ctx, ViewingSettings) - {"exposure_ev"}
     return replace(display_named(name), **{number: getattr(viewing, number) for number in numbers})
 
 
@@ -224,7 +189,7 @@ def _painted(target: Path) -> Show:
     if not is_folder and target.suffix.lower() not in VIDEO_CODECS:
         raise SettingsError(f"--heatmap {target}: give a folder, or a file {', '.join(VIDEO_CODECS)}")
 
-    def show(frames: Iterator[JudgedFrame], viewing: Viewing) -> None:
+    def show(frames: Iterator[ComparedFrame], viewing: Viewing) -> None:
         painter = HeatmapPainter(viewing.width_px, viewing.height_px)
         size = painter.width, painter.height
         if is_folder:
@@ -269,12 +234,12 @@ def _place_on_disk(file: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def _name(frame: JudgedFrame) -> str:
+def _name(frame: ComparedFrame) -> str:
     file = Path(frame.difference.name)
     return file.stem if file.suffix.lower() in IMAGES else f"{frame.difference.number:06d}"
 
 
-def _picture(painter: HeatmapPainter, frame: JudgedFrame) -> Any:
+def _picture(painter: HeatmapPainter, frame: ComparedFrame) -> Any:
     of = frame.difference
     caption = (
         f"frame {of.number}    {of.score:.2f} JND (steady {of.steady.score:.2f}, transient "

@@ -310,14 +310,15 @@ def job_of(
 def _check_effect(ctx: click.Context, method: Method) -> None:
     """Refuse flags and assignments for sections that the method does not read; a file may have them."""
     given = ctx.meta.get(_META, {})
-    read = {kind.table for kind in (*COMMON, *method.settings)}
+    kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
+    read = {kind.table for kind in kinds}
     asked = {flag: kind.table for flag, (kind, _) in FLAGS.items() if flag in given}
     asked |= {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
     for flag, table in asked.items():
         if table not in read:
             raise SettingsError(
-                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it out, or "
-                "choose another method"
+                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "
+                "out, or choose another method"
             )
 
 

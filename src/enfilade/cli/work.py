@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -39,16 +40,14 @@ def command(
     pass_name: str | None,
     shard: str,
     is_openjd: bool,
-    executor: str,
-    workers: int | None,
-    threads: int,
     device: Choice,
     quiet: bool,
+    **team: Any,
 ) -> None:
     """Continue the run in the folder RUN, which `enfilade render` began.
 
-    With --pass, several commands may work on one run, on one or many hosts: each pass after the one before, all
-    shards of a pass at the same time.
+    With --pass, several commands may work on one run, on one or many hosts: each pass after the one before,
+    all shards of a pass at the same time.
     """
     match = re.fullmatch(r"([0-9]+)/([0-9]+)", shard)
     if match is None:
@@ -57,7 +56,7 @@ def command(
         raise SettingsError("--shard needs --pass")
     mark_resumable(ctx)
     activate(_device_of(run) if device == "auto" else device)
-    team = workers_of(executor, workers, threads)
+    workers = workers_of(**team)
     from enfilade.cli.progress import OpenJdMonitor, watch
     from enfilade.cli.render import show_run
     from enfilade.runs.render import Shard, render_shard, resume
@@ -65,9 +64,9 @@ def command(
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
         if pass_name is None:
-            summary = resume(run, monitor, team)
+            summary = resume(run, monitor, workers)
         else:
-            render_shard(run, Shard(pass_name, int(match[1]), int(match[2])), monitor, team)
+            render_shard(run, Shard(pass_name, int(match[1]), int(match[2])), monitor, workers)
     if pass_name is None:
         show_run(run, summary)
 
@@ -77,7 +76,7 @@ def _device_of(run: Path) -> Choice:
     from enfilade.runs.folder import identity_of
 
     try:
-        variant = str(identity_of(run)["renderer"]["variant"])
+        variant = str(identity_of(run)["scene"]["variant"])
     except (RunFolderError, LookupError, TypeError):  # the next step names the cause
         return "auto"
     return "gpu" if variant.startswith("cuda") else "cpu"

@@ -1,20 +1,18 @@
-"""Judging two sequences: opened side by side, followed along their motion, judged frame by frame (§3)."""
+"""Comparing two sequences: read side by side, followed along their motion, measured frame by frame (§3)."""
 
 from __future__ import annotations
 
-from enfilade.comparison.judge import JudgedFrame, Terms, compare, kernels_serve, metric_options
+from enfilade.comparison.compare import ComparedFrame, Show, Terms, compare
 from enfilade.comparison.motion import FlowChoice
-from enfilade.comparison.verdict import FrameDifference, SequenceDifference, meaning, psnr_db
+from enfilade.comparison.result import FrameDifference, SequenceDifference, psnr_db
 
 __all__ = [
+    "ComparedFrame",
     "FlowChoice",
     "FrameDifference",
-    "JudgedFrame",
     "SequenceDifference",
+    "Show",
     "Terms",
     "compare",
-    "kernels_serve",
-    "meaning",
-    "metric_options",
     "psnr_db",
 ]

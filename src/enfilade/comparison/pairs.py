@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import ImageError
 from enfilade.files import read_json
 from enfilade.images import Sequence, open_sequence
@@ -25,7 +26,7 @@ FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """One frame of each sequence, as the screen shows them.
+    """One frame of each sequence, as the display shows them.
 
     Attributes
     ----------
@@ -34,13 +35,13 @@ class Pair:
     name : str
         Of the test's frame.
     number : int
-        Of the test's frame; from 1 where it has none of its own.
+        Of the test's frame; counted from 1 where it has none of its own.
     test, reference : (H, W) float32
         Luminance, cd/m2.
     reference_relative : (H, W) float32
         Of the reference, 1 = white.
-    squared_error : float
-        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+    exposed_test, exposed_reference : (H, W, 3) float32
+        Linear Rec.709 after exposure and clipping, 0..1.
     """
 
     index: int
@@ -49,7 +50,24 @@ class Pair:
     test: F32
     reference: F32
     reference_relative: F32
-    squared_error: float
+    exposed_test: F32
+    exposed_reference: F32
+
+    @property
+    def squared_error(self) -> float:
+        """Mean over pixels and channels, sRGB-encoded; 0 exactly where the frames are equal."""
+        if np.array_equal(self.exposed_test, self.exposed_reference):
+            return 0.0
+        difference = srgb_encode(self.exposed_test) - srgb_encode(self.exposed_reference)
+        return float(np.vdot(difference, difference)) / difference.size
+
+    @property
+    def displayed(self) -> DisplayedPair:
+        """The pair for further measures."""
+        test, reference = (
+            srgb_encode(image).astype(np.float32) for image in (self.exposed_test, self.exposed_reference)
+        )
+        return DisplayedPair(test, reference, self.test, self.reference)
 
 
 class Pairs:
@@ -99,10 +117,10 @@ class Pairs:
         """Width and height, pixels."""
         return self.test.width, self.test.height
 
-    def shown(self, viewing: Viewing, monitor: Monitor) -> Iterator[Pair]:
-        """Frames as the screen of `viewing` shows them; each is read when it is asked for.
+    def displayed(self, viewing: Viewing, monitor: Monitor) -> Iterator[Pair]:
+        """Frames as the display shows them; each is read when it is needed.
 
-        Negative values, which no screen shows, are black; that is said once.
+        Negative values, which no display shows, are black; a message says so once.
 
         Raises
         ------
@@ -117,25 +135,33 @@ class Pairs:
             ]
             if min(least) < 0.0 and not is_said:
                 first = (self.test, self.reference)[least.index(min(least))].name(index)
-                monitor.say(f"{first} holds negative values; a screen shows them, and more like them, as 0")
+                monitor.say(f"{first} holds negative values, which are shown as black")
                 is_said = True
             yield self._pair(index, images, viewing)
 
     def _pair(self, index: int, images: tuple[F32, F32], viewing: Viewing) -> Pair:
-        # What is equal stays exactly equal: both take the same steps.
-        exposed = [
+        # Equal images stay exactly equal: both take the same steps.
+        exposed_test, exposed_reference = (
             np.clip(image * np.float32(2.0**ev), 0.0, 1.0)
             for image, ev in zip(images, self._exposures_ev, strict=True)
-        ]
+        )
         relative = [
-            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0) for image in exposed
+            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0)
+            for image in (exposed_test, exposed_reference)
         ]
         span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
         test, reference = (image * span + black for image in relative)
-        error = _squared_error(*exposed)
-        name, numbers = self.test.name(index), self.test.numbers
-        number = index + 1 if numbers is None else numbers[index]
-        return Pair(index, name, number, test, reference, relative[1], error)
+        numbers = self.test.numbers
+        return Pair(
+            index=index,
+            name=self.test.name(index),
+            number=index + 1 if numbers is None else numbers[index],
+            test=test,
+            reference=reference,
+            reference_relative=relative[1],
+            exposed_test=exposed_test,
+            exposed_reference=exposed_reference,
+        )
 
 
 def open_pairs(
@@ -173,13 +199,6 @@ def open_pairs(
     pairs = Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
     pairs.note = pairs.note or _note_on_paths(test, reference)
     return pairs
-
-
-def _squared_error(test: F32, reference: F32) -> float:
-    if np.array_equal(test, reference):
-        return 0.0
-    difference = srgb_encode(test) - srgb_encode(reference)
-    return float(np.vdot(difference, difference)) / difference.size
 
 
 def _checked(image: F32, name: str) -> float:
@@ -272,7 +291,7 @@ def _common_exposure_ev(test: Sequence, reference: Sequence) -> float:
     if known and known[0] != known[-1]:
         raise ImageError(
             f"the test's run is shown at {known[0]:+g} stops ({test.name(0)}) and the reference's at "
-            f"{known[-1]:+g} ({reference.name(0)}); say with --viewing-exposure-ev at which both are shown"
+            f"{known[-1]:+g} ({reference.name(0)}); say with --exposure-ev at which both are shown"
         )
     return known[0] if known else 0.0
 

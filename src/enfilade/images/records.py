@@ -108,7 +108,7 @@ def _built(kind: type[R], values: Mapping[str, Any], prefix: str) -> R:
     for field in fields(kind):  # type: ignore[arg-type]
         name = f"{prefix}{field.name}"
         hint = _without_none(hints[field.name])
-        if is_dataclass(hint):
+        if isinstance(hint, type) and is_dataclass(hint):
             is_there = any(key.startswith(f"{name}.") for key in values)
             found[field.name] = _built(hint, values, f"{name}.") if is_there else None
         elif hint is int:

@@ -16,7 +16,7 @@ from enfilade.images.imagefiles import SUFFIXES, ImageFiles
 
 __all__ = ["Sequence", "files_of", "open_sequence"]
 
-RUN_FILE = "run.json"
+RUN_FILE, JOB_FILE = "run.json", "job.json"
 NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
 NUMBER = re.compile(r"(^-?[0-9]+|[0-9]+)")  # in a name; one at the beginning may be negative
 MAX_LISTED = 6  # patterns of a folder, in a message
@@ -83,10 +83,11 @@ def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
     _check_one_sequence(files)
     numbers = _numbers(files)
     identity = _at(read_json(run), "identity") if run.is_file() else None
+    job = read_json(run.with_name(JOB_FILE)) if run.with_name(JOB_FILE).is_file() else None
     return ImageFiles(
         files,
         fps=_at(identity, "path", "fps"),
-        exposure_ev=_at(identity, "settings", "viewing", "exposure_ev"),
+        exposure_ev=_at(job, "settings", "viewing", "exposure_ev"),
         numbers=numbers,
         starts=None if numbers is None else _starts(numbers, _at(identity, "path")),
         layer=layer,

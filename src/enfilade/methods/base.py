@@ -16,7 +16,6 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from enfilade.methods.analysis import Analysis
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.renderer import Renderer
 from enfilade.settings import Section, Settings
 
 FRAMES = "frames"  # the last pass of every method; its records are `records.Frame`
@@ -141,6 +140,9 @@ class Method(ABC):
     revision : int
         To be raised with every change of the results that is not a change of settings: runs of another
         revision are not continued.
+    needs_lobes : bool
+        Whether it needs a renderer that separates diffuse from specular lobes, a
+        :class:`~enfilade.renderer.LobeRenderer`.
     settings : tuple of type
         Sections that it reads. Runs that differ in other sections are the same run.
     passes : tuple of Pass
@@ -149,19 +151,12 @@ class Method(ABC):
 
     name: ClassVar[str]
     revision: ClassVar[int] = 1
+    needs_lobes: ClassVar[bool] = False
     settings: ClassVar[tuple[type[Section], ...]] = ()
     passes: ClassVar[tuple[Pass, ...]]
 
-    def check(self, settings: Settings) -> None:
+    def check(self, settings: Settings) -> None:  # noqa: B027  (optional)
         """Refuse settings that the method can't work with, before anything is loaded.
-
-        Raises
-        ------
-        SettingsError
-        """
-
-    def check_scene(self, renderer: Renderer) -> None:
-        """Refuse a scene that the method can't render, once it is loaded.
 
         Raises
         ------

@@ -1,18 +1,24 @@
-"""Where a viewer sees a difference between two rendered images (§3); usable alone.
+"""The animation quality metric: visible differences between two rendered images or sequences (§3).
 
->>> import numpy as np
->>> from enfilade.metric import Aqm
->>> from enfilade.viewing import Viewing
->>> metric = Aqm(Viewing(64, 48))
->>> grey = np.full((48, 64), 20.0, dtype=np.float32)
->>> metric.compare(grey, grey).percent_visible
-0.0
+Usable alone, with NumPy arrays of luminance: `Aqm` for images, `SequenceAqm` for sequences.
 """
 
 from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison, Part
 from enfilade.metric.eye import Pursuit
-from enfilade.metric.options import Fitted, MetricOptions
+from enfilade.metric.modern import ModernMetric
+from enfilade.metric.paper import PaperMetric
 from enfilade.metric.sequence import SequenceAqm, sequence_score
+from enfilade.metric.transducer import Transducer
 
-__all__ = ["Aqm", "Comparison", "Fitted", "MetricOptions", "Part", "Pursuit", "SequenceAqm", "sequence_score"]
+__all__ = [
+    "Aqm",
+    "Comparison",
+    "ModernMetric",
+    "PaperMetric",
+    "Part",
+    "Pursuit",
+    "SequenceAqm",
+    "Transducer",
+    "sequence_score",
+]

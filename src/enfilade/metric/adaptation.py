@@ -1,33 +1,28 @@
-"""The luminance that the eye is adapted to around each pixel."""
+"""The luminance to which the eye is adapted around each pixel."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 import scipy.ndimage
 
 from enfilade.metric.pyramid import double, halve, halved_shape
+from enfilade.records import F32
 
-__all__ = ["DARKEST_CD_M2", "AdaptingLight", "adapting_luminance"]
+__all__ = ["DARKEST_CD_M2", "adapting_luminance"]
 
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-IndexArray: TypeAlias = npt.NDArray[np.int32]
-
-ADAPTATION_SIGMA_DEG = 0.5  # our choice: about the fovea's rim, where gaze and adaptation rest
-DARKEST_CD_M2 = 1e-3  # what is darker is seen as if it were this bright
-COARSEST_SIGMA = 2.0  # samples: the blur is made at reduced size, but not more reduced than this
+ADAPTATION_SIGMA_DEG = 0.5  # our choice: about the radius of the fovea
+DARKEST_CD_M2 = 1e-3  # darker luminances adapt the eye as this one does
+COARSEST_SIGMA = 2.0  # samples: the blur runs at reduced size, with this standard deviation at least
 
 
-def adapting_luminance(luminance_cd_m2: Float32Array, pixels_per_degree: float) -> Float32Array:
+def adapting_luminance(luminance_cd_m2: F32, pixels_per_degree: float) -> F32:
     """Mean luminance around each pixel, under a Gaussian of sigma 0.5 deg.
 
-    Contrast is what a pattern does to the luminance around it, so that an error in a dark corner
-    counts by the light of the corner and not by that of the room. The mean is arithmetic and wide
-    enough that a thin dark line beside a bright wall is seen by the wall's light, as glare has it.
+    Contrast is relative to the surrounding luminance: an error in a dark corner counts by the light
+    of the corner, not of the image. The mean is arithmetic and wide, so that a thin dark line beside a
+    bright wall is seen at the adaptation to the wall, as glare makes it.
 
     Parameters
     ----------
@@ -51,30 +46,3 @@ def adapting_luminance(luminance_cd_m2: Float32Array, pixels_per_degree: float) 
     for step in reversed(range(halvings)):
         coarse = double(coarse, halved_shape(luminance_cd_m2.shape, 2**step))
     return coarse
-
-
-class AdaptingLight:
-    """Adapting luminance at the size of each band, made when asked for and kept.
-
-    Parameters
-    ----------
-    luminance_cd_m2 : () or (H, W) float32
-        One for the whole image, or a map (`adapting_luminance`); above 0.
-    """
-
-    def __init__(self, luminance_cd_m2: Float32Array) -> None:
-        self._maps: dict[int, Float32Array] = {1: luminance_cd_m2}
-        self._offsets: dict[int, IndexArray] = {}
-
-    def at(self, reduction: int) -> Float32Array:
-        """The luminance at every `reduction`-th pixel, cd/m2."""
-        if reduction not in self._maps:
-            finer = self.at(reduction // 2)
-            self._maps[reduction] = halve(finer) if finer.ndim else finer
-        return self._maps[reduction]
-
-    def offset(self, of: Callable[[Float32Array], IndexArray], reduction: int) -> IndexArray:
-        """A table's offsets for the luminance at a reduced size; `of` must stay the same."""
-        if reduction not in self._offsets:
-            self._offsets[reduction] = of(self.at(reduction))
-        return self._offsets[reduction]

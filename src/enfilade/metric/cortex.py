@@ -9,48 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
-__all__ = ["ORIENTATIONS_DEG", "Band", "CortexTransform", "Partition", "bands"]
+from enfilade.errors import InputError
+from enfilade.records import F32
 
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-Complex64Array: TypeAlias = npt.NDArray[np.complex64]
-AnyArray = TypeVar("AnyArray", Float32Array, Complex64Array)
+__all__ = ["FAN_HALF_WIDTH_DEG", "ORIENTATIONS_DEG", "OVERSAMPLING", "Band", "CortexTransform", "bands"]
+
+Complex64: TypeAlias = npt.NDArray[np.complex64]
+Spectrum = TypeVar("Spectrum", F32, Complex64)
+Tilt: TypeAlias = Callable[[F32, "Band", "Band"], F32]
 
 ORIENTATIONS_DEG = (-90.0, -60.0, -30.0, 0.0, 30.0, 60.0)  # centres of the fans (Daly 1993)
 FAN_HALF_WIDTH_DEG = 30.0  # (Daly 1993)
 HALF_TURN_DEG = 180.0
-TRANSITION = 2.0 / 3.0  # width of a mesa's edge, as a share of its radius (Daly 1993)
+TRANSITION = 2.0 / 3.0  # width of a mesa's edge, relative to its radius (Daly 1993)
 BASE_SIGMAS = 3.0  # standard deviations of the base Gaussian inside its cut-off (Daly 1993)
 
 LEVELS_AT_REFERENCE = 6  # radial levels, base included ...
 REFERENCE_PPD = 28.0  # ... at the paper's pixels per degree (§6)
 FEWEST_LEVELS = 2
 NYQUIST = 0.5  # cycles per pixel
-# No unit: our choice. What follows the transform is not linear, and its maps are interpolated; sampled
-# at the limit they would be off by 13 % in a tenth of the pixels.
+# No unit: our choice. The stages after the transform are not linear, and their maps are interpolated; at
+# critical sampling they would be off by 13 % in a tenth of the pixels.
 OVERSAMPLING = 2.0
 CORNER = math.hypot(NYQUIST, NYQUIST)  # highest frequency of all, cycles per pixel
-
-
-class Partition(Enum):
-    """What the channel filters sum to.
-
-    AMPLITUDE
-        Filters sum to one, so the channels sum to the image (Daly 1993). Contrast half way between
-        four channels appears in each at a quarter: 8.6 dB less after pooling with exponent 3.5.
-    POWER
-        Squares of the filters sum to one, so no contrast falls between channels: the dip is at
-        most 2.6 dB. Made from the same windows, w -> sin(pi w / 2), which stay as smooth.
-    """
-
-    AMPLITUDE = "amplitude"
-    POWER = "power"
 
 
 @dataclass(frozen=True)
@@ -62,13 +49,13 @@ class Band:
     level : int
         1 for the finest, counting up to the base.
     low_cpp, high_cpp : float
-        Where the filter passes half the amplitude, cycles per pixel; `low_cpp` is 0 in the base.
+        Frequencies of half amplitude, cycles per pixel; `low_cpp` is 0 in the base.
     centre_cpp : float
-        Geometric mean of the two; in the base the power-weighted mean. Cycles per pixel.
+        Geometric mean of the two; in the base the power-weighted mean.
     cutoff_cpp : float
-        Nothing passes at or above, cycles per pixel; infinite in the finest band.
+        Nothing passes at or above; infinite in the finest band.
     oversampling : float
-        How much finer than the sampling theorem asks the band is sampled at least.
+        Least sampling rate relative to the Nyquist rate.
     """
 
     level: int
@@ -80,8 +67,13 @@ class Band:
 
     @property
     def is_base(self) -> bool:
-        """Whether this is the lowpass rest, which has no orientations."""
+        """Whether this is the lowpass residual, which has no orientations."""
         return self.low_cpp == 0.0
+
+    @property
+    def orientations(self) -> tuple[int | None, ...]:
+        """Indices into ORIENTATIONS_DEG, or one None in the base."""
+        return (None,) if self.is_base else tuple(range(len(ORIENTATIONS_DEG)))
 
     @property
     def reduction(self) -> int:
@@ -92,12 +84,8 @@ class Band:
         return int(2 ** math.floor(math.log2(max(coarsest, 1.0))))
 
 
-def _radius(level: int) -> float:
-    return 2.0**-level
-
-
 def _cutoff(level: int) -> float:
-    return _radius(level) * (1.0 + TRANSITION / 2.0)
+    return 2.0**-level * (1.0 + TRANSITION / 2.0)
 
 
 def _base_sigma(levels: int) -> float:
@@ -107,22 +95,10 @@ def _base_sigma(levels: int) -> float:
 def bands(pixels_per_degree: float, oversampling: float = OVERSAMPLING) -> tuple[Band, ...]:
     """Radial bands for a viewing condition, finest first, base last.
 
-    The ladder hangs on the pixel, one octave a level; viewers far from the screen (many pixels per
-    degree) get more levels, so that the lowest ones stay where they are in cycles per degree.
-    K = 6 + round(log2(ppd / 28)), at least 2, whatever the size of the image.
-
-    Parameters
-    ----------
-    pixels_per_degree : float
-        Above 0.
-    oversampling : float
-        1 or more; 1 will do where energies are summed over an area, and nothing else is done.
-
-    Returns
-    -------
-    tuple of Band
-        K bands: centres 16.6 (only corners of the spectrum), 9.9, 4.9, 2.5, 0.90 and 0.22 cycles
-        per degree at 27.93 px/deg.
+    The bands are fixed to the pixel, one octave a level; more pixels per degree give more levels,
+    6 + round(log2(ppd / 28)), at least 2, so that the lowest ones stay where they are in cycles per
+    degree. At 27.93 px/deg their centres are 16.6 (corners of the spectrum only), 9.9, 4.9, 2.5, 0.90 and
+    0.22 cycles per degree. An oversampling of 1 suffices where energies are only summed over an area.
     """
     octaves = round(math.log2(pixels_per_degree / REFERENCE_PPD))
     levels = max(LEVELS_AT_REFERENCE + octaves, FEWEST_LEVELS)
@@ -130,62 +106,66 @@ def bands(pixels_per_degree: float, oversampling: float = OVERSAMPLING) -> tuple
     base_edge = sigma * math.sqrt(2.0 * math.log(2.0))
     rings = []
     for level in range(1, levels):
-        high = CORNER if level == 1 else _radius(level - 1)
-        low = base_edge if level == levels - 1 else _radius(level)
+        high = CORNER if level == 1 else 2.0 ** (1 - level)
+        low = base_edge if level == levels - 1 else 2.0**-level
         cutoff = math.inf if level == 1 else _cutoff(level - 1)
         rings.append(Band(level, low, high, math.sqrt(low * high), cutoff, oversampling))
     base = Band(levels, 0.0, base_edge, sigma / math.sqrt(math.pi), _cutoff(levels - 1), oversampling)
     return (*rings, base)
 
 
-def _mesa(rho: Float32Array, level: int) -> Float32Array:
+def _mesa(rho: F32, level: int) -> F32:
     if level == 0:
         return np.ones_like(rho)
-    edge = (rho / _radius(level) - 1.0) / TRANSITION + 0.5
-    ramp: Float32Array = 0.5 * (1.0 + np.cos(np.pi * np.clip(edge, 0.0, 1.0)))
+    edge = (rho / 2.0**-level - 1.0) / TRANSITION + 0.5
+    ramp: F32 = 0.5 * (1.0 + np.cos(np.pi * np.clip(edge, 0.0, 1.0)))
     return ramp
 
 
-def _base(rho: Float32Array, levels: int) -> Float32Array:
+def _base(rho: F32, levels: int) -> F32:
     gauss = np.exp(-0.5 * np.square(rho / _base_sigma(levels)))
     return np.where(rho < _cutoff(levels - 1), gauss, np.float32(0.0))
 
 
-def _radial(rho: Float32Array, band: Band, levels: int) -> Float32Array:
+def _dom(rho: F32, band: Band, levels: int) -> F32:
     if band.is_base:
         return _base(rho, levels)
-    is_lowest = band.level == levels - 1
-    inner = _base(rho, levels) if is_lowest else _mesa(rho, band.level)
+    inner = _base(rho, levels) if band.level == levels - 1 else _mesa(rho, band.level)
     return _mesa(rho, band.level - 1) - inner
 
 
-def _fan(theta_deg: Float32Array, centre_deg: float) -> Float32Array:
+def _fan(theta_deg: F32, centre_deg: float) -> F32:
     away = np.abs((theta_deg - centre_deg + HALF_TURN_DEG / 2) % HALF_TURN_DEG - HALF_TURN_DEG / 2)
     window = 0.5 * (1.0 + np.cos(np.pi * away / FAN_HALF_WIDTH_DEG))
     return np.where(away < FAN_HALF_WIDTH_DEG, window, np.float32(0.0))
 
 
-class CortexTransform:
-    """The filters for one image size, and images through them.
+def _power_complementary(window: F32) -> F32:
+    rooted: F32 = np.sin(np.float32(np.pi / 2.0) * window)
+    return rooted.astype(np.float32)
 
-    Images are taken as periodic: pad them first (`metric.borders`). Coarse bands are cropped out of
-    the spectrum and come back at reduced size, sample i of a band standing at pixel
-    i * band.reduction.
+
+class CortexTransform:
+    """The channel filters for one image size.
+
+    Daly's windows w, which sum to one, become sin(pi w / 2): the squares of the filters sum to one,
+    and contrast half way between four channels loses at most 2.6 dB in pooling, instead of 8.6 dB.
+
+    Images are taken as periodic: pad them first (`metric.channels`). Spectra of coarse bands are
+    cropped and inverted at reduced size; sample i of a band stands at pixel i * band.reduction.
 
     Parameters
     ----------
     height_px, width_px : int
         Padded size; each a multiple of twice the coarsest reduction.
     pixels_per_degree : float
-        Sets the ladder, see `bands`.
-    partition : Partition
-        What the filters sum to.
+        Determines the bands, see `bands`.
     tilt : callable, optional
-        (rho, band, base band) -> what every frequency of a band is multiplied by besides.
+        (rho, band, base band) -> further weight of every frequency of a band.
     oversampling : float
         Of the bands, see `bands`.
     workers : int
-        Threads of the FFT.
+        Threads of the FFT, 1 or more.
     """
 
     def __init__(
@@ -194,11 +174,12 @@ class CortexTransform:
         width_px: int,
         pixels_per_degree: float,
         *,
-        partition: Partition = Partition.POWER,
-        tilt: Callable[[Float32Array, Band, Band], Float32Array] | None = None,
+        tilt: Tilt | None = None,
         oversampling: float = OVERSAMPLING,
         workers: int = 1,
     ) -> None:
+        if workers < 1:
+            raise InputError(f"metric: workers is {workers!r}; give 1 or more threads")
         self.height_px, self.width_px = height_px, width_px
         self.bands = bands(pixels_per_degree, oversampling)
         self._workers = workers
@@ -206,24 +187,14 @@ class CortexTransform:
         across = np.fft.rfftfreq(width_px).astype(np.float32)[None, :]
         rho = np.hypot(across, down)
         theta = np.degrees(np.arctan2(down, across))
-        self._radials = [
-            self._window(_radial(self._crop(rho, band), band, len(self.bands)), partition)
-            / np.float32(band.reduction**2)
-            for band in self.bands
-        ]
-        if tilt is not None:
-            for band in self.bands:
-                self._radials[band.level - 1] *= tilt(self._crop(rho, band), band, self.bands[-1])
-        self._fans = [self._window(_fan(theta, centre), partition) for centre in ORIENTATIONS_DEG]
+        self._doms: list[F32] = []
+        for band in self.bands:
+            cropped = self._crop(rho, band)
+            dom = _power_complementary(_dom(cropped, band, len(self.bands))) / np.float32(band.reduction**2)
+            self._doms.append(dom if tilt is None else dom * tilt(cropped, band, self.bands[-1]))
+        self._fans = [_power_complementary(_fan(theta, centre)) for centre in ORIENTATIONS_DEG]
 
-    @staticmethod
-    def _window(window: Float32Array, partition: Partition) -> Float32Array:
-        if partition is Partition.AMPLITUDE:
-            return window.astype(np.float32)
-        rooted: Float32Array = np.sin(np.float32(np.pi / 2.0) * window)
-        return rooted.astype(np.float32)
-
-    def _crop(self, spectrum: AnyArray, band: Band) -> AnyArray:
+    def _crop(self, spectrum: Spectrum, band: Band) -> Spectrum:
         """Rows of the band's reduced size, columns up to its cut-off."""
         height, width = self.reduced_shape(band)
         columns = math.ceil(min(width / 2, self.width_px * band.cutoff_cpp)) + 1
@@ -233,30 +204,28 @@ class CortexTransform:
         low, high = spectrum[..., :half, :columns], spectrum[..., -half:, :columns]
         return np.concatenate((low, high), axis=-2)
 
-    def spectra(self, images: Float32Array) -> Complex64Array:
+    def spectra(self, images: F32) -> Complex64:
         """Spectra of images, (n, height, width) float32 -> (n, height, width/2 + 1) complex64."""
         return scipy.fft.rfft2(images, workers=self._workers)
 
-    def ring(self, spectra: Complex64Array, band: Band) -> Complex64Array:
+    def ring(self, spectra: Complex64, band: Band) -> Complex64:
         """The part of the spectra in a band, cropped to the band's reduced size."""
-        return self._crop(spectra, band) * self._radials[band.level - 1]
+        return self._crop(spectra, band) * self._doms[band.level - 1]
 
-    def fan(self, ring: Complex64Array, band: Band, orientation: int | None) -> Float32Array:
-        """One channel, back in the image plane.
+    def fan(self, ring: Complex64, band: Band, orientation: int | None) -> F32:
+        """One channel of what `ring` gave for the band, back in the image plane.
 
         Parameters
         ----------
         ring : (n, ...) complex64
-            What `ring` gave for the same band.
         band : Band
-            The band.
         orientation : int or None
-            Index into ORIENTATIONS_DEG; None for all orientations together (the base band).
+            Index into ORIENTATIONS_DEG; None for all orientations together.
 
         Returns
         -------
         (n, height / reduction, width / reduction) float32
-            The channel's response, in the units of the images.
+            Response, in the units of the images.
         """
         width, workers = self.reduced_shape(band)[1], self._workers
         if orientation is not None:
@@ -264,10 +233,6 @@ class CortexTransform:
         # Columns beyond the cut-off are zero, and the transform down them is saved.
         columns = scipy.fft.ifft(ring, axis=-2, overwrite_x=orientation is not None, workers=workers)
         return scipy.fft.irfft(columns, n=width, axis=-1, workers=workers)
-
-    def orientations(self, band: Band) -> tuple[int | None, ...]:
-        """Orientations of a band: indices into ORIENTATIONS_DEG, or one None in the base."""
-        return (None,) if band.is_base else tuple(range(len(ORIENTATIONS_DEG)))
 
     def reduced_shape(self, band: Band) -> tuple[int, int]:
         """Height and width of a band's channels."""

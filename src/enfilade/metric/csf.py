@@ -1,4 +1,4 @@
-"""Contrast sensitivity for moving patterns (§3.2, Eq. 4: Kelly 1979, constants of Daly 1998)."""
+"""Spatiovelocity contrast sensitivity (§3.2, Eq. 4: Kelly 1979, constants of Daly 1998)."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def spatiovelocity_sensitivity(
     Parameters
     ----------
     frequency_cpd : float or array
-        Spatial frequency rho, cycles per degree, 0 or more.
+        Spatial frequency rho, 0 or more.
     velocity_deg_s : float or array
-        Velocity v on the retina along the grating's frequency vector, degrees per second, above 0.
-        Below the eye's drift of 0.15 deg/s the fit means nothing: see `metric.eye`.
+        Retinal velocity v along the grating's frequency vector, above 0. The fit is not valid below the
+        eye's drift of 0.15 deg/s, see `metric.eye`.
 
     Returns
     -------
@@ -47,8 +47,8 @@ def spatiovelocity_sensitivity(
 
     Notes
     -----
-    Against people it falls off too early for fast fine patterns (Laird et al. 2006 measured more),
-    and it knows neither luminance nor size. It is kept as published.
+    Against observers it falls off too early for fast fine patterns (Laird et al. 2006 measured more),
+    and it depends neither on luminance nor on size. It is kept as published.
     """
     speed = velocity_deg_s * C2
     octaves = np.abs(np.log10(speed / KNEE_DEG_S))

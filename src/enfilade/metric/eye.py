@@ -1,29 +1,32 @@
-"""Eye movements: how fast an image moves over the retina (§3.3, Eq. 5, Daly 1998)."""
+"""Eye movements: how fast an image moves over the retina (§3.3, Eq. 5, Daly 1998).
+
+Velocities are (2, ...) float32 arrays, to the right and down, degrees per second. A direction theta is that
+of a channel's frequency vector (the normal of its bars), degrees from x (right) towards y (down), one or a
+map; None in the base band, which has no direction and takes the whole speed.
+"""
 
 from __future__ import annotations
 
 import enum
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["Pursuit", "channel_speed", "held_smear", "retinal_speed", "retinal_velocity"]
+from enfilade.records import F32
 
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+__all__ = ["Pursuit", "channel_speed", "held_smear", "retinal_speed", "retinal_velocity", "smeared_contrast"]
 
 EYE_DRIFT_DEG_S = 0.15  # §3.3, v_Min: drift of the eye that fixates
 PURSUIT_MAX_DEG_S = 80.0  # §3.3, v_Max: fastest smooth pursuit
-PURSUIT_EFFICIENCY = 0.82  # §3.3, no unit: share of a target's speed that the eye takes up
+PURSUIT_EFFICIENCY = 0.82  # §3.3, no unit: gain of smooth pursuit
 
-SLOWEST_DEG_S = 1e-6  # below this a direction of motion means nothing
+SLOWEST_DEG_S = 1e-6  # keeps the direction of motion finite
 
 
 class Pursuit(enum.Enum):
-    """What the eye does while the image moves (§3.3).
+    """Eye movement while the image moves (§3.3).
 
     PURSUIT
-        It follows the motion at each pixel as well as it can (Eq. 5). Segment splitting uses this.
+        The eye follows the motion at each pixel as well as it can (Eq. 5). Segment splitting uses this.
     NONE
         It stands still: the image moves over the retina at its own velocity.
     BOTH
@@ -40,22 +43,10 @@ class Pursuit(enum.Enum):
         return (Pursuit.PURSUIT, Pursuit.NONE) if self is Pursuit.BOTH else (self,)
 
 
-def retinal_speed(image_speed_deg_s: Float32Array, pursuit: Pursuit) -> Float32Array:
-    """Speed over the retina of an image that moves (Eq. 5, with a floor).
+def retinal_speed(image_speed_deg_s: F32, pursuit: Pursuit) -> F32:
+    """Speed over the retina of an image that moves at v_I >= 0 (Eq. 5, with a floor), deg/s.
 
     v = max(abs(v_I - min(0.82 v_I + 0.15, 80)), 0.15) with pursuit, max(v_I, 0.15) without.
-
-    Parameters
-    ----------
-    image_speed_deg_s : (...) float32
-        Speed v_I of the image, degrees per second, 0 or more.
-    pursuit : Pursuit
-        PURSUIT or NONE.
-
-    Returns
-    -------
-    (...) float32
-        Degrees per second, never below the eye's drift of 0.15.
 
     Notes
     -----
@@ -65,120 +56,69 @@ def retinal_speed(image_speed_deg_s: Float32Array, pursuit: Pursuit) -> Float32A
     if pursuit is Pursuit.NONE:
         return np.maximum(image_speed_deg_s, np.float32(EYE_DRIFT_DEG_S))
     eye = PURSUIT_EFFICIENCY * image_speed_deg_s + EYE_DRIFT_DEG_S
-    over_retina: Float32Array = image_speed_deg_s - np.minimum(eye, PURSUIT_MAX_DEG_S)
+    over_retina: F32 = image_speed_deg_s - np.minimum(eye, PURSUIT_MAX_DEG_S)
     return np.maximum(np.abs(over_retina), np.float32(EYE_DRIFT_DEG_S))
 
 
-def retinal_velocity(velocity_deg_s: Float32Array, pursuit: Pursuit) -> Float32Array:
+def retinal_velocity(velocity_deg_s: F32, pursuit: Pursuit) -> F32:
     """Velocity over the retina: the direction of the image's, with the speed of Eq. 5.
 
-    Parameters
-    ----------
-    velocity_deg_s : (2, ...) float32
-        Image velocity, degrees per second: to the right, down.
-    pursuit : Pursuit
-        PURSUIT or NONE.
-
-    Returns
-    -------
-    (2, ...) float32
-        Degrees per second. Zero where the image stands still; the floor is left to
-        `channel_speed`.
+    Zero where the image stands still; `channel_speed` applies the floor there.
     """
     if pursuit is Pursuit.NONE:
         return velocity_deg_s
     speed = np.hypot(velocity_deg_s[0], velocity_deg_s[1])
-    share = retinal_speed(speed, pursuit)
-    share /= np.maximum(speed, np.float32(SLOWEST_DEG_S), out=speed)
-    return velocity_deg_s * share
+    ratio = retinal_speed(speed, pursuit)
+    ratio /= np.maximum(speed, np.float32(SLOWEST_DEG_S), out=speed)
+    return velocity_deg_s * ratio
 
 
-def held_smear(velocity_deg_s: Float32Array, pursuit: Pursuit, hold_s: float) -> Float32Array | None:
-    """How far a held frame moves over the retina of an eye that follows the motion.
+def channel_speed(retinal_velocity_deg_s: F32, theta_deg: float | F32 | None) -> F32:
+    """Speed over the retina along the frequency vector of a channel, 0.15 deg/s or more (§3.4).
 
-    The display shows a moving pattern in jumps; between them it stands, and the eye does not.
+    A pattern blurs along its motion: bars across it lose their detail, bars along it keep theirs.
+    So the retinal velocity is projected on the direction in which the bars repeat.
+    """
+    along = np.abs(_along(retinal_velocity_deg_s, theta_deg))
+    np.maximum(along, np.float32(EYE_DRIFT_DEG_S), out=along)
+    return along
+
+
+def held_smear(velocity_deg_s: F32, pursuit: Pursuit, hold_s: float) -> F32 | None:
+    """Smear of a held frame over the retina of an eye that follows the motion, (2, ...) degrees.
+
+    The display shows a moving pattern in jumps; between them it stands, and the eye moves on. None for an
+    eye at rest, or where frames flash.
 
     Parameters
     ----------
     velocity_deg_s : (2, ...) float32
-        Image velocity, degrees per second.
+        Of the image.
     pursuit : Pursuit
         PURSUIT or NONE.
     hold_s : float
-        How long a frame is lit, seconds.
-
-    Returns
-    -------
-    (2, ...) float32 or None
-        Degrees, in the direction of the motion; None for an eye that rests.
+        Time for which a frame is lit, seconds.
     """
-    if pursuit is Pursuit.NONE:
+    if pursuit is Pursuit.NONE or not hold_s:
         return None
-    smear: Float32Array = velocity_deg_s - retinal_velocity(velocity_deg_s, pursuit)
+    smear: F32 = velocity_deg_s - retinal_velocity(velocity_deg_s, pursuit)
     smear *= np.float32(hold_s)
     return smear
 
 
-def _along(vector: Float32Array, theta_deg: float | Float32Array | None) -> Float32Array:
+def smeared_contrast(smear_deg: F32, theta_deg: float | F32 | None, frequency_cpd: float) -> F32:
+    """Factor of a smear on the contrast of a channel, 0..1: the spectrum of a box of its length."""
+    contrast: F32 = np.abs(np.sinc(_along(smear_deg, theta_deg) * np.float32(frequency_cpd)))
+    return contrast
+
+
+def _along(vector: F32, theta_deg: float | F32 | None) -> F32:
     """Component of a field along a direction, signed; its length where there is none."""
     across, down = vector
     if theta_deg is None:
-        length: Float32Array = np.hypot(across, down)
+        length: F32 = np.hypot(across, down)
         return length
     theta = np.radians(np.asarray(theta_deg, dtype=np.float32))
-    along: Float32Array = np.cos(theta) * across
+    along: F32 = np.cos(theta) * across
     along += np.sin(theta) * down
-    return along
-
-
-def smeared_share(
-    smear_deg: Float32Array, theta_deg: float | Float32Array | None, frequency_cpd: float
-) -> Float32Array:
-    """Contrast that a smear leaves of a channel: the spectrum of a box as long as the smear.
-
-    Parameters
-    ----------
-    smear_deg : (2, ...) float32
-        From `held_smear`.
-    theta_deg : float, float32 or None
-        Direction of the frequency vector, the same everywhere or not; None for the base band.
-    frequency_cpd : float
-        Cycles per degree.
-
-    Returns
-    -------
-    (...) float32
-        0..1.
-    """
-    along = _along(smear_deg, theta_deg)
-    share: Float32Array = np.abs(np.sinc(along * np.float32(frequency_cpd)))
-    return share
-
-
-def channel_speed(
-    retinal_velocity_deg_s: Float32Array, theta_deg: float | Float32Array | None
-) -> Float32Array:
-    """Speed over the retina along the frequency vector of a channel (§3.4).
-
-    A pattern blurs along its motion: bars across it lose their detail, bars along it keep theirs.
-    So the retinal velocity is projected on the direction in which the bars repeat.
-
-    Parameters
-    ----------
-    retinal_velocity_deg_s : (2, ...) float32
-        From `retinal_velocity`, degrees per second.
-    theta_deg : float, float32 or None
-        Direction of the frequency vector (the normal of the bars), degrees from x (right) towards
-        y (down), the same everywhere or not; None for the base band, which has no direction and
-        takes the whole speed.
-
-    Returns
-    -------
-    (...) float32
-        Degrees per second, never below the eye's drift of 0.15.
-    """
-    along = _along(retinal_velocity_deg_s, theta_deg)
-    if theta_deg is not None:
-        np.abs(along, out=along)
-    np.maximum(along, np.float32(EYE_DRIFT_DEG_S), out=along)
     return along

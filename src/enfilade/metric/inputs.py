@@ -1,85 +1,59 @@
-"""What the metric refuses, by name: shapes, types, values that are not luminances."""
+"""A pair of images as the metric takes it, and the checks of its arrays."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from enfilade.errors import InputError
+from enfilade.records import F32, Mask
 
-__all__ = ["check_luminance", "check_map", "check_valid"]
-
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+__all__ = ["Pair", "check_map", "check_pair", "fill_undefined"]
 
 
-def _check_form(
-    name: str, array: npt.NDArray[np.generic], dtype: type[np.generic], shape: tuple[int, ...]
-) -> None:
-    if not isinstance(array, np.ndarray):
-        msg = f"metric: {name} is a {type(array).__name__}; give a NumPy array"
-        raise InputError(msg)
-    if array.dtype != dtype:
-        msg = f"metric: {name} has type {array.dtype}; convert it to {np.dtype(dtype)}"
-        raise InputError(msg)
-    if array.shape != shape:
-        msg = f"metric: {name} has shape {array.shape}; the viewing conditions ask for {shape}"
-        raise InputError(msg)
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two images, checked and finite everywhere; the arguments of `Aqm.compare`.
 
-
-def _refuse(name: str, bad: BoolArray, what: str, remedy: str) -> None:
-    count = np.count_nonzero(bad)
-    if count:
-        row, column = (int(index) for index in np.argwhere(bad)[0][:2])
-        msg = (
-            f"metric: {name} is {what} at {count} judged pixels, the first at row {row}, "
-            f"column {column}; {remedy}"
-        )
-        raise InputError(msg)
-
-
-def check_valid(valid: BoolArray, shape: tuple[int, int]) -> None:
-    """Refuse a mask that is not (H, W) bool.
-
-    Parameters
+    Attributes
     ----------
+    test, reference : (H, W) float32
+        Luminance, cd/m2; equal where not valid.
     valid : (H, W) bool
-        Pixels to judge.
-    shape : tuple of int
-        Height and width asked for.
-
-    Raises
-    ------
-    InputError
-        Wrong type or shape.
+        Pixels to compare.
+    velocity : (2, h, w) float32 or None
+        Image velocity at every second pixel, deg/s; None where nothing moves.
+    noise_variance, noise_blur_px, change : (H, W) float32 or None
+        As in `Aqm.compare`.
     """
-    _check_form("valid", valid, np.bool_, shape)
+
+    test: F32
+    reference: F32
+    valid: Mask
+    velocity: F32 | None
+    noise_variance: F32 | None
+    noise_blur_px: F32 | None
+    change: F32 | None
+
+
+def check_pair(
+    shape: tuple[int, int], test: F32, reference: F32, velocity: F32 | None, valid: Mask | None
+) -> None:
+    """Check the arguments of `Aqm.compare` for images of a shape; raise InputError as it does."""
+    if valid is not None:
+        _check_form("valid", valid, np.bool_, shape)
+    check_map("test", test, shape, valid)
+    check_map("reference", reference, shape, valid)
+    if velocity is not None:
+        check_map("velocity", velocity, (*shape, 2), valid, is_signed=True)
 
 
 def check_map(
-    name: str,
-    values: Float32Array,
-    shape: tuple[int, ...],
-    valid: BoolArray | None,
-    *,
-    is_signed: bool,
+    name: str, values: F32, shape: tuple[int, ...], valid: Mask | None, *, is_signed: bool = False
 ) -> None:
-    """Refuse a map of the wrong form, or with NaN, infinite or (if unsigned) negative values.
-
-    Parameters
-    ----------
-    name : str
-        What the message calls it.
-    values : float32
-        The map.
-    shape : tuple of int
-        Shape asked for; the first two are height and width.
-    valid : (H, W) bool or None
-        Pixels to judge; others may hold anything.
-    is_signed : bool
-        Whether negative values mean something.
+    """Check that a map is float32 of a shape, finite and (if unsigned) not negative where valid.
 
     Raises
     ------
@@ -90,31 +64,33 @@ def check_map(
     extremes = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     if np.isfinite(extremes).all() and (is_signed or extremes[0] >= 0):
         return
-    is_judged = np.ones(shape[:2], dtype=np.bool_) if valid is None else valid
-    is_judged = is_judged.reshape(is_judged.shape + (1,) * (values.ndim - is_judged.ndim))
-    remedy = "repair it or take these pixels out of valid"
-    _refuse(name, ~np.isfinite(values) & is_judged, "not finite", remedy)
-    if not is_signed:
-        _refuse(name, (values < 0) & is_judged, "negative", remedy)
+    for word, is_bad in (("not finite", ~np.isfinite(values)), ("negative", (values < 0) & (not is_signed))):
+        bad = is_bad.reshape(*shape[:2], -1).any(axis=2) & (True if valid is None else valid)
+        if bad.any():
+            row, column = np.argwhere(bad)[0]
+            raise InputError(
+                f"metric: {name} is {word} at {np.count_nonzero(bad)} valid pixels, the first at row {row}, "
+                f"column {column}; repair it or take these pixels out of valid"
+            )
 
 
-def check_luminance(name: str, image: Float32Array, shape: tuple[int, int], valid: BoolArray | None) -> None:
-    """Refuse what is not an image of luminances in cd/m2.
+def _check_form(
+    name: str, array: npt.NDArray[np.generic], dtype: type[np.generic], shape: tuple[int, ...]
+) -> None:
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"metric: {name} is a {type(array).__name__}; give a NumPy array")
+    if array.dtype != dtype:
+        raise InputError(f"metric: {name} has type {array.dtype}; convert it to {np.dtype(dtype)}")
+    if array.shape != shape:
+        raise InputError(f"metric: {name} has shape {array.shape}; the viewing conditions need {shape}")
 
-    Parameters
-    ----------
-    name : str
-        "test" or "reference".
-    image : (H, W) float32
-        Luminance, cd/m2.
-    shape : tuple of int
-        Height and width asked for.
-    valid : (H, W) bool or None
-        Pixels to judge; others may hold anything.
 
-    Raises
-    ------
-    InputError
-        With the name, the number of bad pixels and the first of them.
-    """
-    check_map(name, image, shape, valid, is_signed=False)
+def fill_undefined(test: F32, reference: F32, valid: Mask) -> tuple[F32, F32]:
+    """Test and reference, equal where not valid: the reference if finite, else the test, else its mean."""
+    if valid.all():
+        return test, reference
+    known = reference[valid]
+    mean = known.mean(dtype=np.float64) if known.size else 0.0
+    filler = np.where(np.isfinite(test), test, np.float32(mean))
+    filler = np.maximum(np.where(np.isfinite(reference), reference, filler), np.float32(0.0))
+    return np.where(valid, test, filler), np.where(valid, reference, filler)

@@ -1,98 +1,116 @@
-"""Pooling across channels, probability of detection, shares and scores (§3.4, §6; Fig. 6)."""
+"""Pooling over channels and pixels, probability of detection, percentages and scores (§3.4, §6; Fig. 6)."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-import numpy.typing as npt
 
-__all__ = [
-    "DETECTION_JND",
-    "POOLING_EXPONENT",
-    "detection_probability",
-    "percent_visible",
-    "raised",
-    "root",
-]
+from enfilade.metric.comparison import Comparison, Part
+from enfilade.metric.pyramid import Pyramid, double, halved_shape
+from enfilade.records import F32, Mask
 
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+__all__ = ["POOLING_EXPONENT", "Pool", "detection_probability", "percent_visible", "raised"]
 
 POOLING_EXPONENT = 3.5  # b, no unit: slope of the psychometric function (Daly 1993)
 MISS_AT_ONE_JND = 0.25  # §6: 1 JND is seen in 75 % of cases
-DETECTION_JND = 1.0  # §6: where the paper counts a difference as visible
+DETECTION_JND = 1.0  # §6: the paper counts a difference above this as visible
 
 
-def raised(squared: Float32Array) -> Float32Array:
-    """J^3.5 from J^2, as x sqrt(x) sqrt(sqrt(x)): pooling's inner power, without logarithms.
-
-    Parameters
-    ----------
-    squared : (...) float32
-        J^2, 0 or more.
-
-    Returns
-    -------
-    (...) float32
-        J^3.5.
-    """
+def raised(squared: F32) -> F32:
+    """J^3.5 from J^2, 0 or more, as x sqrt(x) sqrt(sqrt(x)), without logarithms."""
     rooted = np.sqrt(squared)
     power = squared * rooted
     power *= np.sqrt(rooted, out=rooted)
     return power
 
 
-def root(pooled: Float32Array, exponent: float = POOLING_EXPONENT) -> Float32Array:
-    """J = (sum of J_kl^b)^(1/b) from the sum.
-
-    Parameters
-    ----------
-    pooled : (...) float32
-        Sum over channels of J_kl^b, 0 or more.
-    exponent : float
-        b, 3.5 in the paper.
-
-    Returns
-    -------
-    (...) float32
-        JND.
-    """
-    return pooled if exponent == 1.0 else pooled ** np.float32(1.0 / exponent)
-
-
-def detection_probability(jnd: Float32Array) -> Float32Array:
-    """Probability that the difference is seen: P = 1 - 0.25^J, 75 % at 1 and 93.75 % at 2 JND (§6).
-
-    Parameters
-    ----------
-    jnd : (...) float32
-        J, pooled over all channels, 0 or more.
-
-    Returns
-    -------
-    (...) float32
-        Between 0 and 1; exactly 0 at 0 JND.
-    """
+def detection_probability(jnd: F32) -> F32:
+    """Probability that the difference is seen: P = 1 - 0.25^J, 75 % at 1 and 93.75 % at 2 JND (§6)."""
     probability = -np.expm1(jnd * np.float32(np.log(MISS_AT_ONE_JND)))
     return np.asarray(probability, dtype=np.float32)
 
 
-def percent_visible(jnd: Float32Array, valid: BoolArray) -> float:
-    """Share of the judged pixels that differ by more than 1 JND, in percent (§3.4).
+def percent_visible(jnd: F32, valid: Mask) -> float:
+    """Valid pixels that differ by more than 1 JND, percent (§3.4); 0 when none is valid."""
+    count = int(np.count_nonzero(valid))
+    return 100.0 * int(np.count_nonzero((jnd > DETECTION_JND) & valid)) / count if count else 0.0
+
+
+class Pool:
+    """Sums the channels of one comparison, each at its own size.
 
     Parameters
     ----------
-    jnd : (H, W) float32
-        The map.
+    levels : int
+        Number of radial bands.
     valid : (H, W) bool
-        Pixels that were judged.
-
-    Returns
-    -------
-    float
-        0 to 100; 0 when nothing was judged.
+        Pixels to compare.
+    exponent : float
+        b, of J = (sum J_kl^b)^(1/b).
     """
-    judged = int(np.count_nonzero(valid))
-    seen = int(np.count_nonzero((jnd > DETECTION_JND) & valid))
-    return 100.0 * seen / judged if judged else 0.0
+
+    def __init__(self, levels: int, valid: Mask, exponent: float) -> None:
+        self._levels, self._valid, self._exponent = levels, valid, exponent
+        self._area = None if valid.all() else Pyramid(valid.astype(np.float32))
+        self._sums: dict[bool, dict[int, F32]] = {False: {}, True: {}}
+        self._band_sums = {kind: [0.0] * levels for kind in self._sums}
+
+    def area(self, reduction: int) -> F32 | None:
+        """Valid part of each coarse sample, 0 to 1; None where all pixels are valid."""
+        return None if self._area is None else self._area.at(reduction)
+
+    def add(self, level: int, power: F32, reduction: int, *, is_transient: bool = False) -> None:
+        """Add J^b of one or more channels of a level, a map at every `reduction`-th pixel."""
+        sums, area = self._sums[is_transient], self.area(reduction)
+        sums[reduction] = sums[reduction] + power if reduction in sums else power
+        if area is None:
+            mean = float(power.mean(dtype=np.float64))
+        else:
+            weight = float(area.sum(dtype=np.float64))
+            mean = float(np.vdot(area, power)) / weight if weight else 0.0
+        self._band_sums[is_transient][level - 1] += mean
+
+    def comparison(self) -> Comparison:
+        """Finish: maps, probabilities, scores."""
+        jnd = self._map(False)
+        score = steady = self._score(jnd)
+        transient = 0.0
+        if self._sums[True]:
+            transient = self._score(self._map(True))
+            jnd = self._map(False, True)
+            score = self._score(jnd)
+        return Comparison(
+            jnd=jnd,
+            probability=detection_probability(jnd),
+            valid=self._valid,
+            percent_visible=percent_visible(jnd, self._valid),
+            band_jnd=self._band_jnd(False, True),
+            score=score,
+            steady=Part(steady, self._band_jnd(False)),
+            transient=Part(transient, self._band_jnd(True)),
+        )
+
+    def _map(self, *kinds: bool) -> F32:
+        """J from the sums of channels: coarse ones interpolated, the root, interpolated to full size."""
+        shape, sums = self._valid.shape, [self._sums[kind] for kind in kinds]
+        sizes = {size for of_kind in sums for size in of_kind} or {1}
+        reduction = max(sizes)
+        total = np.zeros(halved_shape(shape, reduction), dtype=np.float32)
+        while True:
+            for of_kind in sums:
+                if reduction in of_kind:
+                    total += of_kind[reduction]
+            if reduction == min(sizes) and self._exponent != 1.0:
+                total **= np.float32(1.0 / self._exponent)
+            if reduction == 1:
+                return total * self._valid
+            reduction //= 2
+            total = double(total, halved_shape(shape, reduction))
+
+    def _score(self, jnd: F32) -> float:
+        count = max(int(np.count_nonzero(self._valid)), 1)
+        total = float(raised(np.square(jnd)).sum(dtype=np.float64))
+        return float((total / count) ** (1.0 / POOLING_EXPONENT))
+
+    def _band_jnd(self, *kinds: bool) -> tuple[float, ...]:
+        sums = zip(*(self._band_sums[kind] for kind in kinds), strict=True)
+        return tuple(sum(of_kinds) ** (1.0 / self._exponent) for of_kinds in sums)

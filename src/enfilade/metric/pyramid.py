@@ -1,51 +1,21 @@
-"""Maps at half and double size, samples standing on every second pixel of the finer map."""
+"""Maps at half and double size; coarse samples stand on every second pixel of the finer map."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-import numpy.typing as npt
 
-__all__ = ["double", "halve", "halve_periodic", "halved_shape"]
+from enfilade.records import F32
 
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+__all__ = ["Pyramid", "double", "halve", "halve_periodic", "halved_shape"]
 
 
 def halved_shape(shape: tuple[int, int], reduction: int) -> tuple[int, int]:
-    """Samples at every `reduction`-th pixel, the last at or beyond the last pixel.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Height and width in pixels.
-    reduction : int
-        A power of two.
-
-    Returns
-    -------
-    tuple of int
-        Height and width in samples.
-    """
+    """Height and width in samples at every `reduction`-th pixel, the last at or beyond the last pixel."""
     height, width = shape
     return -(-(height - 1) // reduction) + 1, -(-(width - 1) // reduction) + 1
 
 
-def _halve(fine: Float32Array, coarse: Float32Array) -> Float32Array:
-    """Rows of a map, weights 1/4, 1/2, 1/4 around every second; transposed views do columns."""
-    even, odd = fine[::2], fine[1::2]
-    inner, outer = coarse[: len(even)], coarse[len(even) :]
-    np.multiply(even, np.float32(2.0), out=inner)
-    inner[: len(odd)] += odd
-    inner[0] += fine[0]
-    inner[1:] += odd[: len(even) - 1]
-    inner[len(odd) :] += fine[-1]
-    inner *= np.float32(0.25)
-    outer[...] = fine[-1]
-    return coarse
-
-
-def halve(fine: Float32Array) -> Float32Array:
+def halve(fine: F32) -> F32:
     """Average a map down by two, weights 1/4, 1/2, 1/4 around every second pixel.
 
     Parameters
@@ -56,28 +26,19 @@ def halve(fine: Float32Array) -> Float32Array:
     Returns
     -------
     (H // 2 + 1, W // 2 + 1) float32
-        Never outside the range of `fine`.
     """
-    height, width = fine.shape
-    rows = _halve(fine, np.empty((height // 2 + 1, width), dtype=np.float32))
-    coarse = np.empty((height // 2 + 1, width // 2 + 1), dtype=np.float32)
-    _halve(rows.T, coarse.T)
+    height, width = halved_shape(fine.shape, 2)
+    padded = np.pad(fine, (1, 2), mode="edge")
+    two, quarter = np.float32(2.0), np.float32(0.25)
+    rows = two * padded[1::2][:height] + padded[2::2][:height] + padded[::2][:height]
+    rows *= quarter
+    coarse: F32 = two * rows[:, 1::2][:, :width] + rows[:, 2::2][:, :width] + rows[:, ::2][:, :width]
+    coarse *= quarter
     return coarse
 
 
-def halve_periodic(fine: Float32Array) -> Float32Array:
-    """Average a periodic map down by two, with the weights of `halve`; the mean stays.
-
-    Parameters
-    ----------
-    fine : (H, W) float32
-        The map, H and W even.
-
-    Returns
-    -------
-    (H / 2, W / 2) float32
-        Never outside the range of `fine`.
-    """
+def halve_periodic(fine: F32) -> F32:
+    """Average a periodic map of even size down by two, with the weights of `halve`; the mean stays."""
     for axis in (0, 1):
         even, odd = (fine[::2], fine[1::2]) if axis == 0 else (fine[:, ::2], fine[:, 1::2])
         quarter = np.float32(0.25)
@@ -85,30 +46,37 @@ def halve_periodic(fine: Float32Array) -> Float32Array:
     return fine
 
 
-def double(coarse: Float32Array, shape: tuple[int, int]) -> Float32Array:
-    """Interpolate a map up by two, bilinearly.
-
-    Parameters
-    ----------
-    coarse : (h, w) float32
-        The map; h, w as `halve` makes them.
-    shape : tuple of int
-        Height and width of the result.
-
-    Returns
-    -------
-    shape float32
-        Never outside the range of `coarse`.
-    """
+def double(coarse: F32, shape: tuple[int, int]) -> F32:
+    """Interpolate a map up by two, bilinearly, to a height and width; the inverse of `halve` in size."""
     rows = np.empty((shape[0], coarse.shape[1]), dtype=np.float32)
-    _double(coarse, rows)
+    _double_rows(coarse, rows)
     fine = np.empty(shape, dtype=np.float32)
-    _double(rows.T, fine.T)
+    _double_rows(rows.T, fine.T)
     return fine
 
 
-def _double(coarse: Float32Array, fine: Float32Array) -> None:
+def _double_rows(coarse: F32, fine: F32) -> None:
     between = fine[1::2]
     fine[::2] = coarse[: (len(fine) + 1) // 2]
     np.add(coarse[: len(between)], coarse[1 : len(between) + 1], out=between)
     between *= np.float32(0.5)
+
+
+class Pyramid:
+    """A map at the size of each band; levels are computed on first use and kept.
+
+    Parameters
+    ----------
+    values : () or (H, W) float32
+        A constant or a map.
+    """
+
+    def __init__(self, values: F32) -> None:
+        self._maps: dict[int, F32] = {1: values}
+
+    def at(self, reduction: int) -> F32:
+        """The map at every `reduction`-th pixel."""
+        if reduction not in self._maps:
+            finer = self.at(reduction // 2)
+            self._maps[reduction] = halve(finer) if finer.ndim else finer
+        return self._maps[reduction]

@@ -1,65 +1,73 @@
-"""Sensitivity of every channel at every pixel: velocity and luminance through the CSF (Fig. 6)."""
+"""Sensitivity of every channel at every pixel, by retinal velocity and luminance (Fig. 6)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.metric.adaptation import AdaptingLight
 from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
-from enfilade.metric.eye import EYE_DRIFT_DEG_S, channel_speed, smeared_share
-from enfilade.metric.pyramid import halve
+from enfilade.metric.eye import (
+    EYE_DRIFT_DEG_S,
+    Pursuit,
+    channel_speed,
+    held_smear,
+    retinal_velocity,
+    smeared_contrast,
+)
+from enfilade.metric.pyramid import Pyramid, double, halve, halved_shape
+from enfilade.records import F32, Mask
 
-__all__ = ["FINEST_REDUCTION", "ChannelSensitivity", "SensitivityTable"]
+__all__ = ["FINEST_REDUCTION", "ChannelSensitivity", "SensitivityTable", "coarse_velocity"]
 
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-Float64Array: TypeAlias = npt.NDArray[np.float64]
-IndexArray: TypeAlias = npt.NDArray[np.int32]
-Csf: TypeAlias = Callable[[float, Float64Array, Float64Array], Float64Array]
+F64: TypeAlias = npt.NDArray[np.float64]
+Indices: TypeAlias = npt.NDArray[np.int32]
 
-FASTEST_DEG_S = 2000.0  # faster retinal motion is taken as this: nothing is seen any more
+FASTEST_DEG_S = 2000.0  # faster retinal motion is clipped to this: nothing is seen any more
 SPEEDS = 4096  # 0.23 % between speeds
-SPEEDS_BY_LUMINANCE = 512  # 1.9 % between speeds, where luminance matters too
+SPEEDS_BY_LUMINANCE = 512  # 1.9 % between speeds, in a table by luminance
 LUMINANCES = 128  # 13 % between luminances, of which sensitivity depends on a small power
 LUMINANCE_RANGE_CD_M2 = (1e-3, 1e4)
-FINEST_REDUCTION = 2  # velocity and light are taken from every second pixel, for speed
+FINEST_REDUCTION = 2  # velocity and luminance are sampled at every second pixel, for speed
 LEAST_SENSITIVITY = 1e-3  # contrast of 1000: never seen, and float32 powers stay normal
 
 
 class SensitivityTable:
-    """Sensitivity by retinal speed and luminance for every band, looked up on logarithmic scales.
+    """Sensitivity of every band by retinal speed and luminance, sampled on logarithmic scales.
 
     Parameters
     ----------
     csf : callable
         (frequency_cpd, velocities_deg_s, luminances_cd_m2) -> sensitivities, broadcast.
     bands : tuple of Band
-        Bands of the Cortex transform.
     pixels_per_degree : float
-        Turns their centres into cycles per degree.
     by_luminance : bool
         Whether the CSF depends on luminance.
     """
 
     def __init__(
-        self, csf: Csf, bands: tuple[Band, ...], pixels_per_degree: float, *, by_luminance: bool = False
+        self,
+        csf: Callable[[float, F64, F64], F64],
+        bands: tuple[Band, ...],
+        pixels_per_degree: float,
+        *,
+        by_luminance: bool = False,
     ) -> None:
         self._pixels_per_degree = pixels_per_degree
         self._size = SPEEDS_BY_LUMINANCE if by_luminance else SPEEDS
         self._luminances = LUMINANCES if by_luminance else 1
+        self._steps_per_e = (self._size - 1) / math.log(FASTEST_DEG_S / EYE_DRIFT_DEG_S)
         speeds = np.geomspace(EYE_DRIFT_DEG_S, FASTEST_DEG_S, self._size)
         luminances = np.geomspace(*LUMINANCE_RANGE_CD_M2, self._luminances)[:, None]
-        rows = [csf(band.centre_cpp * pixels_per_degree, speeds, luminances) for band in bands]
-        self._rows: list[Float32Array] = [
-            np.maximum(row, LEAST_SENSITIVITY).astype(np.float32).ravel() for row in rows
-        ]
-        self._steps_per_e = (self._size - 1) / math.log(FASTEST_DEG_S / EYE_DRIFT_DEG_S)
+        self._rows: list[F32] = []
+        for band in bands:
+            row = csf(self.frequency_cpd(band), speeds, luminances)
+            self._rows.append(np.maximum(row, LEAST_SENSITIVITY).astype(np.float32).ravel())
 
-    def index(self, speed_deg_s: Float32Array) -> IndexArray:
+    def speed_index(self, speed_deg_s: F32) -> Indices:
         """Nearest entries for retinal speeds in deg/s, which are 0.15 or more."""
         steps = np.log(speed_deg_s * np.float32(1.0 / EYE_DRIFT_DEG_S))
         steps *= np.float32(self._steps_per_e)
@@ -67,8 +75,8 @@ class SensitivityTable:
         np.clip(steps, 0, self._size - 1, out=steps)
         return np.asarray(steps, dtype=np.int32)
 
-    def luminance_offset(self, luminance_cd_m2: Float32Array) -> IndexArray:
-        """What to add to `index` for luminances in cd/m2, above 0."""
+    def luminance_index(self, luminance_cd_m2: F32) -> Indices:
+        """Summand of `speed_index` for luminances in cd/m2, above 0."""
         if self._luminances == 1:
             return np.zeros((), dtype=np.int32)
         darkest, brightest = LUMINANCE_RANGE_CD_M2
@@ -81,13 +89,13 @@ class SensitivityTable:
         """Centre of a band, cycles per degree."""
         return band.centre_cpp * self._pixels_per_degree
 
-    def row(self, band: Band) -> Float32Array:
-        """Sensitivities of a band by entry; the first is that of a still eye."""
+    def row(self, band: Band) -> F32:
+        """Sensitivities of a band by the sum of both indices; at speed index 0 that of an eye at rest."""
         return self._rows[band.level - 1]
 
 
 class ChannelSensitivity:
-    """Sensitivities of all channels, band after band, at the size of each.
+    """Weights of all channels for one pair of images: sensitivity times contrast of a unit response.
 
     Speeds are averaged over the area of a coarse sample as magnitudes, after the projection on the
     channel's direction, so that motions to the left and to the right do not cancel.
@@ -96,100 +104,119 @@ class ChannelSensitivity:
     ----------
     table : SensitivityTable
         The CSF.
-    velocities : sequence of (2, h, w) float32
-        Retinal velocities at every second pixel, deg/s, one for each eye movement that may happen;
-        the largest sensitivity counts. Empty when nothing moves.
-    light : AdaptingLight, optional
-        What the eye is adapted to; needed where the CSF depends on luminance.
-    smears : sequence of (2, h, w) float32 or None
-        How far a held frame smears for each of `velocities`, degrees; None where it does not. Empty
-        for a display that flashes.
+    image_shape : tuple of int
+        Height and width, pixels.
+    light, contrast : Pyramid
+        Adapting luminance, cd/m2, and contrast of a response of one.
+    velocity : (2, h, w) float32 or None
+        Image velocity at every second pixel (`coarse_velocity`), deg/s; None where nothing moves.
+    eyes : sequence of Pursuit
+        Eye movements that may happen; the largest sensitivity counts.
+    hold_s : float
+        Time for which a frame is lit, seconds; 0 for a display that flashes.
     """
 
     def __init__(
         self,
         table: SensitivityTable,
-        velocities: Sequence[Float32Array],
-        light: AdaptingLight | None = None,
-        smears: Sequence[Float32Array | None] = (),
+        image_shape: tuple[int, int],
+        *,
+        light: Pyramid,
+        contrast: Pyramid,
+        velocity: F32 | None,
+        eyes: Sequence[Pursuit],
+        hold_s: float = 0.0,
     ) -> None:
-        self._table = table
-        self._smears = smears or [None] * len(velocities)
-        self._velocities = velocities
-        self._light = light
+        self._is_still = velocity is None
+        self._table, self._image_shape = table, image_shape
+        self._light, self._contrast = light, contrast
+        self._eyes, self._hold_s = eyes, hold_s
+        self._motions = [] if velocity is None else [self._motion(velocity, eye) for eye in eyes]
         self._reduction = 0
-        self._indices: dict[int | None, list[IndexArray]] = {}
+        self._speeds: dict[int | None, list[Indices]] = {}
+        self._luminances: dict[int, Indices] = {}
 
-    def _entries(self, orientation: int | None, reduction: int) -> list[IndexArray]:
-        """Places in the table by speed and luminance, kept for the bands of one size."""
-        if reduction != self._reduction:
-            self._indices.clear()
-            self._reduction = reduction
-        if orientation not in self._indices:
-            theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
-            offset = self._offset(reduction)
-            found = []
-            for velocity in self._velocities:
-                speed = channel_speed(velocity, theta)
-                for _ in range((reduction // FINEST_REDUCTION).bit_length() - 1):
-                    speed = halve(speed)
-                index = self._table.index(speed)
-                index += offset
-                found.append(index)
-            self._indices[orientation] = found
-        return self._indices[orientation]
+    def weights(self, band: Band) -> Iterator[F32]:
+        """Weight of every channel of a band, () or (h, w) float32 at the band's size."""
+        if self._is_still:
+            yield from [self.at_rest(band)] * len(band.orientations)
+            return
+        for orientation in band.orientations:
+            yield self._weight(self._moving(band, orientation), band)
 
-    def map(self, band: Band, orientation: int | None) -> Float32Array:
-        """Sensitivity of a channel; ask for all of one size together.
+    def at_rest(self, band: Band) -> F32:
+        """Weight of patterns at rest on the retina."""
+        return self._weight(self._table.row(band)[self._luminance(_reduction(band))], band)
 
-        Parameters
-        ----------
-        band : Band
-            The channel's band.
-        orientation : int or None
-            Index into ORIENTATIONS_DEG; None for the base band.
-
-        Returns
-        -------
-        () or (h, w) float32
-            A single number when nothing moves and the light is even, else a map at the size of
-            `reduction`.
-        """
-        if self.is_still:
-            return self.still(band)
-        row = self._table.row(band)
-        indices = self._entries(orientation, self.reduction(band))
-        maps = [row.take(index) for index in indices]
-        for found, smear in zip(maps, self._smears, strict=True):
+    def towards(self, band: Band, velocity: F32, theta_deg: F32, reduction: int) -> F32:
+        """Sensitivity to motions (2, h, w) deg/s of patterns of directions (n, h, w) at a reduced size."""
+        row, rho = self._table.row(band), self._table.frequency_cpd(band)
+        best = np.zeros((), dtype=np.float32)
+        for moved, smear in (self._motion(velocity, eye) for eye in self._eyes):
+            index = self._table.speed_index(channel_speed(moved, theta_deg))
+            found = row.take(index + self._luminance(reduction))
             if smear is not None:
-                np.multiply(found, self._smeared(smear, band, orientation), out=found)
-        first, *others = maps
-        for other in others:
-            np.maximum(first, other, out=first)
-        return first
+                found *= smeared_contrast(smear, theta_deg, rho)
+            best = np.maximum(best, found)
+        return best
 
-    def _smeared(self, smear: Float32Array, band: Band, orientation: int | None) -> Float32Array:
+    def _motion(self, velocity: F32, eye: Pursuit) -> tuple[F32, F32 | None]:
+        return retinal_velocity(velocity, eye), held_smear(velocity, eye, self._hold_s)
+
+    def _moving(self, band: Band, orientation: int | None) -> F32:
+        """Sensitivity of a channel to moving patterns, the largest over eye movements."""
         theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
-        share = smeared_share(smear, theta, self._table.frequency_cpd(band))
-        for _ in range((self.reduction(band) // FINEST_REDUCTION).bit_length() - 1):
-            share = halve(share)
-        return share
+        row, rho, reduction = self._table.row(band), self._table.frequency_cpd(band), _reduction(band)
+        best = np.zeros((), dtype=np.float32)
+        for index, (_, smear) in zip(self._indices(orientation, reduction), self._motions, strict=True):
+            found = row.take(index)
+            if smear is not None:
+                found *= _reduced(smeared_contrast(smear, theta, rho), reduction)
+            best = np.maximum(best, found)
+        return best
 
-    @property
-    def is_still(self) -> bool:
-        """Whether nothing moves, so that all orientations are alike."""
-        return not self._velocities
+    def _indices(self, orientation: int | None, reduction: int) -> list[Indices]:
+        """Table entries by speed and luminance for each eye movement, kept for the bands of one size."""
+        if reduction != self._reduction:
+            self._speeds.clear()
+            self._reduction = reduction
+        if orientation not in self._speeds:
+            theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
+            speeds = (_reduced(channel_speed(moved, theta), reduction) for moved, _ in self._motions)
+            self._speeds[orientation] = [
+                self._table.speed_index(speed) + self._luminance(reduction) for speed in speeds
+            ]
+        return self._speeds[orientation]
 
-    def still(self, band: Band) -> Float32Array:
-        """Sensitivity of an eye that rests, shaped as `map`."""
-        return np.asarray(self._table.row(band)[self._offset(self.reduction(band))])
+    def _luminance(self, reduction: int) -> Indices:
+        if reduction not in self._luminances:
+            self._luminances[reduction] = self._table.luminance_index(self._light.at(reduction))
+        return self._luminances[reduction]
 
-    @staticmethod
-    def reduction(band: Band) -> int:
-        """How coarse the maps of a band are: at every second pixel in the finest bands too."""
-        return max(band.reduction, FINEST_REDUCTION)
+    def _weight(self, sensitivity: F32, band: Band) -> F32:
+        """Weights at the band's own size; sensitivities of the finest bands come at half of it."""
+        weight = np.asarray(sensitivity * self._contrast.at(_reduction(band)))
+        if weight.ndim and band.reduction < FINEST_REDUCTION:
+            return double(weight, halved_shape(self._image_shape, band.reduction))
+        return weight
 
-    def _offset(self, reduction: int) -> IndexArray:
-        if self._light is None:
-            return np.zeros((), dtype=np.int32)
-        return self._light.offset(self._table.luminance_offset, reduction)
+
+def coarse_velocity(velocity_deg_s: F32, valid: Mask) -> F32:
+    """Velocity at every second pixel, (H, W, 2) -> (2, h, w) float32; 0 where not valid."""
+    rows, columns = (
+        np.minimum(FINEST_REDUCTION * np.arange(samples), pixels - 1)
+        for samples, pixels in zip(halved_shape(valid.shape, FINEST_REDUCTION), valid.shape, strict=True)
+    )
+    here = np.ix_(rows, columns)
+    return np.where(valid[here], np.moveaxis(velocity_deg_s[here], -1, 0), np.float32(0.0))
+
+
+def _reduction(band: Band) -> int:
+    return max(band.reduction, FINEST_REDUCTION)
+
+
+def _reduced(values: F32, reduction: int) -> F32:
+    """From every second pixel to every `reduction`-th."""
+    for _ in range((reduction // FINEST_REDUCTION).bit_length() - 1):
+        values = halve(values)
+    return values

@@ -1,1 +1,1 @@
-"""Renderers behind the seam of ``renderer.Renderer``: one module each."""
+"""Scenes and the renderers that read them: Mitsuba's, or your own (:mod:`enfilade.scene.opener`)."""

@@ -1,7 +1,13 @@
-"""A scene, and the renderer that opens it."""
+"""A scene, and the renderer that reads it.
+
+Mitsuba reads ``.xml`` scenes. A renderer of your own is named by an import path, ``module:function``. The function is
+called with the scene's file, ``max_depth`` and ``chunk`` (paths in flight), and returns a
+:class:`enfilade.renderer.Renderer`. Worker processes must be able to import the module, too.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.metadata
 from dataclasses import dataclass
@@ -9,9 +15,17 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.device import active
-from enfilade.errors import SceneError
+from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import Renderer
 from enfilade.settings import LimitSettings, Settings, TraceSettings
+
+__all__ = ["Scene"]
+
+ADVICE = {
+    ".blend": "export it with the mitsuba-blender add-on (File > Export > Mitsuba) and give the XML file: "
+    "docs/formats.md",
+    ".json": "a camera path is given by --path",
+}
 
 
 @dataclass(frozen=True)
@@ -22,60 +36,73 @@ class Scene:
     ----------
     file : Path
     renderer : str
-        ``module:function`` that opens it, called with the file and the settings; empty: Mitsuba 3.
+        Import path of your own renderer; empty: Mitsuba.
     """
 
     file: Path
     renderer: str = ""
 
-    def fingerprint(self) -> str:
-        """SHA-256 of the scene's files.
-
-        Raises
-        ------
-        SceneError
-            A file is missing or malformed.
-        """
-        if self.renderer:
-            import hashlib
-
-            return hashlib.sha256(self.file.read_bytes()).hexdigest()
-        from enfilade.scene.scenefile import fingerprint
-
-        return fingerprint(self.file)
-
-    def renderer_identity(self) -> dict[str, str]:
-        """Name, version and variant of the renderer."""
-        if self.renderer:
-            return {"name": self.renderer, "variant": active().backend}
-        return {"name": f"Mitsuba {importlib.metadata.version('mitsuba')}", "variant": active().variant}
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", Path(self.file))
 
     def check(self, limits: LimitSettings) -> None:
-        """Refuse a scene that reaches for files or plugins that it may not use, before it is loaded.
+        """Refuse a scene that is missing, or uses plugins or files that it may not, without loading it.
+
+        The scene of your own renderer must only exist.
 
         Raises
         ------
         SceneError
+        SettingsError
+            There is no such renderer.
         """
         if self.renderer:
+            _imported(self.renderer)
             if not self.file.is_file():
                 raise SceneError(f"there is no scene file {self.file}")
             return
-        from enfilade.scene.scenecheck import check_scene
+        self._check_suffix()
+        from enfilade.scene.mitsuba.files import check_scene
 
-        _ = check_scene, limits  # TEMP
+        check_scene(self.file, limits)
 
-    def preflight(self, settings: Settings) -> None:
+    def identity(self) -> dict[str, str]:
+        """Renderer with its version, variant of its kernels, and fingerprint of the scene's files.
+
+        Raises
+        ------
+        SceneError
+            The scene is missing or malformed.
+        """
+        if self.renderer:
+            try:
+                digest = hashlib.sha256(self.file.read_bytes()).hexdigest()
+            except OSError as error:
+                raise SceneError(f"can't read the scene {self.file}: {error.strerror}") from error
+            return {"renderer": self.renderer, "variant": active().backend, "fingerprint": digest}
+        self._check_suffix()
+        from enfilade.scene.mitsuba.files import fingerprint
+
+        name = f"Mitsuba {importlib.metadata.version('mitsuba')}"
+        return {"renderer": name, "variant": active().variant, "fingerprint": fingerprint(self.file)}
+
+    def preflight(self, settings: Settings) -> str:
         """Load the scene once in a process of its own, with limits of memory and time.
+
+        Returns
+        -------
+        str
+            Why the diffuse lobe of its materials can't be separated; empty where it can, or is not known.
 
         Raises
         ------
         SceneError
         """
-        if not self.renderer:
-            from enfilade.scene.trial import try_scene
+        if self.renderer:
+            return ""
+        from enfilade.scene.preflight import preflight
 
-            try_scene(self.file, settings[TraceSettings], settings[LimitSettings], active().variant)
+        return preflight(self.file, settings[TraceSettings], settings[LimitSettings], active().variant)
 
     def open(self, settings: Settings) -> Renderer:
         """Load the scene.
@@ -84,18 +111,22 @@ class Scene:
         ------
         SceneError
             It is missing, malformed, or refused by the renderer.
+        SettingsError
+            There is no such renderer.
+        DeviceError
+            No usable LLVM or CUDA.
         """
+        terms = {
+            "max_depth": settings[TraceSettings].max_depth,
+            "chunk": settings[LimitSettings].paths_in_flight,
+        }
         if self.renderer:
-            module, _, function = self.renderer.partition(":")
-            opened: Renderer = getattr(importlib.import_module(module), function)(self.file, settings)
+            opened: Renderer = _imported(self.renderer)(self.file, **terms)
             return opened
-        from enfilade.scene.mitsuba import MitsubaRenderer
+        self._check_suffix()
+        from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
-        return MitsubaRenderer(
-            self.file,
-            max_depth=settings[TraceSettings].max_depth,
-            chunk=settings[LimitSettings].paths_in_flight,
-        )
+        return MitsubaRenderer(self.file, **terms)
 
     def to_json(self) -> dict[str, Any]:
         """Fit for JSON; read back by :meth:`from_json`."""
@@ -105,3 +136,19 @@ class Scene:
     def from_json(table: dict[str, Any]) -> Scene:
         """Read back from :meth:`to_json`."""
         return Scene(Path(table["file"]), str(table["renderer"]))
+
+    def _check_suffix(self) -> None:
+        suffix = self.file.suffix.lower()
+        if suffix != ".xml":
+            advice = f": {ADVICE[suffix]}" if suffix in ADVICE else ""
+            raise SceneError(f"{self.file} is not a scene in Mitsuba's XML format (.xml){advice}")
+
+
+def _imported(renderer: str) -> Any:
+    module, _, function = renderer.partition(":")
+    try:
+        return getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SettingsError(
+            f"there is no renderer {renderer!r}: {error}; give it as module:function, of an importable module"
+        ) from error

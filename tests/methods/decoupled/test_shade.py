@@ -12,7 +12,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.decoupled import LightCache, Shader, open_cache, open_page
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from enfilade.scene.mitsuba import MitsubaRenderer
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.settings import TraceSettings
 from studies.scenes import write_scene
 

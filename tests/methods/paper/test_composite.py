@@ -9,10 +9,10 @@ import scipy.ndimage
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper import agrees, composite, warp_keyframe
 from enfilade.records import Geometry, Warped
-from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Sphere
 from enfilade.settings import WarpSettings
 from keyframes_analytic import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
 from scenes_analytic import room, room_walk
+from support.analytic_scene import AnalyticScene, Material, Plane, Sphere
 
 SETTINGS = WarpSettings(depth_tolerance=0.02)
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 50.0, 1, 1)

@@ -12,10 +12,10 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper import warp_keyframe
 from enfilade.methods.paper.warp import _land, disparity_gradient
 from enfilade.records import Geometry, Keyframe, Shading
-from enfilade.scene.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere, Waves
 from enfilade.settings import WarpSettings
 from keyframes_analytic import first_hits, keyframe_of, pixel_centres, projected, psnr, ray_directions
 from scenes_analytic import ball, room, room_walk, wall
+from support.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere, Waves
 from twins.painter import occlusion_compatible_order, painted
 
 SETTINGS = WarpSettings()

@@ -11,10 +11,10 @@ from enfilade.gbuffer import image_flow
 from enfilade.methods.paper import Slice, filter_along_flow, reconstruct, spatial_support_px
 from enfilade.methods.paper.support import TemporalLimits
 from enfilade.records import Flow, Geometry
-from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad
 from enfilade.settings import AntialiasSettings
 from keyframes_analytic import geometry_of, psnr, traced_image
 from scenes_analytic import room, room_walk
+from support.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad
 from twins.trajectory import filtered
 
 H, W = 14, 18

@@ -1,39 +1,87 @@
-"""Judges of a sequence against its reference: each takes frames in order, and one number says the end.
+"""Measures of the difference between two sequences.
 
 >>> import numpy as np
->>> from enfilade.comparison.measures import Psnr, shown
+>>> from enfilade.comparison.measures import Psnr, display_pair
 >>> from enfilade.viewing import Viewing
 >>> grey = np.full((48, 64, 3), 0.5, np.float32)
->>> pair = shown(grey * 1.1, grey, Viewing(64, 48))
->>> judge = Psnr()
->>> round(judge.pooled([judge.judge(pair)]), 1)
+>>> pair = display_pair(grey * 1.1, grey, Viewing(64, 48))
+>>> measure = Psnr()
+>>> round(measure.pool([measure.measure(pair)]), 1)
 30.2
 """
 
 from __future__ import annotations
 
-from enfilade.comparison.measures.aqm import AqmJudge
+from importlib.util import find_spec
+
+from enfilade.comparison.measures.aqm import AqmMeasure
+from enfilade.comparison.measures.base import Measure, Scale
 from enfilade.comparison.measures.colorvideovdp import ColorVideoVdp
+from enfilade.comparison.measures.displayed import DisplayedPair, display_pair
 from enfilade.comparison.measures.flip import Flip
-from enfilade.comparison.measures.judge import Judge, Scale
-from enfilade.comparison.measures.panel import JUDGES, SCALES, open_judge, why_missing
 from enfilade.comparison.measures.psnr import Psnr
-from enfilade.comparison.measures.shown import Shown, shown
-from enfilade.comparison.measures.temporal import Temporal, seen_before
+from enfilade.comparison.measures.temporal import Temporal, visible_before
+from enfilade.errors import SettingsError
+from enfilade.metric import Pursuit
+from enfilade.viewing import Viewing
 
 __all__ = [
-    "JUDGES",
     "SCALES",
-    "AqmJudge",
+    "AqmMeasure",
     "ColorVideoVdp",
+    "DisplayedPair",
     "Flip",
-    "Judge",
+    "Measure",
     "Psnr",
     "Scale",
-    "Shown",
     "Temporal",
-    "open_judge",
-    "seen_before",
-    "shown",
+    "display_pair",
+    "open_measure",
+    "visible_before",
     "why_missing",
 ]
+
+SCALES: dict[str, Scale] = {
+    of.SCALE.name: of.SCALE for of in (AqmMeasure, Flip, Psnr, Temporal, ColorVideoVdp)
+}
+
+
+def open_measure(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> Measure:
+    """A measure for one pair of sequences.
+
+    Parameters
+    ----------
+    name
+        One of :data:`SCALES`.
+    viewing
+        Viewing conditions.
+    pursuit
+        Eye movements that AQM assumes.
+
+    Raises
+    ------
+    SettingsError
+        There is no such measure, or it is not installed.
+    """
+    match name:
+        case "aqm":
+            return AqmMeasure(viewing, pursuit=pursuit)
+        case "flip":
+            return Flip(viewing)
+        case "psnr":
+            return Psnr()
+        case "temporal":
+            return Temporal()
+        case "cvvdp":
+            return ColorVideoVdp(viewing)
+        case _:
+            raise SettingsError(f"there is no measure {name!r}; choose one of {', '.join(SCALES)}")
+
+
+def why_missing(name: str) -> str:
+    """Why a measure is not available, and how to get it; empty where it is."""
+    if name == "flip" and find_spec("flip_evaluator") is None:
+        return "FLIP is left out; install it with: pip install 'enfilade[judges]'"
+    if name == "cvvdp" and find_spec("pycvvdp") is None:
+        return "ColorVideoVDP is left out; install it with: pip install cvvdp"
+    return ""

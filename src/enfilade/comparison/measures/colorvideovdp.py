@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.comparison.measures.judge import Scale
-from enfilade.comparison.measures.shown import Shown
+from enfilade.comparison.measures.base import Scale
+from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
 __all__ = ["ColorVideoVdp"]
 
 PERFECT_JOD = 10.0
-BLACK_LEAST_CD_M2 = 1e-4  # a contrast ratio is asked for: black can't be 0
+BLACK_LEAST_CD_M2 = 1e-4  # the display model takes a contrast ratio
 
 
 def _lost(jod: float) -> float:
@@ -24,9 +24,9 @@ def _lost(jod: float) -> float:
 
 
 class ColorVideoVdp:
-    """Just objectionable differences: 10 is identical, 1 less is what three of four people find worse.
+    """Just objectionable differences: 10 is identical; 1 less is found worse by three of four observers.
 
-    It has colour and flicker, and no motion of the eye. It judges a sequence as a whole.
+    It models colour and flicker, but no eye movements. It measures a sequence as a whole.
 
     Parameters
     ----------
@@ -43,6 +43,7 @@ class ColorVideoVdp:
     """
 
     SCALE = Scale("cvvdp", "ColorVideoVDP", "JOD", is_more_better=True, error_of=_lost)
+    name = SCALE.name
 
     def __init__(self, viewing: Viewing) -> None:
         try:
@@ -51,7 +52,7 @@ class ColorVideoVdp:
             from torch import device
         except ImportError as error:
             raise SettingsError(
-                f"ColorVideoVDP can't judge: {error}; install it with: pip install cvvdp"
+                f"ColorVideoVDP is not available: {error}; install it with: pip install cvvdp"
             ) from error
         black = max(viewing.black_cd_m2, BLACK_LEAST_CD_M2)
         screen = vvdp_display_photo_eotf(viewing.peak_cd_m2, contrast=viewing.peak_cd_m2 / black, EOTF="sRGB")
@@ -64,14 +65,14 @@ class ColorVideoVdp:
         )
         self._frames: list[tuple[npt.NDArray[np.float16], npt.NDArray[np.float16]]] = []
 
-    def judge(self, pair: Shown) -> None:
-        """Keep the next frame; nothing is said of it alone."""
+    def measure(self, pair: DisplayedPair) -> None:
+        """Keep the next frame, which has no value of its own."""
         self._frames.append((pair.test.astype(np.float16), pair.reference.astype(np.float16)))
 
-    def pooled(self, values: Sequence[float | None]) -> float:
-        """JOD of the frames that were judged."""
+    def pool(self, values: Sequence[float | None]) -> float:
+        """JOD of all frames."""
         del values
         test, reference = (np.stack(frames) for frames in zip(*self._frames, strict=True))
-        fps = self._fps if len(test) > 1 else 0.0  # its word for a single image
+        fps = self._fps if len(test) > 1 else 0.0  # of a single image
         jod, _ = self._metric.predict(test, reference, dim_order="FHWC", frames_per_second=fps)
         return float(jod)

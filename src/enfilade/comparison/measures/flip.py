@@ -1,4 +1,4 @@
-"""LDR-FLIP (Andersson et al. 2020): the difference of images that flip in place, by ``flip-evaluator``."""
+"""LDR-FLIP (Andersson et al. 2020): the difference between alternating images, by ``flip-evaluator``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enfilade.comparison.measures.judge import Scale
-from enfilade.comparison.measures.shown import Shown
+from enfilade.comparison.measures.base import Scale
+from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
@@ -17,7 +17,7 @@ __all__ = ["Flip"]
 class Flip:
     """Mean of the LDR-FLIP map, 0 (identical) to 1, at the pixels per degree of the viewing conditions.
 
-    It looks at each frame by itself: flicker is nothing to it.
+    Each frame is measured by itself: flicker does not count.
 
     Parameters
     ----------
@@ -30,20 +30,21 @@ class Flip:
     """
 
     SCALE = Scale("flip", "FLIP", "mean")
+    name = SCALE.name
 
     def __init__(self, viewing: Viewing) -> None:
         try:
             from flip_evaluator import evaluate
         except ImportError as error:
             raise SettingsError(
-                f"FLIP can't judge: {error}; install it with: pip install 'enfilade[judges]'"
+                f"FLIP is not available: {error}; install it with: pip install 'enfilade[judges]'"
             ) from error
         self._evaluate = evaluate
         self._parameters = {"ppd": float(viewing.pixels_per_degree)}
 
-    def judge(self, pair: Shown) -> float:
-        """Judge the next frame: mean of its map."""
-        # inputsRGB, applyMagma, computeMeanError; the mean it gives back is 0 where the maps are.
+    def measure(self, pair: DisplayedPair) -> float:
+        """Mean of the frame's map."""
+        # inputsRGB, applyMagma, computeMeanError
         found = self._evaluate(
             np.ascontiguousarray(pair.reference),
             np.ascontiguousarray(pair.test),
@@ -55,7 +56,7 @@ class Flip:
         )
         return float(found[1])
 
-    def pooled(self, values: Sequence[float | None]) -> float:
+    def pool(self, values: Sequence[float | None]) -> float:
         """Mean over the frames."""
         known = [value for value in values if value is not None]
         return sum(known) / len(known)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enfilade.comparison.measures.judge import Scale
-from enfilade.comparison.measures.shown import Shown
+from enfilade.comparison.measures.base import Scale
+from enfilade.comparison.measures.displayed import DisplayedPair
 
 __all__ = ["Psnr"]
 
@@ -24,13 +24,14 @@ class Psnr:
     """
 
     SCALE = Scale("psnr", "PSNR", "dB", is_more_better=True, error_of=_rms)
+    name = SCALE.name
 
-    def judge(self, pair: Shown) -> float:
+    def measure(self, pair: DisplayedPair) -> float:
         """PSNR of the next frame, dB."""
         difference = (pair.test - pair.reference).ravel()
         return _db(float(np.vdot(difference, difference)) / difference.size)
 
-    def pooled(self, values: Sequence[float | None]) -> float:
+    def pool(self, values: Sequence[float | None]) -> float:
         """PSNR of the whole sequence: of the mean squared error over all frames."""
         squared = [_rms(value) ** 2 for value in values if value is not None]
         return _db(sum(squared) / len(squared))

@@ -9,14 +9,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.comparison.measures.judge import Scale
-from enfilade.comparison.measures.shown import Shown
+from enfilade.comparison.measures.base import Scale
+from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.records import F32, Mask
 
-__all__ = ["Temporal", "seen_before"]
+__all__ = ["Temporal", "visible_before"]
 
-PLANE_TOLERANCE = 0.01  # of the depth: how far from its plane a surface point counts as that surface
-ITEM, POSITION, NORMAL, DEPTH, BACKWARD = "item", "P", "N", "Z", "backward"  # layers of a delivered frame
+PLANE_TOLERANCE = 0.01  # of the depth: distance from its plane within which a point is of the same surface
+SHAPE, POSITION, NORMAL, DEPTH, BACKWARD = (
+    "shape_index",
+    "P",
+    "N",
+    "Z",
+    "backward",
+)  # layers of a delivered frame
 
 
 class Temporal:
@@ -34,39 +40,45 @@ class Temporal:
     """
 
     SCALE = Scale("temporal", "temporal", "RMS", is_of_changes=True)
+    name = SCALE.name
 
     def __init__(self) -> None:
         self._before: F32 | None = None
 
-    def judge(self, pair: Shown) -> float | None:
-        """Judge the next frame; None where a shot begins, or nothing is seen in both frames."""
+    def measure(self, pair: DisplayedPair) -> float | None:
+        """Change of the error; None where a shot begins, or no surface is in both frames."""
         error = pair.test - pair.reference
         before, self._before = self._before, error
-        if before is None or pair.flow is None or pair.seen_before is None or not pair.seen_before.any():
+        if (
+            before is None
+            or pair.flow is None
+            or pair.visible_before is None
+            or not pair.visible_before.any()
+        ):
             return None
-        change = (error - _read(before, pair.flow.backward))[pair.seen_before]
+        change = (error - _read(before, pair.flow.backward))[pair.visible_before]
         return math.sqrt(float(np.mean(np.square(change, dtype=np.float64))))
 
-    def pooled(self, values: Sequence[float | None]) -> float:
+    def pool(self, values: Sequence[float | None]) -> float:
         """Root of the mean over frames of the squares; 0 where no frame has one before it."""
         known = [value for value in values if value is not None]
         return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
 
 
-def seen_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.NDArray[Any]]) -> Mask:
-    """Pixels whose surface the last frame sees too.
+def visible_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.NDArray[Any]]) -> Mask:
+    """Pixels whose surface the last frame shows, too.
 
     Parameters
     ----------
     layers, last
-        Layers ``item``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one before it
-        in the same shot.
+        Layers ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one
+        before it in the same shot.
 
     Returns
     -------
     (H, W) bool
-        True where the flow leads to a pixel that shows the same item on the same plane (or nothing, where
-        nothing is seen).
+        True where the flow leads to a pixel that shows the same shape on the same plane (or nothing, where
+        nothing is hit).
     """
     backward = layers[BACKWARD].astype(np.float32)
     height, width = backward.shape[:2]
@@ -76,7 +88,7 @@ def seen_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.N
     at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0).astype(int)
     step = last[POSITION][at] - layers[POSITION]
     off_plane = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
-    same: Mask = inside & (last[ITEM][at] == layers[ITEM]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
+    same: Mask = inside & (last[SHAPE][at] == layers[SHAPE]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
     return same
 
 

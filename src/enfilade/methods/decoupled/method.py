@@ -20,7 +20,7 @@ from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Frame
-from enfilade.renderer import LobeRenderer, Renderer
+from enfilade.renderer import LobeRenderer
 from enfilade.settings import (
     DecoupledSettings,
     KeyframeSettings,
@@ -34,6 +34,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes afresh in every frame."""
 
     name = "decoupled"
+    needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
         Pass("prepass", IrradianceImage),
@@ -65,24 +66,6 @@ class Decoupled(Method):
         """
         if settings[DecoupledSettings].denoiser != "none" and (why := why_no_denoiser()):
             raise SettingsError(why)
-
-    def check_scene(self, renderer: Renderer) -> None:
-        """Refuse scenes whose diffuse lobes can't be separated.
-
-        Raises
-        ------
-        SettingsError
-        """
-        name = renderer.describe().renderer
-        reason = (
-            renderer.why_inseparable
-            if isinstance(renderer, LobeRenderer)
-            else f"{name} can't separate the diffuse lobe"
-        )
-        if reason:
-            raise SettingsError(
-                f"--method decoupled can't render the scene: {reason}; take --method paper or --method reference"
-            )
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Keyframes, of which irradiance images are made."""
@@ -136,7 +119,7 @@ class Decoupled(Method):
 
     def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
         if self._integrator is None or self._virtual_images is None:
-            assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`check_scene`)
+            assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
             self._integrator = Integrator(walk.renderer)
             self._virtual_images = VirtualImages(walk.renderer)
         if self._shot is None or self._shot.number != task.shot:

@@ -10,7 +10,7 @@ from enfilade.methods.base import Output
 from enfilade.methods.decoupled.irradiance import gather
 from enfilade.methods.decoupled.irradiance_cache import accumulate, light_of, upload
 from enfilade.methods.decoupled.shot import ACCUMULATED, Shot
-from enfilade.metric import Aqm, MetricOptions
+from enfilade.metric import Aqm
 from enfilade.records import Geometry, Mask
 from enfilade.renderer import Emitters, Purpose
 from enfilade.settings import DecoupledSettings
@@ -117,7 +117,7 @@ def _pilot_jnd(shot: Shot, frame: int, where: Mask) -> float:
         image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
         light = light_of(accumulate(geometry, where, [upload(geometry, image)]))
         shown.append(walk.display_luminance(geometry.albedo * light))
-    metric = Aqm(walk.viewing, options=MetricOptions.modern(), workers=FFT_THREADS)
+    metric = Aqm.modern(walk.viewing, workers=FFT_THREADS)
     return metric.compare(shown[0], shown[1], valid=where).score
 
 

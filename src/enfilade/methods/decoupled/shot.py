@@ -82,7 +82,7 @@ class Shot:
     @property
     def renderer(self) -> LobeRenderer:
         """The renderer."""
-        assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.check_scene`)
+        assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.needs_lobes`)
         return self.walk.renderer
 
     def prepass_cache(self, frame: int) -> IrradianceCache:

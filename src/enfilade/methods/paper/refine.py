@@ -99,9 +99,8 @@ class Refinement:
 
     def __init__(self, walk: Walkthrough) -> None:
         self._walk = walk
-        self._metric = Aqm(
-            walk.viewing, mask_slope=walk.settings[MetricSettings].mask_slope, workers=FFT_THREADS
-        )
+        slope = walk.settings[MetricSettings].mask_slope
+        self._metric = Aqm.paper(walk.viewing, mask_slope=slope, workers=FFT_THREADS)
 
     def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
         """Judge a segment, and its halves where it is split.

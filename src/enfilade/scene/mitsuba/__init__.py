@@ -1,5 +1,1 @@
 """Mitsuba 3, embedded (Jakob et al. 2022): the renderer that comes with enfilade."""
-
-from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-
-__all__ = ["MitsubaRenderer"]

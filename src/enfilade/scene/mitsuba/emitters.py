@@ -1,4 +1,4 @@
-"""Where the emitters of a Mitsuba scene are."""
+"""Points on the emitters of a Mitsuba scene."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from enfilade.arrays import Array3f, lanes, rows
 from enfilade.kernels.random import R2
 from enfilade.renderer import Emitters
 
-MOST_POINTS = 1 << 17  # on all lamps together
+MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
 
 
 def find_emitters(scene: Any) -> Emitters:
-    """Points all over the surfaces that emit; none of an environment, or of a light without a surface."""
+    """Distribute points over all emitting surfaces; environments, point and directional lights have none."""
     shapes = [(index, shape) for index, shape in enumerate(scene.shapes(), start=1) if shape.is_emitter()]
-    count = int(np.clip(MOST_POINTS // max(len(shapes), 1), *POINTS))
+    count = int(np.clip(MAX_POINTS // max(len(shapes), 1), *POINTS))
     square = mi.Point2f(
         *(lanes(np.mod(step / 2**32 * np.arange(count), 1.0).astype(np.float32)) for step in R2)
     )

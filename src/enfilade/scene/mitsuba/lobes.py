@@ -1,12 +1,13 @@
-"""Mitsuba's BSDFs as a diffuse lobe times an albedo, and the rest.
+"""Mitsuba's BSDFs, split into albedo times a diffuse lobe, and specular lobes.
 
-Most of Mitsuba's BSDFs evaluate and sample their diffuse component alone when asked to. Their albedo is what
-that component sends straight ahead: a coat that lets less light out the more obliquely it is seen is part of
-it, so that the light by the albedo is the same whoever looks. Some BSDFs do not divide themselves
-(``principled`` answers with all of itself, ``mask`` samples its diffuse component wrongly): for them the
-diffuse lobe is Lambert's with their own albedo, as far as they are opaque and no metal or glass, and the rest
-is what the whole BSDF has beyond it, which may be negative; a mask over a Lambert lobe has none where it is
-opaque.
+Most BSDFs of Mitsuba evaluate and sample their diffuse component alone when a context selects it. Their
+albedo is the value of that component for light along the normal. It includes the transmittance of a coat
+towards the viewer, so that the quotient of the diffuse component and the albedo does not depend on the view.
+
+Some BSDFs can't be split by a context: ``principled`` evaluates all of itself, and ``mask`` samples its
+diffuse component wrongly. Their diffuse lobe is a Lambertian one with their own albedo, reduced by
+transparency, metalness and transmission. The specular part is the difference between the whole BSDF and that
+lobe; it may be negative. A mask over a Lambertian BSDF has nothing but its null interaction left.
 """
 
 from __future__ import annotations
@@ -15,17 +16,19 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from enfilade.arrays import Bool, UInt
+from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
-UNDIVIDED = ("Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured")
-NOT_DIFFUSE = ("metallic", "spec_trans")  # shares of a surface that its base colour's diffuse lobe lacks
-LAMBERT = ("MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse")  # made of these alone it is Lambert's lobe with holes
+WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured"}  # not split by a context
+NOT_DIFFUSE = ("metallic", "spec_trans")  # attributes: shares of the base colour without a diffuse lobe
+LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
 
 class Lobes:
-    """The materials of a scene, divided.
+    """The BSDFs of a scene, split.
+
+    Directions are in the local frame of the interaction `si`.
 
     Parameters
     ----------
@@ -38,146 +41,132 @@ class Lobes:
         self._diffuse, self._specular = mi.BSDFContext(), mi.BSDFContext()
         self._diffuse.type_mask = int(flags.Diffuse)
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
-        materials = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
-        numbers: Any = [dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(material)) for material in materials]
-        registry = [int(number[0]) for number in numbers]
-        is_undivided, is_lambert = np.zeros((2, max(registry, default=0) + 1), bool)
-        is_undivided[registry] = [not names.isdisjoint(UNDIVIDED) for names in map(_classes, materials)]
-        is_lambert[registry] = [names.issubset(LAMBERT) for names in map(_classes, materials)]
-        self._is_undivided, self._is_lambert = Bool(is_undivided), Bool(is_lambert)
-        self._has_undivided = bool(is_undivided.any())
+        self._whole = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
+        self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
+        self._has_whole = bool(dr.any(self._whole))
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._is_undivided, self._is_lambert
+        return self._whole, self._lambertian
 
-    def is_undivided(self, seen: Any, material: Any) -> Any:
-        """Whether the diffuse lobe of these hits is Lambert's, and not Mitsuba's own component."""
-        number: Any = dr.reinterpret_array(UInt, material)
-        return dr.gather(Bool, self._is_undivided, number, seen.is_valid())
-
-    def _is_lamberts(self, seen: Any, material: Any) -> Any:
-        """Whether these hits are Lambert's lobe, perhaps with holes."""
-        number: Any = dr.reinterpret_array(UInt, material)
-        return dr.gather(Bool, self._is_lambert, number, seen.is_valid())
-
-    def has_specular(self, seen: Any, material: Any) -> Any:
-        """Whether these hits have more than a diffuse lobe."""
+    def has_specular(self, si: Any, bsdf: Any) -> Any:
+        """Whether there are specular lobes, null interactions included."""
         beyond = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Diffuse)
-        has_specular = seen.is_valid() & ((material.flags() & beyond) != 0)
-        if not self._has_undivided:
+        has_specular = si.is_valid() & ((bsdf.flags() & beyond) != 0)
+        if not self._has_whole:
             return has_specular
-        is_lambert = self._is_lamberts(seen, material)
-        is_opaque = is_lambert & (self._opacity(seen, material, has_specular & is_lambert) >= 1.0)
-        return (has_specular & ~is_opaque) | (self.is_undivided(seen, material) & ~is_lambert)
+        is_lambertian = _of(self._lambertian, si, bsdf)
+        is_opaque = is_lambertian & (_opacity(si, bsdf, has_specular & is_lambertian) >= 1.0)
+        return (has_specular & ~is_opaque) | (_of(self._whole, si, bsdf) & ~is_lambertian)
 
-    def has_glossy(self, seen: Any, material: Any) -> Any:
-        """Whether what these hits have beyond the diffuse lobe is more than lobes of one direction each."""
-        is_glossy = has_lobe(material.flags(), "GlossyReflection", "GlossyTransmission")
-        if not self._has_undivided:
+    def has_glossy(self, si: Any, bsdf: Any) -> Any:
+        """Whether there are specular lobes other than delta lobes and null interactions."""
+        is_glossy = has_lobe(bsdf.flags(), "GlossyReflection", "GlossyTransmission")
+        if not self._has_whole:
             return is_glossy
-        return is_glossy | (self.is_undivided(seen, material) & ~self._is_lamberts(seen, material))
+        return is_glossy | (_of(self._whole, si, bsdf) & ~_of(self._lambertian, si, bsdf))
 
-    def albedo(self, seen: Any, material: Any, active: Any) -> Any:
-        """Albedo of the diffuse lobe, 0..1: what light is multiplied with, and what the rest is without."""
-        is_diffuse = active & has_lobe(material.flags(), "DiffuseReflection", "DiffuseTransmission")
-        undivided = self.is_undivided(seen, material)
-        ahead = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), seen.wi.z))
-        albedo = dr.pi * material.eval(self._diffuse, seen, ahead, is_diffuse & ~undivided)
-        if self._has_undivided:
-            undivided &= is_diffuse
-            own = material.eval_diffuse_reflectance(seen, undivided)
-            own *= self._opacity(seen, material, undivided)
+    def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
+        """Albedo of the diffuse lobe, 0..1; Color3f."""
+        is_diffuse = active & has_lobe(bsdf.flags(), "DiffuseReflection", "DiffuseTransmission")
+        is_whole = _of(self._whole, si, bsdf)
+        along_normal = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), si.wi.z))
+        albedo = dr.pi * bsdf.eval(self._diffuse, si, along_normal, is_diffuse & ~is_whole)
+        if self._has_whole:
+            is_whole &= is_diffuse
+            own = bsdf.eval_diffuse_reflectance(si, is_whole)
+            own *= _opacity(si, bsdf, is_whole)
             for name in NOT_DIFFUSE:
-                has_it = undivided & material.has_attribute(name, undivided)
-                own *= 1.0 - dr.select(has_it, material.eval_attribute_1(name, seen, has_it), 0.0)
-            albedo = dr.select(undivided, own, albedo)
+                has_it = is_whole & bsdf.has_attribute(name, is_whole)
+                own *= 1.0 - dr.select(has_it, bsdf.eval_attribute_1(name, si, has_it), 0.0)
+            albedo = dr.select(is_whole, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
 
-    def eval_diffuse(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        """Diffuse lobe times cosine, and its density, for a direction in the local frame."""
-        undivided = self.is_undivided(seen, material)
-        own, own_pdf = material.eval_pdf(self._diffuse, seen, wo, active & ~undivided)
-        lambert, lambert_pdf = self._lambert(seen, material, wo, active & undivided)
-        return dr.select(undivided, lambert, own), dr.select(undivided, lambert_pdf, own_pdf)
+    def eval_diffuse(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """Diffuse lobe times cosine, and the density of :meth:`sample_diffuse`."""
+        is_whole = _of(self._whole, si, bsdf)
+        value, pdf = bsdf.eval_pdf(self._diffuse, si, wo, active & ~is_whole)
+        lambert, lambert_pdf = self._lambert(si, bsdf, wo, active & is_whole)
+        return dr.select(is_whole, lambert, value), dr.select(is_whole, lambert_pdf, pdf)
 
-    def sample_diffuse(self, seen: Any, material: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
+    def sample_diffuse(self, si: Any, bsdf: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
         """Direction, density and weight of a sample of the diffuse lobe."""
-        undivided = self.is_undivided(seen, material)
+        is_whole = _of(self._whole, si, bsdf)
         second, first = mi.Point2f(rng.next_float32(), rng.next_float32()), rng.next_float32()
-        own, weight = material.sample(self._diffuse, seen, first, second, active & ~undivided)
-        up = _cosine(seen, second)
-        albedo = self.albedo(seen, material, active & undivided)
-        wo = dr.select(undivided, up, own.wo)
-        pdf = dr.select(undivided, dr.abs(up.z) / dr.pi, own.pdf)
-        return wo, pdf, dr.select(undivided, albedo, weight)
+        sample, weight = bsdf.sample(self._diffuse, si, first, second, active & ~is_whole)
+        up = _cosine_direction(si, second)
+        albedo = self.albedo(si, bsdf, active & is_whole)
+        wo = dr.select(is_whole, up, sample.wo)
+        pdf = dr.select(is_whole, dr.abs(up.z) / dr.pi, sample.pdf)
+        return wo, pdf, dr.select(is_whole, albedo, weight)
 
-    def eval_specular(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        """Everything but the diffuse lobe, times cosine, and the density of :meth:`sample_specular`."""
-        undivided = self.is_undivided(seen, material)
-        own, own_pdf = material.eval_pdf(self._specular, seen, wo, active & ~undivided)
-        beyond, mixed_pdf = self._beyond(seen, material, wo, active & undivided)
-        return dr.select(undivided, beyond, own), dr.select(undivided, mixed_pdf, own_pdf)
+    def eval_specular(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """Specular lobes times cosine, and the density of :meth:`sample_specular`."""
+        is_whole = _of(self._whole, si, bsdf)
+        value, pdf = bsdf.eval_pdf(self._specular, si, wo, active & ~is_whole)
+        difference, mixture_pdf = self._difference(si, bsdf, wo, active & is_whole)
+        return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
-    def sample_specular(
-        self, seen: Any, material: Any, rng: Any, choice: Any = None
-    ) -> tuple[Any, Any, Any, Any]:
-        """Direction, density, weight, and whether the direction is the only one (a delta lobe).
+    def sample_specular(self, si: Any, bsdf: Any, rng: Any, choice: Any = None) -> tuple[Any, Any, Any, Any]:
+        """Direction, density, weight of a sample, and whether it is of a delta lobe.
 
-        What a whole BSDF has beyond Lambert's lobe is sampled by both in turn: where only the one or the
-        other is large, the weight stays bounded. A Lambert lobe with holes has nothing beyond but these. Who
-        makes the choice of the lobe, 0..1, gets a direction of it, and no weight.
+        The difference between a whole BSDF and its Lambertian lobe is sampled by both with equal probability,
+        so that the weight stays bounded where only one of them is large. A masked Lambertian BSDF is sampled
+        by itself: only its null interaction counts. A given `choice` of the lobe, 0..1, yields a direction
+        of that lobe, and a weight without meaning.
         """
-        undivided = self.is_undivided(seen, material)
+        is_whole = _of(self._whole, si, bsdf)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-        has_holes = undivided & self._is_lamberts(seen, material)
-        is_turn = has_holes | (rng.next_float32() < 0.5)
+        is_masked = is_whole & _of(self._lambertian, si, bsdf)
+        by_bsdf = is_masked | (rng.next_float32() < 0.5)
         if choice is not None:
-            first, is_turn = choice, Bool(True)
-        own, weight = material.sample(self._specular, seen, first, second, ~undivided)
-        whole, whole_weight = material.sample(self._all, seen, first, second, undivided)
-        kind = dr.select(undivided, whole.sampled_type, own.sampled_type)
+            first, by_bsdf = choice, Bool(True)
+        sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
+        whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
+        kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
         is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) | mi.has_flag(kind, mi.BSDFFlags.Null)
-        is_delta &= ~undivided | is_turn
+        is_delta &= ~is_whole | by_bsdf
 
-        mixed_wo = dr.select(is_turn, whole.wo, _cosine(seen, second))
-        beyond, mixed_pdf = self._beyond(seen, material, mixed_wo, undivided & ~is_delta)
-        beyond = dr.select(mixed_pdf > 0.0, beyond / mixed_pdf, 0.0)
-        beyond = dr.select(is_delta, dr.select(has_holes, 1.0, 2.0) * whole_weight, beyond)
-        mixed_pdf = dr.select(is_delta, whole.pdf, mixed_pdf)
+        # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
+        wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
+        difference, pdf = self._difference(si, bsdf, wo, is_whole & ~is_delta)
+        difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
+        difference = dr.select(is_delta, dr.select(is_masked, 1.0, 2.0) * whole_weight, difference)
+        pdf = dr.select(is_delta, whole.pdf, pdf)
 
-        wo, pdf = dr.select(undivided, mixed_wo, own.wo), dr.select(undivided, mixed_pdf, own.pdf)
-        return wo, pdf, dr.select(undivided, beyond, weight), is_delta
+        wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
+        return wo, pdf, dr.select(is_whole, difference, weight), is_delta
 
-    def _opacity(self, seen: Any, material: Any, active: Any) -> Any:
-        """What part of a surface is there: 1 - what it lets through unseen."""
-        return 1.0 - dr.mean(material.eval_null_transmission(seen, active))
-
-    def _beyond(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        """What a whole BSDF has beyond Lambert's lobe, and the mean density of sampling the two."""
-        whole, whole_pdf = material.eval_pdf(self._all, seen, wo, active)
-        lambert, lambert_pdf = self._lambert(seen, material, wo, active)
+    def _difference(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""
+        whole, whole_pdf = bsdf.eval_pdf(self._all, si, wo, active)
+        lambert, lambert_pdf = self._lambert(si, bsdf, wo, active)
         return whole - lambert, 0.5 * (whole_pdf + lambert_pdf)
 
-    def _lambert(self, seen: Any, material: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        is_reflected = wo.z * seen.wi.z > 0.0
+    def _lambert(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        is_reflected = wo.z * si.wi.z > 0.0
         pdf = dr.select(is_reflected, dr.abs(wo.z) / dr.pi, 0.0)
-        return self.albedo(seen, material, active) * pdf, pdf
+        return self.albedo(si, bsdf, active) * pdf, pdf
 
 
-def _classes(material: Any) -> set[str]:
-    """Mitsuba's classes of a material, and of those nested in it."""
-    return {n.class_name() for n in mi.traverse(material).hierarchy if isinstance(n, mi.BSDF)}
+def _of(table: Any, si: Any, bsdf: Any) -> Any:
+    """Entries of a table of BSDFs; Bool."""
+    number: Any = dr.reinterpret_array(UInt, bsdf)
+    return dr.gather(Bool, table, number, si.is_valid())
 
 
-def has_lobe(flags: Any, *lobes: str) -> Any:
-    """Whether a material has any of these lobes, by Mitsuba's names of them."""
-    return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
+def _classes(bsdf: Any) -> set[str]:
+    """Mitsuba's classes of a BSDF and of those nested in it."""
+    return {n.class_name() for n in mi.traverse(bsdf).hierarchy if isinstance(n, mi.BSDF)}
 
 
-def _cosine(seen: Any, square: Any) -> Any:
-    """Direction on the side from which a surface is seen, as likely as its cosine."""
+def _opacity(si: Any, bsdf: Any, active: Any) -> Any:
+    return 1.0 - dr.mean(bsdf.eval_null_transmission(si, active))
+
+
+def _cosine_direction(si: Any, square: Any) -> Any:
+    """A cosine-distributed direction in the hemisphere of the viewer."""
     up = mi.warp.square_to_cosine_hemisphere(square)
-    return mi.Vector3f(up.x, up.y, dr.copysign(up.z, seen.wi.z))
+    return mi.Vector3f(up.x, up.y, dr.copysign(up.z, si.wi.z))

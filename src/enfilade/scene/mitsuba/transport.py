@@ -1,4 +1,4 @@
-"""The light apart from the surfaces: what ``renderer.LobeRenderer`` asks, answered by Mitsuba."""
+"""Light transport at a shading point of a Mitsuba scene, for the diffuse and the specular lobes apart."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Radiance = Callable[[Rays, Any, int, Any], Any]
 
 
 class LightTransport:
-    """Emission, light samples and bounces of a Mitsuba scene.
+    """Emission, next-event estimation and BSDF samples.
 
     Parameters
     ----------
     scene : mitsuba.Scene
     radiance
-        The path tracer: radiance along rays, given a random number generator for each, the
-        path depth at which they begin, and which of them are traced.
+        The path tracer: radiance along rays, from the rays, their random number generators, the path depth at
+        which they begin, and which of them are traced.
     """
 
     def __init__(self, scene: Any, radiance: Radiance) -> None:
@@ -34,58 +34,52 @@ class LightTransport:
 
     @property
     def state(self) -> Any:
-        """Arrays that the materials' division reads."""
+        """Arrays that the methods read."""
         return self._lobes.state
 
-    def albedo(self, seen: Any, material: Any, active: Any) -> Any:
+    def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1; 0 where there is none."""
-        return Array3f(self._lobes.albedo(seen, material, active))
+        return Array3f(self._lobes.albedo(si, bsdf, active))
 
-    def emission(self, seen: Any, bounce: Bounce | None) -> Any:
-        """Radiance that a hit, or the environment, sends back along the ray."""
-        emitted = seen.emitter(self._scene).eval(seen)
+    def has_specular(self, si: Any) -> Any:
+        """Whether the BSDF of a hit has specular lobes."""
+        return self._lobes.has_specular(si, si.bsdf())
+
+    def emission(self, si: Any, bounce: Bounce | None) -> Any:
+        """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
+        emitted = si.emitter(self._scene).eval(si)
         if bounce is None:
             return Array3f(emitted)
         origin = dr.zeros(mi.Interaction3f)
         origin.p = mi.Point3f(bounce.position)
-        direction = mi.DirectionSample3f(self._scene, seen, origin)
-        sampled = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
-        return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _balance(bounce.pdf, sampled)))
+        direction = mi.DirectionSample3f(self._scene, si, origin)
+        emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
+        return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
 
-    def has_specular(self, seen: Any) -> Any:
-        """Whether a hit's material is more than a diffuse lobe."""
-        return self._lobes.has_specular(seen, seen.bsdf())
+    def estimate(self, sample: BsdfSample, rng: Any, path_depth: int) -> tuple[Any, Any]:
+        """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
+        found = self._radiance(sample.rays, rng, path_depth, sample.is_alive)
+        ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
+        si = self._scene.ray_intersect(ray, sample.is_alive)
 
-    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
-        return self._onward(self.sample_diffuse(point, rng), rng, path_depth)
-
-    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int) -> tuple[Any, Any]:
-        """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
-        return self._onward(self.sample_specular(point, rng), rng, path_depth)
-
-    def _onward(self, lobe: BsdfSample, rng: Any, path_depth: int) -> tuple[Any, Any]:
-        """What a lobe sends: sampled lights, and what the path tracer finds, its first emitter weighted."""
-        found = self._radiance(lobe.rays, rng, path_depth, lobe.is_alive)
-        ray = mi.Ray3f(mi.Point3f(lobe.rays.origin), mi.Vector3f(lobe.rays.direction))
-        following = self._scene.ray_intersect(ray, lobe.is_alive)
-        whole = following.emitter(self._scene).eval(following, lobe.is_alive)
-        emitted = lobe.throughput * self.emission(following, lobe.bounce)
-        direct = lobe.direct + dr.select(lobe.is_alive, emitted, 0.0)
-        indirect = dr.select(lobe.is_alive, lobe.throughput * (found - whole), 0.0)
+        # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
+        unweighted = si.emitter(self._scene).eval(si, sample.is_alive)
+        emitted = sample.throughput * self.emission(si, sample.bounce)
+        direct = sample.direct + dr.select(sample.is_alive, emitted, 0.0)
+        indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
     def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
-        seen, albedo = point.native, point.surfaces.albedo
-        active = seen.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
-        material = seen.bsdf()
-        direct = self._sampled_lights(seen, material, self._lobes.eval_diffuse, rng, active, albedo)
-        wo, pdf, weight = self._lobes.sample_diffuse(seen, material, rng, active)
-        ray = seen.spawn_ray(seen.to_world(wo))
+        si, albedo = point.native, point.surfaces.albedo
+        active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        bsdf = si.bsdf()
+        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, rng, active, albedo)
+        wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, rng, active)
+        ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
-            bounce=Bounce(Array3f(seen.p), pdf, Bool(False)),
+            bounce=Bounce(Array3f(si.p), pdf, Bool(False)),
             throughput=_divided(weight, albedo),
             direct=Array3f(direct),
             is_alive=Bool(active & (pdf > 0.0)),
@@ -93,45 +87,45 @@ class LightTransport:
 
     def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
-        seen = point.native
-        material = seen.bsdf()
-        wo, pdf, weight, is_delta = self._lobes.sample_specular(seen, material, rng, choice)
-        # Mirrors and clear glass send nothing from a point on a light: its shadow ray is spared.
-        is_spread = point.has_specular & self._lobes.has_glossy(seen, material)
-        direct = self._sampled_lights(seen, material, self._lobes.eval_specular, rng, is_spread)
-        ray = seen.spawn_ray(seen.to_world(wo))
+        si = point.native
+        bsdf = si.bsdf()
+        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, rng, choice)
+        # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
+        has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
+        direct = self._next_event(si, bsdf, self._lobes.eval_specular, rng, has_glossy)
+        ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
-            bounce=Bounce(Array3f(seen.p), pdf, Bool(is_delta)),
+            bounce=Bounce(Array3f(si.p), pdf, Bool(is_delta)),
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
         )
 
-    def _sampled_lights(
-        self, seen: Any, material: Any, evaluate: Any, rng: Any, active: Any, albedo: Any = None
+    def _next_event(
+        self, si: Any, bsdf: Any, evaluate: Any, rng: Any, active: Any, albedo: Any = None
     ) -> Any:
-        """Weighted radiance that a lobe, by its albedo if any, sends from one sampled point on the lights."""
-        point = mi.Point2f(rng.next_float32(), rng.next_float32())
-        light, radiance = self._scene.sample_emitter_direction(seen, point, True, active)
-        active = active & (light.pdf != 0.0)
-        value, pdf = evaluate(seen, material, seen.to_local(light.d), active)
+        """Radiance of a lobe from one sampled point on the emitters, MIS-weighted, divided by the albedo."""
+        square = mi.Point2f(rng.next_float32(), rng.next_float32())
+        emitter, radiance = self._scene.sample_emitter_direction(si, square, True, active)
+        active = active & (emitter.pdf != 0.0)
+        value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), active)
         if albedo is not None:
             value = _divided(value, albedo)
-        share = dr.select(light.delta, 1.0, _balance(light.pdf, pdf))
-        return dr.select(active, value * radiance * share, 0.0)
+        weight = dr.select(emitter.delta, 1.0, _mis_weight(emitter.pdf, pdf))
+        return dr.select(active, value * radiance * weight, 0.0)
 
 
 def _divided(lobe: Any, albedo: Any) -> Any:
-    """A diffuse lobe by its albedo; in channels that have none, as in the one that has most: Array3f.
+    """A diffuse lobe divided by its albedo; Array3f.
 
-    What light a red surface gets, its pale neighbours get, too: a channel that it swallows may not look dark.
+    A channel without albedo takes the value of the brightest one: irradiance is shared with surfaces that do
+    reflect in this channel.
     """
     channels = list(zip(Array3f(lobe), Array3f(albedo), strict=True))
     most = dr.max(Array3f(albedo))
-    brightest = dr.select(
-        most > MIN_DIFFUSE_ALBEDO, dr.max(Array3f(lobe)) / dr.maximum(most, MIN_DIFFUSE_ALBEDO), 0.0
-    )
+    brightest = dr.max(Array3f(lobe)) / dr.maximum(most, MIN_DIFFUSE_ALBEDO)
+    brightest = dr.select(most > MIN_DIFFUSE_ALBEDO, brightest, 0.0)
     quotients = (
         dr.select(a > MIN_DIFFUSE_ALBEDO, v / dr.maximum(a, MIN_DIFFUSE_ALBEDO), brightest)
         for v, a in channels
@@ -139,8 +133,8 @@ def _divided(lobe: Any, albedo: Any) -> Any:
     return Array3f(*quotients)
 
 
-def _balance(this: Any, other: Any) -> Any:
-    """Veach's power heuristic; 0 where neither strategy would have found it."""
-    this, other = this * this, other * other
-    share = this / (this + other)
-    return dr.select(dr.isfinite(share), share, 0.0)
+def _mis_weight(pdf: Any, other_pdf: Any) -> Any:
+    """Veach's power heuristic; 0 where both densities are 0."""
+    pdf, other_pdf = pdf * pdf, other_pdf * other_pdf
+    weight = pdf / (pdf + other_pdf)
+    return dr.select(dr.isfinite(weight), weight, 0.0)

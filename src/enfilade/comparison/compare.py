@@ -1,0 +1,217 @@
+"""The visible difference between two sequences, frame by frame (§3)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from enfilade.comparison.measures import Measure, open_measure
+from enfilade.comparison.motion import FlowChoice, Moved, open_motion
+from enfilade.comparison.pairs import Pair, open_pairs
+from enfilade.comparison.result import FrameDifference, Part, SequenceDifference
+from enfilade.errors import ImageError, InputError
+from enfilade.kernels.tone import srgb_encode
+from enfilade.metric import Aqm, Comparison, Pursuit, SequenceAqm
+from enfilade.monitor import Monitor
+from enfilade.records import F32
+from enfilade.settings import MetricSettings, ViewingSettings
+from enfilade.viewing import Display, Viewing
+
+__all__ = ["ComparedFrame", "Show", "Terms", "compare"]
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedFrame:
+    """A compared frame, for heat maps.
+
+    Attributes
+    ----------
+    index : int
+        From 0.
+    difference : FrameDifference
+    jnd : (H, W) float32
+        Map of visible differences.
+    reference_relative : (H, W) float32
+        Luminance of the reference, 1 = white.
+    """
+
+    index: int
+    difference: FrameDifference
+    jnd: F32
+    reference_relative: F32
+
+    @property
+    def grey(self) -> F32:
+        """The reference, encoded for a display, (H, W) float32, 0..1."""
+        return srgb_encode(self.reference_relative)
+
+
+Show = Callable[[Iterator[ComparedFrame], Viewing], object]
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Assumptions of a comparison.
+
+    Attributes
+    ----------
+    viewing
+        Viewing conditions of an image that fills the display; its exposure is not used.
+    metric
+        Eye movements, and the slope of masking in the paper's mode.
+    display
+        Replaces `viewing`: images stand pixel for pixel on a display.
+    mode
+        Of the metric.
+    flow
+        Origin of the motion vectors.
+    fps
+        Frames per second shown; by default the reference's, the test's, or 30.
+    exposure_ev
+        Of OpenEXR frames, stops; by default that of the run folders, or 0.
+    layers
+        Layer or part of the test's and the reference's OpenEXR frames that is compared.
+    measures
+        Further measures: ``psnr``, ``flip``, ``cvvdp``, or a :class:`~enfilade.comparison.measures.Measure`
+        of your own.
+    """
+
+    viewing: ViewingSettings = field(default_factory=ViewingSettings)
+    metric: MetricSettings = field(default_factory=MetricSettings)
+    display: Display | None = None
+    mode: Literal["modern", "paper"] = "modern"
+    flow: FlowChoice = FlowChoice.AUTO
+    fps: float | None = None
+    exposure_ev: float | None = None
+    layers: tuple[str | None, str | None] = (None, None)
+    measures: Sequence[str | Measure] = ()
+
+    def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
+        """Viewing conditions of an image of a size."""
+        if self.display is not None:
+            return self.display.viewing(*size, fps)
+        return Viewing(
+            *size,
+            diagonal_m=self.viewing.diagonal_m,
+            distance_m=self.viewing.distance_m,
+            fps=fps,
+            peak_cd_m2=self.viewing.peak_cd_m2,
+            black_cd_m2=self.viewing.black_cd_m2,
+            persistence=self.viewing.persistence,
+        )
+
+
+def compare(
+    test: Path | str,
+    reference: Path | str,
+    terms: Terms,
+    monitor: Monitor,
+    *,
+    show: Show | None = None,
+) -> SequenceDifference:
+    """Measure the visible difference between two image sequences, videos or run folders.
+
+    Frames are read and compared one after another: memory does not grow with their number.
+
+    Parameters
+    ----------
+    test, reference
+        Sources of :func:`enfilade.images.open_sequence`.
+    terms
+    monitor
+    show
+        Receives the compared frames and the viewing conditions, and must iterate over all of them.
+
+    Raises
+    ------
+    ImageError
+        A sequence can't be read, the two differ in length, size or frame rate, they are runs of different
+        frames, or pixels are NaN or infinite. The message names the frame.
+    SettingsError
+        There is no such measure, or it is not installed.
+    """
+    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers)
+    conditions = terms.conditions(pairs.size, pairs.fps)
+    motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
+    notes = [motion.text, pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note))]
+    if pairs.exposure_ev:
+        notes.append(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
+    if terms.display is None:
+        notes.append(
+            f"display: the image fills a diagonal of {conditions.diagonal_m:g} m, seen from "
+            f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; --display "
+            "chooses another"
+        )
+    for note in filter(None, notes):
+        monitor.say(note)
+    comparer = _Comparer(conditions, terms)
+    found: list[FrameDifference] = []
+
+    def compared() -> Iterator[ComparedFrame]:
+        for pair, moved in motion.follow(pairs.displayed(conditions, monitor)):
+            frame = comparer.compare(pair, moved)
+            found.append(frame.difference)
+            yield frame
+            monitor.progress("compare", len(found), len(pairs))
+
+    if show is None:
+        deque(compared(), maxlen=0)
+    else:
+        show(compared(), conditions)
+    bands = comparer.bands_cpd
+    return SequenceDifference(tuple(found), conditions, bands, terms.mode, motion.kind, comparer.scores())
+
+
+class _Comparer:
+    def __init__(self, viewing: Viewing, terms: Terms) -> None:
+        self._viewing = viewing
+        pursuit = Pursuit(terms.metric.metering.value)
+        if terms.mode == "paper":
+            aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=terms.metric.mask_slope)
+        else:
+            aqm = Aqm.modern(viewing, pursuit=pursuit)
+        self._aqm = SequenceAqm(aqm)
+        self.bands_cpd = aqm.bands_cpd
+        opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in terms.measures]
+        self._measures: list[tuple[Measure, list[float | None]]] = [(measure, []) for measure in opened]
+
+    def compare(self, pair: Pair, moved: Moved) -> ComparedFrame:
+        velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
+        try:
+            found = self._aqm.compare(
+                pair.test,
+                pair.reference,
+                velocity=velocity,
+                backward_flow_px=moved.backward,
+                is_cut=moved.is_cut,
+            )
+        except InputError as error:
+            raise ImageError(f"{pair.name} can't be compared: {error}") from error
+        for measure, values in self._measures:
+            values.append(measure.measure(pair.displayed))
+        speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
+        difference = _difference(pair, found, speed)
+        return ComparedFrame(pair.index, difference, found.jnd, pair.reference_relative)
+
+    def scores(self) -> dict[str, float]:
+        return {measure.name: measure.pool(values) for measure, values in self._measures}
+
+
+def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
+    steady, transient = (Part(part.score, part.band_jnd) for part in (found.steady, found.transient))
+    return FrameDifference(
+        pair.name,
+        pair.number,
+        found.percent_visible,
+        found.score,
+        steady,
+        transient,
+        pair.squared_error,
+        speed_deg_s,
+        largest_jnd=float(found.jnd.max()),
+    )

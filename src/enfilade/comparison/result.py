@@ -1,0 +1,194 @@
+"""The result of a comparison: per frame, per band, steady and transient, and as one number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from enfilade.metric import sequence_score
+from enfilade.viewing import Viewing
+
+__all__ = ["FrameDifference", "Part", "SequenceDifference", "psnr_db"]
+
+WORDS = (  # for scores up to so many JND, of all pixels and frames taken together
+    (0.0, "identical"),
+    (0.25, "next to none overall"),
+    (0.75, "faint overall"),
+    (1.5, "noticeable overall"),
+    (3.0, "obvious overall"),
+    (math.inf, "strong overall"),
+)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Steady or transient errors of one frame.
+
+    Attributes
+    ----------
+    score : float
+        JND.
+    bands : tuple of float
+        Per radial band, finest first, JND.
+    """
+
+    score: float
+    bands: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FrameDifference:
+    """The visible difference between two frames.
+
+    Attributes
+    ----------
+    name : str
+        Of the test's frame.
+    number : int
+        Of the test's frame; counted from 1 where it has none of its own.
+    percent_visible : float
+        Pixels above 1 JND, percent.
+    score : float
+        The map of visible differences pooled to one number, JND.
+    steady, transient : Part
+        Errors that stay on their surface, and errors that change from frame to frame. Both are part of the
+        score; the paper's mode has no transient errors.
+    squared_error : float
+        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+    velocity_deg_s : float
+        Mean image velocity.
+    largest_jnd : float
+        Largest value of the map, JND.
+    """
+
+    name: str
+    number: int
+    percent_visible: float
+    score: float
+    steady: Part
+    transient: Part
+    squared_error: float
+    velocity_deg_s: float
+    largest_jnd: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, fit for JSON; the PSNR of identical images is None."""
+        return {
+            "name": self.name,
+            "number": self.number,
+            "score_jnd": self.score,
+            "steady_jnd": self.steady.score,
+            "transient_jnd": self.transient.score,
+            "percent_visible": self.percent_visible,
+            "largest_jnd": self.largest_jnd,
+            "steady_bands_jnd": list(self.steady.bands),
+            "transient_bands_jnd": list(self.transient.bands),
+            "psnr_db": _finite(psnr_db(self.squared_error)),
+            "velocity_deg_s": self.velocity_deg_s,
+        }
+
+
+@dataclass(frozen=True)
+class SequenceDifference:
+    """The visible difference between two sequences.
+
+    Attributes
+    ----------
+    frames : tuple of FrameDifference
+    viewing : Viewing
+        Viewing conditions.
+    bands_cpd : tuple of (float, float)
+        Frequencies that each radial band passes, cycles per degree, finest first; the base from 0.
+    mode : str
+        Of the metric: ``modern`` or ``paper``.
+    flow : str
+        Origin of the motion vectors: ``layers``, ``estimate`` or ``none``.
+    scores : mapping of str to float
+        Results of further measures, by name.
+    """
+
+    frames: tuple[FrameDifference, ...]
+    viewing: Viewing
+    bands_cpd: tuple[tuple[float, float], ...]
+    mode: str
+    flow: str
+    scores: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def score(self) -> float:
+        """One number for the sequence, JND: (mean over frames of score^3.5)^(1/3.5)."""
+        return sequence_score([f.score for f in self.frames])
+
+    @property
+    def meaning(self) -> str:
+        """The score in words, and the frame with the largest difference, if any pixel is visible."""
+        words, worst = words_of(self.score), max(self.frames, key=lambda f: f.largest_jnd)
+        if not any(f.percent_visible for f in self.frames):
+            return words
+        return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
+
+    @property
+    def psnr_db(self) -> float:
+        """PSNR of the whole sequence, of the mean squared error over all frames; infinite if identical."""
+        return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, fit for JSON."""
+        viewing = self.viewing
+        return {
+            "score_jnd": self.score,
+            "meaning": self.meaning,
+            "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
+            "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
+            "percent_visible": _spread([f.percent_visible for f in self.frames]),
+            "largest_jnd": max(f.largest_jnd for f in self.frames),
+            "psnr_db": _finite(self.psnr_db),
+            "scores": {name: _finite(score) for name, score in self.scores.items()},
+            "worst_frame": max(range(len(self.frames)), key=lambda i: self.frames[i].score),
+            "frames": len(self.frames),
+            "size": [viewing.width_px, viewing.height_px],
+            "fps": viewing.fps,
+            "pixels_per_degree": viewing.pixels_per_degree,
+            "distance_m": viewing.distance_m,
+            "peak_cd_m2": viewing.peak_cd_m2,
+            "black_cd_m2": viewing.black_cd_m2,
+            "persistence": viewing.persistence,
+            "mode": self.mode,
+            "flow": self.flow,
+            "bands_cpd": [list(band) for band in self.bands_cpd],
+            "per_frame": [frame.to_dict() for frame in self.frames],
+        }
+
+
+def words_of(score: float) -> str:
+    """A score in words.
+
+    It is that of all pixels and frames together: a small or brief defect has a low score, however plain it
+    is.
+
+    Parameters
+    ----------
+    score
+        JND, 0 or more.
+    """
+    return next(text for most, text in WORDS if score <= most)
+
+
+def psnr_db(squared_error: float) -> float:
+    """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
+    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
+
+
+def _short(name: str) -> str:
+    # "frame 3 of walk.mp4", or the path of an image
+    return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
+
+
+def _spread(values: list[float]) -> dict[str, float]:
+    return {"mean": sum(values) / len(values), "most": max(values)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,104 @@
+"""The published metric: the stages of Fig. 6 in their order (§3.2 to §3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.errors import InputError
+from enfilade.metric.adaptation import DARKEST_CD_M2
+from enfilade.metric.amplitude import contrast_gain, response
+from enfilade.metric.channels import ChannelBank
+from enfilade.metric.comparison import Comparison
+from enfilade.metric.csf import spatiovelocity_sensitivity
+from enfilade.metric.eye import Pursuit
+from enfilade.metric.inputs import Pair
+from enfilade.metric.masking import MASK_SLOPE, threshold_elevation
+from enfilade.metric.noise import response_variance
+from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
+from enfilade.metric.pyramid import Pyramid
+from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
+from enfilade.records import F32, Mask
+from enfilade.viewing import Viewing
+
+__all__ = ["PaperMetric"]
+
+F64: TypeAlias = npt.NDArray[np.float64]
+
+
+class PaperMetric:
+    """The published metric for one viewing condition and image size; see `Aqm.paper`.
+
+    1. Amplitude nonlinearity (Daly 1993), contrast over the mean of the reference: `amplitude`.
+    2. Cortex transform (Watson 1987, Daly 1993): `channels`, `cortex`.
+    3. Retinal velocity, with smooth pursuit and without (Eq. 5): `eye`.
+    4. Spatiovelocity contrast sensitivity (Eq. 4): `csf`, `sensitivity`.
+    5. Differences that Monte Carlo noise explains are not counted: `noise`.
+    6. Mutual visual masking by threshold elevation (Daly 1993): `masking`.
+    7. Pooling over channels and probability of detection (§6): `pooling`.
+
+    Parameters
+    ----------
+    viewing, mask_slope, workers
+        As in `Aqm.paper`.
+    """
+
+    has_transient = False
+
+    def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE, workers: int = 1) -> None:
+        if not 0.0 <= mask_slope <= 1.0:
+            raise InputError(f"metric: mask_slope is {mask_slope!r}; give a number from 0 to 1")
+        self.viewing = viewing
+        self._mask_slope = mask_slope
+        self._bank = ChannelBank(viewing, workers=workers)
+        self.bands = self._bank.bands
+        self._table = SensitivityTable(_csf, self.bands, viewing.pixels_per_degree)
+
+    def compare(self, pair: Pair, eyes: Sequence[Pursuit]) -> Comparison:
+        """Compare two images; the most sensitive of several eye movements counts."""
+        # Respond to luminance; the reference's mean sets adaptation and contrast.
+        test, reference = response(pair.test), response(pair.reference)
+        adapting = max(_mean(pair.reference, pair.valid), DARKEST_CD_M2)
+        mean = _mean(reference, pair.valid)
+        darkest = float(response(np.asarray(DARKEST_CD_M2, dtype=np.float32)))
+        contrast = 1.0 / (max(mean, darkest) * contrast_gain(adapting))
+        # Transform the difference rather than the test, so that equal images give exactly zero.
+        spectra = self._bank.spectra(reference - np.float32(mean), test - reference)
+        noise = None
+        if pair.noise_variance is not None:
+            luminance = np.float32(0.5) * (pair.test + pair.reference)
+            variance = response_variance(luminance, pair.noise_variance)
+            noise = self._bank.noise(variance, pair.noise_blur_px)
+        sensitivity = ChannelSensitivity(
+            self._table,
+            pair.valid.shape,
+            light=Pyramid(np.asarray(adapting, dtype=np.float32)),
+            contrast=Pyramid(np.asarray(contrast, dtype=np.float32)),
+            velocity=pair.velocity,
+            eyes=eyes,
+        )
+        pool = Pool(len(self.bands), pair.valid, POOLING_EXPONENT)
+        for band in self.bands:
+            channels = self._bank.channels(spectra, band, pair.valid, noise)
+            for channel, weight in zip(channels, sensitivity.weights(band), strict=True):
+                # Express contrasts in units of the threshold; the uniform part stands still.
+                difference = channel.counted * weight
+                if channel.uniform is not None:
+                    difference += channel.uniform * sensitivity.at_rest(band)
+                # Elevate the threshold by the lower contrast of the two images.
+                masker = np.abs(channel.reference + channel.difference)
+                masker = np.minimum(np.abs(channel.reference), masker) * weight
+                difference /= threshold_elevation(masker, self._mask_slope)
+                pool.add(band.level, raised(np.square(difference)), band.reduction)
+        return pool.comparison()
+
+
+def _csf(frequency_cpd: float, velocity_deg_s: F64, _luminance_cd_m2: F64) -> F64:
+    return spatiovelocity_sensitivity(frequency_cpd, velocity_deg_s)
+
+
+def _mean(image: F32, valid: Mask) -> float:
+    return float(image.sum(dtype=np.float64, where=valid)) / max(int(np.count_nonzero(valid)), 1)

@@ -1,0 +1,32 @@
+"""Limits that a child process sets for itself."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+
+__all__ = ["die_with", "limit_memory"]
+
+MB = 1 << 20
+PR_SET_PDEATHSIG = 1  # prctl(2): the signal for this process when its parent dies
+
+
+def die_with(parent: int) -> None:
+    """End with the process of this number, or at once if that is no longer the parent.
+
+    The kernel signals the end of the thread that started this process, which must live as long.
+    """
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before
+        sys.exit(1)
+
+
+def limit_memory(megabytes: int) -> None:
+    """Bound the address space, below any limit already set, and write no core file."""
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = megabytes * MB if hard == resource.RLIM_INFINITY else min(megabytes * MB, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -1,0 +1,272 @@
+"""Hands out the tasks of a run until all are done: tries failed ones again, then sets them aside."""
+
+from __future__ import annotations
+
+import heapq
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from enfilade.device import active
+from enfilade.errors import DamagedFileError, EnfiladeError, UnfinishedError
+from enfilade.files import whole_file
+from enfilade.methods.base import Pass, Task, TaskId
+from enfilade.monitor import Monitor
+from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO, analysis_tasks, video_tasks
+from enfilade.runs.executor import Ended, Executor, InProcess, Order, Workers
+from enfilade.runs.failure import Failure, FailureKind
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.graph import TaskGraph, block_of
+from enfilade.runs.job import Job
+from enfilade.runs.resources import cores, gpus
+from enfilade.runs.worker import analysis_of
+from enfilade.settings import LimitSettings
+
+ATTEMPTS = 3  # at a task, and at a file that is found damaged again and again
+DELAYS_S = (1.0, 10.0)  # before the second and the third
+REDUCTION = 4  # of the paths in flight, after a lack of memory
+SET_ASIDE_IN_A_ROW = 4  # tasks without a success between them, after which the run ends
+FAILED = "failed"  # folder of the logs of tasks that were set aside
+SHOWN = 5  # tasks named in a message
+
+Chosen = Callable[[Sequence[Task]], list[Task]]  # those tasks of a run that this command does
+
+
+def passes_of(job: Job) -> list[Pass]:
+    """All passes of a run, in order."""
+    return [ANALYSIS, *job.opened_method().passes, CLIPS, VIDEO]
+
+
+def tasks_of(job: Job, run: RunFolder) -> list[Task]:
+    """All tasks of a run; before its path is analyzed, those of the analysis alone."""
+    analysis = analysis_tasks(len(job.path))
+    if not all(is_done(job, run, task) for task in analysis):
+        return analysis
+    return [*analysis, *job.opened_method().tasks(analysis_of(job, run)), *video_tasks(len(job.path))]
+
+
+def is_done(job: Job, run: RunFolder, task: Task) -> bool:
+    """Whether a task is finished and its files have the sizes on record."""
+    line = run.line(task.pass_name, job.path.numbers[task.frame])
+    if line is None:
+        return False
+    is_video = task.pass_name in (CLIPS.name, VIDEO.name)
+    return not is_video or bool(line["video"] == job.video_identity)
+
+
+def work(
+    job: Job, run: RunFolder, workers: Workers, monitor: Monitor, *, chosen: Chosen | None = None
+) -> None:
+    """Do all tasks of a run that are not done.
+
+    Parameters
+    ----------
+    job
+    run
+        Opened to write in it.
+    workers
+    monitor
+    chosen
+        Chooses the tasks of this command; others are done by other commands. None: all.
+
+    Raises
+    ------
+    UnfinishedError
+        Some tasks failed again and again and were set aside; the rest is done.
+    NoSpaceError
+        The disk is full. All finished tasks stay.
+    EnfiladeError
+        An error of the input or of a method; a file that is damaged again and again.
+    """
+    damages: Counter[str] = Counter()
+    # New workers after each repair: the old ones have the damaged file in memory, and would not write it.
+    while (name := _work_once(job, run, workers, monitor, chosen)) is not None:
+        damages[name] += 1
+        if damages[name] >= ATTEMPTS:
+            raise EnfiladeError(
+                f"{run.folder / name} was damaged {ATTEMPTS} times during the run; check its disk"
+            )
+        run.forget(name)
+        monitor.say(f"{name} is missing or damaged: its task is done again")
+
+
+def _work_once(
+    job: Job, run: RunFolder, workers: Workers, monitor: Monitor, chosen: Chosen | None
+) -> str | None:
+    """Do all tasks; returns the name of a damaged file if one is found."""
+    run.refresh()
+    executor: Executor | None = None
+    try:
+        while True:
+            everything = tasks_of(job, run)
+            mine = everything if chosen is None else chosen(everything)
+            left = [task for task in mine if not is_done(job, run, task)]
+            if left:
+                executor = executor or open_executor(job, run, workers)
+                if (name := _Loop(job, run, left, executor, monitor, mine).run()) is not None:
+                    return name
+            elif chosen is not None or len(everything) > len(analysis_tasks(len(job.path))):
+                return None
+    finally:
+        if executor is not None:
+            executor.close()
+
+
+def open_executor(job: Job, run: RunFolder, workers: Workers) -> Executor:
+    """Open the executor of a run.
+
+    Raises
+    ------
+    EnfiladeError
+        Ray is not installed, or its cluster does not answer.
+    """
+    kind, _, address = workers.executor.partition(":")
+    device = "gpu" if active().backend == "cuda" else "cpu"
+    limits = job.settings[LimitSettings]
+    executor: Executor
+    if kind == "in-process":
+        executor = InProcess(job, run)
+    elif kind == "processes":
+        from enfilade.runs.processes import Processes
+
+        names = gpus() if device == "gpu" else []
+        count = workers.count or max(len(names), 1 if device == "gpu" else cores())
+        threads = workers.threads or max(cores() // count, 1)
+        executor = Processes(run, limits, device=device, workers=count, threads=threads, gpus=names)
+    else:
+        from enfilade.runs.cluster import Cluster
+
+        executor = Cluster(run, limits, workers, address=address, device=device)
+    if run.lock is not None:
+        run.lock.sign(executor.slots)
+    return executor
+
+
+class _Loop:
+    """One pass over the tasks that are left."""
+
+    def __init__(
+        self,
+        job: Job,
+        run: RunFolder,
+        left: Sequence[Task],
+        executor: Executor,
+        monitor: Monitor,
+        everything: Iterable[Task],
+    ) -> None:
+        self._job = job
+        self._run = run
+        self._graph = TaskGraph(passes_of(job), left)
+        self._executor = executor
+        self._monitor = monitor
+        self._totals = Counter(task.pass_name for task in everything)
+        self._counts = self._totals - Counter(task.pass_name for task in left)
+        self._in_hand: dict[int, Order] = {}
+        self._blocks: dict[int, int] = {}  # of the workers
+        self._reduction = 1  # of the paths in flight
+        self._failures: dict[TaskId, list[Failure]] = {}
+        self._delayed: list[tuple[float, TaskId, Task]] = []
+        self._set_aside: list[Task] = []
+        self._in_a_row = 0
+
+    def run(self) -> str | None:
+        """Do the tasks; returns the name of a damaged file if one is found."""
+        while self._hand_out():
+            for ended in self._wait():
+                order = self._in_hand.pop(ended.slot)
+                if not isinstance(ended.result, Failure):
+                    self._finish(order.task, ended.result)
+                elif isinstance(ended.result.error, DamagedFileError):
+                    return ended.result.error.file
+                else:
+                    self._executor.discard(ended.slot)  # it may have left the device in a bad state
+                    self._fail(order, ended.result)
+        self._report()
+        if left := self._graph.unfinished:
+            names = shortened([self._name(task) for task in left])
+            raise EnfiladeError(f"--method {self._job.method}: its tasks need each other: {names}")
+        return None
+
+    def _hand_out(self) -> bool:
+        """Give tasks to free workers; returns whether there is anything to wait for."""
+        now = time.monotonic()
+        while self._delayed and self._delayed[0][0] <= now:
+            self._graph.put_back(heapq.heappop(self._delayed)[2])
+        for slot in range(self._executor.slots):
+            if slot in self._in_hand:
+                continue
+            others = [self._blocks[other] for other in self._in_hand]
+            task = self._graph.take(self._blocks.get(slot), others)
+            if task is None:
+                break
+            self._in_hand[slot], self._blocks[slot] = Order(task, self._reduction), block_of(task)
+            self._executor.begin(slot, self._in_hand[slot])
+        return bool(self._in_hand or self._delayed)
+
+    def _wait(self) -> list[Ended]:
+        wait_s = max(self._delayed[0][0] - time.monotonic(), 0.0) if self._delayed else None
+        if self._in_hand:
+            return self._executor.wait(wait_s)
+        time.sleep(wait_s or 0.0)
+        return []
+
+    def _finish(self, task: Task, line: dict[str, Any]) -> None:
+        self._run.finish(line)
+        self._graph.finish(task)
+        self._counts[task.pass_name] += 1
+        self._monitor.progress(task.pass_name, self._counts[task.pass_name], self._totals[task.pass_name])
+        self._in_a_row = 0
+
+    def _fail(self, order: Order, failure: Failure) -> None:
+        if failure.kind is FailureKind.FATAL:
+            raise failure.error or EnfiladeError(failure.text)
+        task, fewer = order.task, ""
+        if failure.kind is FailureKind.MEMORY:  # other tasks would need as much
+            self._reduction = max(self._reduction, order.reduction * REDUCTION)
+            fewer = ", with fewer paths in flight"
+        failures = self._failures.setdefault(task.id, [])
+        failures.append(failure)
+        if len(failures) < ATTEMPTS:
+            self._monitor.say(f"{self._name(task)}: {failure.text}; it is tried again{fewer}")
+            until = time.monotonic() + DELAYS_S[len(failures) - 1]
+            heapq.heappush(self._delayed, (until, task.id, task))
+            return
+        self._graph.give_up(task)
+        self._set_aside.append(task)
+        self._in_a_row += 1
+        self._write_log(task, failures)
+        self._monitor.say(f"{self._name(task)}: {failure.text}; it is set aside")
+        if self._in_a_row >= SET_ASIDE_IN_A_ROW:
+            self._report()
+
+    def _report(self) -> None:
+        """Raise an error if tasks were set aside."""
+        if not self._set_aside:
+            return
+        names = [self._name(task) for task in self._set_aside]
+        last = self._failures[self._set_aside[-1].id][-1]
+        raise UnfinishedError(
+            f"{len(names)} tasks failed {ATTEMPTS} times each: {shortened(names)} ({last.text}); their logs are "
+            f"in {self._run.folder / FAILED}. {len(self._graph)} more tasks are left; the same command "
+            "continues",
+            tuple(names),
+        )
+
+    def _write_log(self, task: Task, failures: list[Failure]) -> None:
+        text = "".join(f"attempt {n}: {f.text}\n\n{f.log}\n" for n, f in enumerate(failures, 1))
+        name = re.sub(r"[^A-Za-z0-9_-]+", "-", self._name(task))
+        try:
+            with whole_file(self._run.folder / FAILED / f"{name}.log") as beside:
+                beside.write_text(text, encoding="utf-8")
+        except EnfiladeError as error:  # the run goes on without the log
+            self._monitor.say(str(error))
+
+    def _name(self, task: Task) -> str:
+        return f"{task.pass_name} {self._job.path.numbers[task.frame]}"
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names for a message: the first ones, and how many more there are."""
+    return ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")

@@ -1,0 +1,137 @@
+"""Plugins and files of a Mitsuba scene, as Mitsuba's own parser lists them.
+
+Mitsuba loads a plugin of any name, from the scene's folder if it has a folder `plugins`, and opens files at
+any path. A scene from elsewhere is therefore parsed and checked before it is loaded. Parsing instantiates no
+plugin and needs no variant. It does read included XML files, and the files of ``<spectrum filename="...">``,
+wherever they are: the former are checked afterwards, the latter hold numbers only, and are not checked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+
+from enfilade.errors import SceneError
+from enfilade.settings import LimitSettings
+
+__all__ = ["check_scene", "fingerprint", "reason"]
+
+PARSER_VARIANT = "scalar_rgb"  # required by the parser, which is the same for all variants
+PLUGINS = Path(mi.__file__).resolve().parent / "plugins"
+BLENDER = "blender"  # its meshes are addresses in the memory of a process
+SOURCE_LOCATION = re.compile(r"\[\w+\.(?:cpp|h):\d+\] ")
+QUOTED_SPECTRUM = re.compile(r'(failed to load spectrum from file ".*?"): .*', re.DOTALL)
+
+
+def check_scene(scene: Path, limits: LimitSettings) -> None:
+    """Refuse a scene with plugins other than Mitsuba's own, or with files outside the allowed folders.
+
+    Parameters
+    ----------
+    scene
+        An XML file.
+    limits
+        ``limits.allow`` names folders beside the scene's own.
+
+    Raises
+    ------
+    SceneError
+        The scene is malformed, a file is missing, or one of the above. The message names the file.
+    """
+    roots = [scene.resolve().parent, *(Path(p).resolve() for p in limits.allow.split(os.pathsep) if p)]
+    with _parsed(scene) as (state, resolver):
+        for node in state.nodes:
+            name = node.props.plugin_name()
+            if name != "scene" and not _is_own_plugin(name, resolver):
+                where = mi.parser.file_location(state, node)
+                raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
+        for file in _files(state, resolver):
+            if not any(file.is_relative_to(root) for root in roots):
+                raise SceneError(
+                    f"{scene} uses {file}, outside the scene's folder; allow it with --allow {file.parent}"
+                )
+            if not file.is_file():
+                raise SceneError(f"{scene} uses {file}, which is missing or not a regular file")
+
+
+def fingerprint(scene: Path) -> str:
+    """SHA-256 over the contents of the XML files of a scene, of the files they name, and of their spectra.
+
+    Raises
+    ------
+    SceneError
+        The scene is malformed, or a file is missing or can't be read.
+    """
+    digest = hashlib.sha256()
+    with _parsed(scene) as (state, resolver):
+        for file in dict.fromkeys(_files(state, resolver)):
+            with file.open("rb") as stream:
+                digest.update(hashlib.file_digest(stream, "sha256").digest())
+        for _, spectrum in _properties(state, "Spectrum"):
+            digest.update(repr((list(spectrum.wavelengths), list(spectrum.values))).encode())
+    return digest.hexdigest()
+
+
+def reason(error: Exception) -> str:
+    """The last sentence of a Mitsuba error and the list below it, without locations in Mitsuba's source.
+
+    The first line of a file that is no spectrum is left out: any file can be named as one.
+    """
+    text = QUOTED_SPECTRUM.sub(r"\1", SOURCE_LOCATION.sub("", str(error).strip()))
+    lines = [line.strip() for line in text.splitlines()] or [""]
+    first = max((i for i, line in enumerate(lines) if not line.startswith("- ")), default=0)
+    listed = ", ".join(line.removeprefix("- ") for line in lines[first + 1 :])
+    return f"{lines[first]} {listed}".strip()
+
+
+@contextmanager
+def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
+    """The parsed scene, and the file resolver with all folders in which its files are looked for."""
+    if not scene.is_file():
+        raise SceneError(f"there is no scene file {scene}")
+    untyped: Any = mi  # its stubs lack the functions of the file resolver
+    before = untyped.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(scene.resolve().parent))
+    untyped.set_file_resolver(resolver)
+    mi.set_log_level(mi.LogLevel.Error)
+    try:
+        yield mi.parser.parse_file(mi.parser.ParserConfig(PARSER_VARIANT), str(scene.resolve())), resolver
+    except RuntimeError as error:
+        raise SceneError(f"Mitsuba can't parse {scene}: {reason(error)}") from error
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{scene} or a file that it includes is not UTF-8: {error}") from error
+    except OSError as error:
+        raise SceneError(f"can't read {error.filename}, which {scene} uses: {error.strerror}") from error
+    finally:
+        untyped.set_file_resolver(before)
+
+
+def _is_own_plugin(name: str, resolver: Any) -> bool:
+    library = Path(str(resolver.resolve(f"plugins/{name}.so")))
+    return name != BLENDER and library.is_file() and library.resolve().parent == PLUGINS
+
+
+def _files(state: Any, resolver: Any) -> Iterator[Path]:
+    """Absolute paths of the XML files of a scene, then of the files that they name, links followed."""
+    xml = [Path(str(file)).resolve() for file in state.files]
+    yield from xml
+    for name, value in _properties(state, "String"):
+        if name == "filename":
+            yield (xml[0].parent / str(resolver.resolve(value))).resolve()
+
+
+def _properties(state: Any, type_name: str) -> Iterator[tuple[str, Any]]:
+    """Names and values of all properties of a type, in the order of the scene."""
+    kind = getattr(mi.Properties.Type, type_name)
+    for node in state.nodes:
+        for name in node.props.keys():  # noqa: SIM118  (not a dictionary)
+            if node.props.type(name) == kind:
+                yield name, node.props[name]

@@ -1,0 +1,53 @@
+"""Loading of a Mitsuba scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from enfilade.errors import SceneError
+from enfilade.scene.mitsuba.files import fingerprint, reason
+
+__all__ = ["load_scene"]
+
+OUT_OF_MEMORY = ("out of memory", "bad_alloc")  # in errors of Dr.Jit and C++
+
+
+def load_scene(file: Path) -> Any:
+    """Load a scene of at least one shape and one emitter.
+
+    Meshes of the same material are not merged, so that shapes are those of the file. Symbolic links are
+    followed first: Mitsuba looks for files beside the XML file.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, malformed, or refused by Mitsuba; or a file that it names can't be read.
+    MemoryError
+    """
+    if not file.is_file():
+        raise SceneError(f"there is no scene file {file}")
+    mi.set_log_level(mi.LogLevel.Error)
+    threads = dr.thread_count()
+    if threads == 1:  # Mitsuba waits for the tasks that read an OpenEXR file without running any of them
+        dr.set_thread_count(2)
+    try:
+        scene = mi.load_file(str(file.resolve()), optimize=False)
+    except (RuntimeError, UnicodeDecodeError) as error:
+        if any(words in str(error).lower() for words in OUT_OF_MEMORY):
+            raise MemoryError(f"too little memory to load {file}") from error
+        fingerprint(file)  # raises with the operating system's error if a file can't be read
+        raise SceneError(f"Mitsuba can't load {file}: {reason(error)}") from error
+    finally:
+        if threads == 1:
+            dr.set_thread_count(1)
+    if not isinstance(scene, mi.Scene):
+        raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
+    if not scene.shapes():
+        raise SceneError(f"{file} has no shapes: there is nothing to render")
+    if not scene.emitters():
+        raise SceneError(f"{file} has no light, every frame would be black: add an <emitter>")
+    return scene

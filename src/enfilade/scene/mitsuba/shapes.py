@@ -1,0 +1,101 @@
+"""Tables of a Mitsuba scene's shapes and BSDFs, by their indices in Dr.Jit's registry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from enfilade.arrays import Bool, UInt
+from enfilade.records import SurfaceClass
+
+__all__ = ["Shapes", "bsdf_table", "has_lobe", "surface_class"]
+
+NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has one, too, but is visible
+
+
+class Shapes:
+    """The shapes of a scene.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of shapes 1, 2, ...
+    may_be_null : bool
+        Whether any BSDF has null interactions.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        shapes = scene.shapes()
+        registry = [_registry_index(mi.ShapePtr(shape)) for shape in shapes]
+        index = np.zeros(max(registry) + 1, np.uint32)
+        index[registry] = np.arange(1, len(shapes) + 1)
+        self._index = UInt(index)
+        self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
+        self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
+        self.names = tuple(s.id() or f"{s.class_name()} {i}" for i, s in enumerate(shapes, start=1))
+        self.may_be_null = bool(dr.any(self._is_null))
+
+    @property
+    def state(self) -> Any:
+        """Arrays that the methods read, and all BSDFs, which makes Dr.Jit consider those of no shape, too."""
+        return self._index, self._is_null, self._bsdfs
+
+    def index(self, si: Any) -> Any:
+        """Index of the shape that is hit, from 1; an instance is a shape. 0 for a miss; UInt."""
+        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        instance: Any = dr.reinterpret_array(mi.UInt32, si.instance)
+        return dr.gather(UInt, self._index, dr.select(instance != 0, instance, shape), si.is_valid())
+
+    def is_null(self, si: Any, transmittance: float) -> Any:
+        """Whether a hit is a null interaction: its surface transmits more than this share of light; Bool.
+
+        Emitters never are: their light would be lost.
+        """
+        bsdf = si.bsdf()
+        number: Any = dr.reinterpret_array(mi.UInt32, bsdf)
+        is_null = dr.gather(Bool, self._is_null, number, si.is_valid())
+        transmitted = bsdf.eval_null_transmission(si, is_null)
+        return is_null & ~si.shape.is_emitter() & (mi.luminance(transmitted) > transmittance)
+
+
+def bsdf_table(scene: Any, predicate: Callable[[Any], bool]) -> Any:
+    """A predicate of all BSDFs of a scene, nested ones and those of instances included; Bool."""
+    bsdfs = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
+    registry = [_registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
+    table = np.zeros(max(registry, default=0) + 1, bool)
+    table[registry] = [predicate(bsdf) for bsdf in bsdfs]
+    return Bool(table)
+
+
+def surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
+    """``records.SurfaceClass`` of a BSDF with these flags; UInt."""
+    refracts = has_lobe(flags, "DeltaTransmission", "GlossyTransmission")
+    mirrors = has_lobe(flags, "DeltaReflection")
+    is_glossy = has_lobe(flags, "GlossyReflection")
+    is_broad = is_glossy | has_lobe(flags, "DiffuseReflection", "DiffuseTransmission")
+    is_thin_glass = has_lobe(flags, "Null") & mirrors & ~is_broad
+
+    surface = UInt(SurfaceClass.DIFFUSE)
+    surface = dr.select(is_emitter, UInt(SurfaceClass.EMISSIVE), surface)
+    surface = dr.select(is_glossy | mirrors, UInt(SurfaceClass.GLOSSY), surface)
+    surface = dr.select(mirrors & ~is_broad, UInt(SurfaceClass.MIRROR), surface)
+    surface = dr.select(refracts | is_thin_glass, UInt(SurfaceClass.TRANSPARENT), surface)
+    return dr.select(is_hit, surface, UInt(SurfaceClass.NONE))
+
+
+def has_lobe(flags: Any, *lobes: str) -> Any:
+    """Whether a BSDF has any of these lobes, by their names in Mitsuba's ``BSDFFlags``; Bool."""
+    return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
+
+
+def _registry_index(pointer: Any) -> int:
+    index: Any = dr.reinterpret_array(mi.UInt32, pointer)
+    return int(index[0])

@@ -1,0 +1,91 @@
+"""Preflight: a scene is loaded once by a child process with bounded memory and time, before a run begins."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from enfilade.errors import SceneError
+from enfilade.resource_limits import die_with, limit_memory
+from enfilade.settings import LimitSettings, Settings, TraceSettings
+
+__all__ = ["preflight"]
+
+
+def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> str:
+    """Check a Mitsuba scene, and load it, in a child process, which ends with this one.
+
+    Parameters
+    ----------
+    scene
+    trace
+        With which the scene will be rendered.
+    limits
+        Memory, seconds and folders.
+    variant
+        Of Mitsuba. The memory of a GPU is not bounded.
+
+    Returns
+    -------
+    str
+        See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`.
+
+    Raises
+    ------
+    SceneError
+        The scene is refused, or the child crashed, or took too much memory or time.
+    """
+    tables = Settings(trace, limits).to_tables((TraceSettings, LimitSettings))
+    line = [sys.executable, "-P", "-m", __name__, str(scene), json.dumps(tables), variant, str(os.getpid())]
+    try:
+        done = subprocess.run(  # noqa: S603
+            line, capture_output=True, text=True, errors="replace", check=False, timeout=limits.preflight_s
+        )
+        is_late = done.returncode == -signal.SIGALRM
+    except subprocess.TimeoutExpired:
+        is_late = True
+    if is_late:
+        raise SceneError(
+            f"{scene} was not loaded in {limits.preflight_s:g} s by the preflight process; raise "
+            "--set limits.preflight_s"
+        )
+    if done.returncode:
+        raise SceneError(
+            f"{scene} was too much for the preflight process (exit code {done.returncode}, "
+            f"{limits.preflight_mb} MB of memory): it is damaged, or needs more (--set limits.preflight_mb)"
+        )
+    answer = json.loads(done.stdout)
+    if answer["error"]:
+        raise SceneError(answer["error"])
+    why_inseparable: str = answer["why_inseparable"]
+    return why_inseparable
+
+
+def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
+    die_with(parent)
+    settings = Settings.from_tables(json.loads(tables))
+    signal.setitimer(signal.ITIMER_REAL, settings[LimitSettings].preflight_s)  # for a parent that is stopped
+    is_gpu = variant.startswith("cuda")
+    from enfilade.device import activate
+
+    activate("gpu" if is_gpu else "cpu")
+    from enfilade.scene.mitsuba.files import check_scene
+    from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+
+    if not is_gpu:  # CUDA maps the memory of the GPU into the address space
+        limit_memory(settings[LimitSettings].preflight_mb)
+    answer = {"error": "", "why_inseparable": ""}
+    try:
+        check_scene(scene, settings[LimitSettings])
+        answer["why_inseparable"] = MitsubaRenderer(scene, max_depth=settings[TraceSettings].max_depth).why_inseparable
+    except SceneError as error:
+        answer["error"] = str(error)
+    sys.stdout.write(json.dumps(answer))
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4]))

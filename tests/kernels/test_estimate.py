@@ -1,0 +1,138 @@
+"""Estimates of pixels: random numbers, filters and variance, by the known noise of the analytic renderer."""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.gbuffer import find_geometry
+from enfilade.records import SurfaceClass
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from scenes_analytic import room, room_walk, slide, wall
+from support.analytic import AnalyticRenderer
+from support.analytic_scene import AnalyticScene, Material, Plane, Quad
+
+ROUNDING = 1e-6  # products and quotients of a few float32
+
+
+def traced(
+    scene,
+    camera,
+    pixels=None,
+    *,
+    chunk=1 << 20,
+    spp=4,
+    seed=7,
+    frame=3,
+    purpose=Purpose.FILL,
+    at=PixelFilter.CENTRE,
+):
+    if pixels is None:
+        pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    return AnalyticRenderer(scene, chunk=chunk).trace(
+        camera, pixels, RandomKey(seed, frame, purpose), spp=spp, pixel_filter=at
+    )
+
+
+@pytest.mark.parametrize("at", list(PixelFilter))
+def test_random_numbers_depend_on_the_pixel_alone(at):
+    camera, scene = room_walk(1, size=(40, 30)).cameras[0], room(noise=0.5)
+    pixels = np.random.default_rng(5).permutation(1200).astype(np.uint32)
+    whole = traced(scene, camera, spp=70, at=at)  # two passes
+    shuffled = traced(scene, camera, pixels, spp=70, at=at)
+    chunked = traced(scene, camera, pixels[::2], chunk=1024, spp=70, at=at)
+    np.testing.assert_array_equal(shuffled.color, whole.color[pixels])
+    np.testing.assert_array_equal(chunked.color, whole.color[pixels[::2]])
+    np.testing.assert_array_equal(chunked.variance, whole.variance[pixels[::2]])
+
+
+def test_other_seeds_frames_and_purposes_are_other_numbers():
+    camera, scene = slide(1, size=(16, 12)).cameras[0], wall(noise=0.5)
+    first = traced(scene, camera).color
+    for change in ({"seed": 8}, {"frame": 4}, {"purpose": Purpose.KEYFRAME}):
+        other = traced(scene, camera, **change).color
+        assert (other != first).any(axis=1).mean() > 0.99
+
+
+def test_noise_has_the_promised_mean_spread_and_variance():
+    camera, spp = slide(1).cameras[0], 16
+    grey = AnalyticScene((Plane((0, 0, 0), (0, 0, 1)),), light=(0, 0, 0), ambient=(1, 1, 1), noise=0.8)
+    shading = traced(grey, camera, spp=spp)
+    mean, sigma, count = 0.5, 0.8 * 0.5 / math.sqrt(spp), 64 * 48
+    # Five standard errors. Of a variance it is sqrt((kurtosis + 2) / n), kurtosis 6 / spp for the means.
+    assert abs(shading.color[:, 0].mean() - mean) < 5 * sigma / math.sqrt(count)
+    slack = 5 * math.sqrt((6 / spp + 2) / count)
+    assert shading.color[:, 0].astype(float).var() == pytest.approx(sigma**2, rel=slack)
+    # An estimate from 16 paths scatters by sqrt((8 + 2 / 15) / 16) around the truth, without bias.
+    assert shading.variance.mean() == pytest.approx(sigma**2, rel=5 * math.sqrt(8.2 / 16 / count))
+
+
+@pytest.mark.parametrize(
+    ("at", "blur"), [(PixelFilter.CENTRE, None), (PixelFilter.BOX, 0.0), (PixelFilter.GAUSSIAN, 0.5)]
+)
+def test_paths_begin_where_the_pixel_filter_says(at, blur):
+    # A white half plane x > edge, seen so that one unit is one pixel and the edge lies 0.3 into pixel 10.
+    white = Material((0, 0, 0), SurfaceClass.EMISSIVE, emission=(1, 1, 1))
+    scene = AnalyticScene((Quad((0.3, -50, 0), (50, 0, 0), (0, 100, 0), white),))
+    camera = Camera(look_at((0, 0, 10), (0, 0, 0)), 2 * math.degrees(math.atan(1)), 20, 20)
+    got = traced(scene, camera, spp=64, at=at).color[:, 0].reshape(20, 20).mean(axis=0)
+    if at is PixelFilter.CENTRE:
+        expected = (np.arange(20) + 0.5 > 10.3).astype(float)
+    elif at is PixelFilter.BOX:
+        expected = np.clip(np.arange(20) + 1 - 10.3, 0, 1)
+    else:
+        reach = np.clip(np.arange(20) + 0.5 - 10.3, -1.5, 1.5) / (blur * math.sqrt(2))
+        expected = 0.5 + 0.5 * np.vectorize(math.erf)(reach) / math.erf(1.5 / (blur * math.sqrt(2)))
+    # 1280 coin flips a column: five standard errors of at most 0.5
+    np.testing.assert_allclose(got, expected, atol=5 * 0.5 / math.sqrt(1280))
+    np.testing.assert_allclose(got[[0, 5, 15, 19]], [0, 0, 1, 1], atol=ROUNDING)
+
+
+def test_nan_samples_are_dropped_and_counted():
+    camera = slide(1).cameras[0]
+    clean, dirty = traced(wall(), camera, spp=8), traced(wall(nan_share=0.25), camera, spp=8)
+    paths = 64 * 48 * 8
+    assert clean.dropped == 0
+    assert dirty.dropped == pytest.approx(paths / 4, abs=5 * math.sqrt(paths * 3 / 16))
+    is_seen = dirty.color.any(axis=1)
+    assert is_seen.mean() > 0.999  # all eight are lost with probability 1.5e-5
+    np.testing.assert_allclose(dirty.color[is_seen], clean.color[is_seen], rtol=ROUNDING)
+    lost = traced(wall(nan_share=1.0), camera, spp=2)
+    assert lost.dropped == 64 * 48 * 2
+    assert not lost.color.any()
+    assert not lost.variance.any()
+
+
+def test_an_empty_list_of_pixels_is_traced():
+    shading = traced(wall(), slide(1).cameras[0], np.array([], np.uint32))
+    assert shading.color.shape == (0, 3)
+
+
+def test_no_kernel_is_compiled_after_the_first_frame():
+    renderer, path = AnalyticRenderer(room(specular=True, noise=0.3)), room_walk(4, size=(48, 36))
+    pixels = np.arange(48 * 36, dtype=np.uint32)
+
+    def render(index):
+        camera = path.cameras[index]
+        find_geometry(renderer, camera)
+        renderer.trace(
+            camera,
+            pixels[index:],
+            RandomKey(index, index, Purpose.FILL),
+            spp=4,
+            pixel_filter=PixelFilter.GAUSSIAN,
+        )
+
+    render(0)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for index in range(1, 4):
+            render(index)
+        history = dr.kernel_history([dr.KernelType.JIT])
+    assert len(history) >= 6
+    # from memory, not from disk, where another run may have left every variant of a literal
+    assert all(kernel["cache_hit"] and not kernel["cache_disk"] for kernel in history)

@@ -1,0 +1,100 @@
+"""The choice of workers, and what a worker refuses."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from enfilade.errors import RunFolderError, SettingsError
+from enfilade.methods.base import Task
+from enfilade.runs import scheduler
+from enfilade.runs.executor import InProcess, Order, Workers, open_worker
+from enfilade.runs.failure import FailureKind
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.render import prepare
+from enfilade.runs.scheduler import open_executor
+from enfilade.settings import LimitSettings
+from support.toys import order, toy_job
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("threads",), r"no executor 'threads'; choose one of in-process, processes, ray, ray:ADDRESS"),
+        (("ray:",), "lacks the address"),
+        (("in-process", 2), "--executor processes"),
+        (("processes", 0), "0 workers"),
+        (("processes", 2, -1), "-1 threads"),
+    ],
+)
+def test_workers_that_there_are_not(given, words):
+    with pytest.raises(SettingsError, match=words):
+        Workers(*given)
+
+
+@pytest.mark.parametrize(
+    ("device", "workers", "slots", "threads"),
+    [
+        ("llvm", {}, 6, 1),
+        ("cuda", {}, 2, 3),
+        ("llvm", {"count": 2}, 2, 3),
+        ("llvm", {"count": 2, "threads": 5}, 2, 5),
+        ("llvm", {"count": 9}, 9, 1),
+    ],
+)
+def test_workers_share_cores_and_gpus(tmp_path, monkeypatch, device, workers, slots, threads):
+    monkeypatch.setattr(scheduler, "cores", lambda: 6)
+    monkeypatch.setattr(scheduler, "gpus", lambda: ["0", "1"])
+    monkeypatch.setattr(scheduler, "active", lambda: SimpleNamespace(backend=device))
+    with RunFolder.create(tmp_path / "run", {}) as run:
+        executor = open_executor(toy_job(tmp_path), run, Workers("processes", **workers))
+    assert (executor.slots, executor._terms.threads) == (slots, threads)
+    assert executor._gpus == (["0", "1"] if device == "cuda" else ())
+
+
+@pytest.fixture
+def begun(tmp_path):
+    job = toy_job(tmp_path)
+    prepare(job, tmp_path / "run")
+    with RunFolder.share(tmp_path / "run") as run:
+        yield job, run
+
+
+def test_a_host_with_another_scene_is_refused(begun):
+    job, run = begun
+    job.scene.file.write_text("another wall")
+    with pytest.raises(RunFolderError, match="is not that with which the run began"):
+        open_worker(job, run)
+    executor = InProcess(job, run)
+    executor.begin(0, Order(Task("analysis", 0)))
+    assert executor.wait(None)[0].result.kind is FailureKind.FATAL
+
+
+@pytest.mark.parametrize(
+    ("paths", "reduction", "left"), [(1 << 20, 4, 1 << 18), (5000, 16, 1024), (1024, 4, 1024)]
+)
+def test_a_lack_of_memory_reduces_the_paths_in_flight(begun, paths, reduction, left):
+    job, run = begun
+    settings = job.settings.replace(LimitSettings, paths_in_flight=paths)
+    worker = open_worker(type(job)(job.scene, job.path, settings, job.method), run, reduction)
+    assert worker._job.settings[LimitSettings].paths_in_flight == left
+
+
+def test_in_process_a_worker_is_kept_until_it_is_discarded(begun, tmp_path):
+    job, run = begun
+    executor = InProcess(job, run)
+    assert executor.wait(None) == []
+    workers = []
+    for reduction in (1, 1, 4):
+        executor.begin(0, Order(Task("light", 0), reduction))
+        executor.wait(None)
+        workers.append(executor._worker)
+    assert workers[0] is workers[1] is not workers[2]
+    order(tmp_path, light_2="raise")
+    executor.begin(0, Order(Task("light", 1), 4))
+    failure = executor.wait(None)[0].result
+    assert failure.text == "ZeroDivisionError: by nought"
+    assert "Traceback" in failure.log
+    executor.discard(0)
+    assert executor._worker is None

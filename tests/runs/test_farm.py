@@ -1,0 +1,201 @@
+"""A run on a render farm: the template, and the jobs of Slurm."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.runs import farm
+from enfilade.runs.farm import Command, submit, template, write_template
+from enfilade.runs.render import prepare
+from support.toys import slide, toy_job, wait_for
+
+OPENJD = Path(sys.executable).with_name("openjd")
+STEPS = ["analysis", "light", "mean", "frames", "clips", "video"]
+WORKER = ["--executor", "processes", "--workers", "1"]
+
+
+@pytest.fixture
+def begun(tmp_path):
+    prepare(toy_job(tmp_path, path=slide(6)), tmp_path / "run")
+    return tmp_path / "run"
+
+
+def test_the_template_is_one_of_open_job_description(begun):
+    write_template(begun, begun / "farm.json", shards=2)
+    made = json.loads((begun / "farm.json").read_text())
+    assert made == template(begun, 2)
+    assert [step["name"] for step in made["steps"]] == STEPS
+    line = [str(OPENJD), "check", str(begun / "farm.json")]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
+    assert done.returncode == 0, done.stdout
+
+
+def test_each_task_has_a_worker_process_of_its_own(begun):
+    for step in template(begun, 2)["steps"]:
+        line = step["script"]["actions"]["onRun"]["args"]
+        assert line[line.index("--executor") :][:4] == WORKER
+
+
+class Cluster:
+    """Stands for submitit: keeps when each task is submitted and when it is waited for."""
+
+    def __init__(self, failing=""):
+        self.failing, self.events, self.parameters = failing, [], []
+        self.core = SimpleNamespace(utils=SimpleNamespace(UncompletedJobError=TimeoutError))
+        self.AutoExecutor = lambda **_: SimpleNamespace(
+            update_parameters=lambda **given: self.parameters.append(given),
+            batch=nullcontext,
+            submit=self._submit,
+        )
+
+    def _submit(self, task):
+        number = str(sum(what == "given" for what, _ in self.events))
+        self.events.append(("given", number))
+        return SimpleNamespace(job_id=number, exception=lambda: self._ended(number, task.line))
+
+    def _ended(self, number, line):
+        self.events.append(("ended", number))
+        return RuntimeError("no memory") if self.failing in line else None
+
+
+def test_tasks_on_this_machine_come_one_after_the_other(begun, monkeypatch):
+    cluster, told = Cluster(), []
+    monkeypatch.setitem(sys.modules, "submitit", cluster)
+    jobs = submit(begun, "local", 3, {}, told.append)
+    assert jobs == [str(n) for n in range(1 + 3 * 3 + 1 + 1)]
+    assert cluster.events == [(what, job) for job in jobs for what in ("given", "ended")]
+    assert all("cpus_per_task" not in given for given in cluster.parameters)
+    assert told[0] == "analysis   job 0, 1 task"
+    monkeypatch.setitem(sys.modules, "submitit", Cluster(failing="mean"))
+    with pytest.raises(EnfiladeError, match="step 'mean' failed: no memory"):
+        submit(begun, "local", 3, {}, told.append)
+
+
+SBATCH = """
+n=$(ls "$SLURM_SEEN" | wc -l)
+if [ "$n" -ge "$SLURM_REFUSES" ]; then echo "sbatch: error: QOSMaxSubmitJobPerUserLimit" >&2; exit 1; fi
+cp "$1" "$SLURM_SEEN/$((100 + n))"
+echo "Submitted batch job $((100 + n))"
+"""
+SCONTROL = """
+if [ "$1" = requeue ]; then echo "$2" >> "$SLURM_REQUEUED"; else echo "MaxArraySize   = $SLURM_MOST"; fi
+"""
+
+
+@pytest.fixture
+def slurm(tmp_path, monkeypatch):
+    """Slurm's commands; returns the lines of each job's batch file, by its number."""
+    seen = tmp_path / "seen"
+    for folder in (seen, tmp_path / "bin"):
+        folder.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scontrol", SCONTROL), ("srun", "exit 1")):
+        script(tmp_path / "bin" / name, text)
+    facts = {"SEEN": seen, "REQUEUED": tmp_path / "requeued", "REFUSES": 99, "MOST": 1001}
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
+    for name, value in facts.items():
+        monkeypatch.setenv(f"SLURM_{name}", str(value))
+    return lambda: {int(file.name): file.read_text().splitlines() for file in sorted(seen.iterdir())}
+
+
+def script(file, text):
+    file.write_text(f"#!/bin/sh\n{text}")
+    file.chmod(file.stat().st_mode | stat.S_IXUSR)
+
+
+def asked(lines, option):
+    """An option of a batch file."""
+    found = [line for line in lines if line.startswith(f"#SBATCH --{option}")]
+    return found[0].partition("=")[2] if found else None
+
+
+def test_slurm_gets_each_step_as_an_array_that_waits_for_the_one_before(begun, slurm):
+    told = []
+    jobs = submit(begun, "slurm", 2, {"timeout_min": 5, "slurm_partition": "cpu"}, told.append)
+    assert jobs == ["100", "101", "102", "103", "104", "105"]
+    assert told[:2] == ["analysis   job 100, 1 task", "light      job 101, 2 tasks"]
+    for number, lines in slurm().items():
+        before = f"afterok:{number - 1}" if number > 100 else None
+        assert asked(lines, "dependency") == before
+        assert asked(lines, "kill-on-invalid-dep") == (before and "yes")
+        assert asked(lines, "array") == ("0-1%2" if number in (101, 102, 103) else None)
+        assert asked(lines, "cpus-per-task") == "8"
+        assert asked(lines, "time") == "5"
+        assert "#SBATCH --requeue" in lines
+        assert any("srun" in line and "--cpus-per-task=8" in line for line in lines)
+
+
+def test_cores_are_those_that_are_asked_for(begun, slurm):
+    submit(begun, "slurm", 1, {"cpus_per_task": 3}, print)
+    submit(begun, "slurm", 1, {"slurm_exclusive": "user"}, print)
+    found = slurm()
+    assert {asked(found[number], "cpus-per-task") for number in range(100, 106)} == {"3"}
+    assert any("srun" in line and "--cpus-per-task=3" in line for line in found[100])
+    assert {asked(found[number], "cpus-per-task") for number in range(106, 112)} == {None}
+
+
+def test_more_shards_than_an_array_takes_come_as_several(begun, slurm, monkeypatch):
+    monkeypatch.setenv("SLURM_MOST", "2")
+    told = []
+    submit(begun, "slurm", 5, {}, told.append)
+    assert told[1:5] == [
+        "light      job 101, 2 tasks",
+        "light      job 102, 2 tasks",
+        "light      job 103, 1 task",
+        "mean       job 104, 2 tasks",
+    ]
+    assert asked(slurm()[103], "dependency") == "afterok:100"
+    assert asked(slurm()[104], "dependency") == "afterok:101:102:103"
+
+
+def test_jobs_in_the_queue_are_named_if_slurm_refuses_the_next(begun, slurm, monkeypatch):
+    monkeypatch.setenv("SLURM_REFUSES", "2")
+    told = []
+    with pytest.raises(
+        EnfiladeError, match=r"step 'mean' .*QOSMax.*; jobs 100 101 .* `scancel 100 101` removes"
+    ):
+        submit(begun, "slurm", 2, {}, told.append)
+    assert [line.split()[2] for line in told] == ["100,", "101,"]
+
+
+def test_unknown_parameters_of_submitit_are_refused(begun, slurm):
+    with pytest.raises(SettingsError, match="Unknown argument 'queue'"):
+        submit(begun, "slurm", 2, {"slurm_queue": "cpu"}, print)
+    with pytest.raises(SettingsError, match="timeout_min"):
+        submit(begun, "slurm", 2, {"timeout_min": "1h"}, print)
+    assert slurm() == {}
+
+
+def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, monkeypatch):
+    script(tmp_path / "enfilade", f"echo $$ > {tmp_path / 'pid'}; exec sleep 60\n")
+    monkeypatch.setattr(farm, "_executable", lambda: str(tmp_path / "enfilade"))
+    submit(begun, "slurm", 1, {"timeout_min": 5}, print)
+    facts = {"SUBMITIT_EXECUTOR": "slurm", "SLURM_JOB_ID": "100", "SLURM_JOB_NODELIST": "here"}
+    line = [sys.executable, "-m", "submitit.core._submit", str(begun / "slurm")]
+    with subprocess.Popen(line, env={**os.environ, **facts}, stderr=subprocess.PIPE, text=True) as job:  # noqa: S603
+        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text().strip())
+        job.send_signal(signal.SIGUSR2)
+        _, said = job.communicate(timeout=120)
+    assert (tmp_path / "requeued").read_text() == "100\n", said
+    assert not Path(f"/proc/{(tmp_path / 'pid').read_text().strip()}").exists()
+    assert (begun / "slurm" / "100_submitted.pkl").exists()
+    assert not (begun / "slurm" / "100_0_result.pkl").exists()
+
+
+def test_a_command_that_fails_is_reported_with_its_output(capfd):
+    Command([sys.executable, "-c", "print('done')"])()
+    with pytest.raises(EnfiladeError, match="wrong input"):
+        Command([sys.executable, "-c", "import sys; sys.exit('wrong input')"])()
+    assert capfd.readouterr() == ("done\n", "wrong input\n")
+    with pytest.raises(EnfiladeError, match="exit code 3"):
+        Command([sys.executable, "-c", "raise SystemExit(3)"])()

@@ -1,0 +1,182 @@
+"""Jobs: what identifies a run and what does not, and the way through JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import enfilade
+from enfilade.errors import RunFolderError, SceneError, SettingsError
+from enfilade.runs.job import Job, read_job
+from enfilade.runs.render import prepare
+from enfilade.scene.opener import Scene
+from enfilade.settings import SECTIONS, Settings, VideoSettings
+from support.toy_method import ToySettings
+from support.toys import slide, toy_job
+
+
+def settings(**tables):
+    return Settings.from_tables(tables, [*SECTIONS, ToySettings])
+
+
+def test_the_way_through_json_changes_nothing(tmp_path):
+    path = slide(4, cuts=(2,))
+    cameras = [dataclasses.replace(path.cameras[0], fov_deg=np.float64(50)), *path.cameras[1:]]
+    job = toy_job(tmp_path, path=dataclasses.replace(path, cameras=tuple(cameras), fps=24), toy={"gain": 2.0})
+    again = Job.from_json(json.loads(json.dumps(job.to_json())))
+    assert again.identity() == job.identity()
+    assert again.to_json() == job.to_json()
+    assert again.settings[ToySettings].gain == 2.0
+    prepare(job, tmp_path / "run")
+    assert read_job(tmp_path / "run").identity() == job.identity()
+    prepare(read_job(tmp_path / "run"), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"warp": {"max_magnification": 2.0}},
+        {"sampling": {"spp": 3}},
+        {"viewing": {"exposure_ev": 1.0, "distance_m": 2.0}},
+        {"video": {"codec": "h264"}},
+        {"limits": {"paths_in_flight": 2048, "task_timeout_s": 5.0}},
+    ],
+)
+def test_settings_that_the_method_does_not_read_do_not_count(tmp_path, tables):
+    job = toy_job(tmp_path)
+    assert dataclasses.replace(job, settings=settings(**tables)).identity() == job.identity()
+
+
+@pytest.mark.parametrize(
+    ("key", "changed"),
+    [
+        ("settings", lambda job: dataclasses.replace(job, settings=settings(trace={"seed": 1}))),
+        ("settings", lambda job: dataclasses.replace(job, settings=settings(toy={"gain": 2.0}))),
+        ("settings", lambda job: dataclasses.replace(job, settings=settings(output={"layers": "Z"}))),
+        ("path", lambda job: dataclasses.replace(job, path=slide(5))),
+        ("path", lambda job: dataclasses.replace(job, path=slide(4, cuts=(2,)))),
+        ("path", lambda job: dataclasses.replace(job, path=slide(4, size=(9, 6)))),
+        ("scene", lambda job: dataclasses.replace(job, scene=other_scene(job.scene))),
+        ("method", lambda job: dataclasses.replace(job, method="reference")),
+    ],
+)
+def test_everything_else_counts(tmp_path, key, changed):
+    job = toy_job(tmp_path)
+    before, after = job.identity(), changed(job).identity()
+    assert before[key] != after[key]
+    assert set(before) == {"enfilade", "method", "renderer", "scene", "path", "settings"}
+
+
+def other_scene(scene):
+    file = scene.file.with_name("other.txt")
+    file.write_text("another wall")
+    return Scene(file, scene.renderer)
+
+
+IDENTITY = """
+import json, sys
+from pathlib import Path
+import enfilade
+from enfilade.device import activate
+activate("cpu")
+from enfilade.runs.job import Job
+print(json.dumps([enfilade.__file__, Job.from_json(json.loads(sys.argv[1])).identity()]))
+"""
+
+
+def test_a_comment_in_the_source_changes_no_identity(tmp_path):
+    shutil.copytree(Path(enfilade.__file__).parent, tmp_path / "src" / "enfilade")
+    method = tmp_path / "src" / "enfilade" / "methods" / "reference.py"
+    method.write_text(f"{method.read_text()}# a comment\n")
+    job = toy_job(tmp_path, method="reference")
+    path = os.pathsep.join([str(tmp_path / "src"), *sys.path])
+    done = subprocess.run(  # noqa: S603
+        [sys.executable, "-c", IDENTITY, json.dumps(job.to_json())],
+        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    where, identity = json.loads(done.stdout)
+    assert where.startswith(str(tmp_path))
+    identity["renderer"] = job.identity()["renderer"]  # this process may be on a GPU
+    assert identity == job.identity()
+
+
+def test_the_video_has_an_identity_of_its_own(tmp_path):
+    job = toy_job(tmp_path)
+    found = [
+        dataclasses.replace(job, settings=settings(**tables)).video_identity
+        for tables in ({}, {"video": {"quality": 20}}, {"viewing": {"exposure_ev": 1.0}})
+    ]
+    assert found[0] not in found[1:]
+    assert found[1] != found[2]
+
+
+def test_an_edited_view_is_another_video(tmp_path):
+    ocio = pytest.importorskip("PyOpenColorIO")
+    look = tmp_path / "look.cube"
+    (tmp_path / "config.ocio").write_text(OCIO)
+    identities = []
+    for middle in (0.6, 0.7):
+        look.write_text(f"LUT_1D_SIZE 3\n0 0 0\n{middle} {middle} {middle}\n1 1 1\n")
+        ocio.ClearAllCaches()
+        identities.append(toy_job(tmp_path, video={"ocio": str(tmp_path / "config.ocio")}).video_identity)
+    assert identities[0] != identities[1]
+
+
+OCIO = """ocio_profile_version: 2
+search_path: "."
+roles: {default: raw, scene_linear: lin_rec709}
+displays:
+  sRGB:
+    - !<View> {name: Plain, colorspace: encoded}
+active_displays: []
+active_views: []
+colorspaces:
+  - !<ColorSpace> {name: raw, isdata: true}
+  - !<ColorSpace> {name: lin_rec709}
+  - !<ColorSpace>
+    name: encoded
+    from_scene_reference: !<FileTransform> {src: look.cube, interpolation: linear}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "holds no run; begin one"),
+        ("{", "is damaged"),
+        ("[]", "is damaged"),
+        ('{"path": {}}', "is damaged"),
+        ('{"path": {"size": [1e999, 1], "poses": []}}', "is damaged"),
+    ],
+)
+def test_a_damaged_job(tmp_path, text, words):
+    if text is not None:
+        (tmp_path / "job.json").write_text(text)
+    with pytest.raises(RunFolderError, match=words):
+        read_job(tmp_path)
+
+
+def test_a_method_that_can_not_be_imported(tmp_path):
+    table = toy_job(tmp_path).to_json()
+    (tmp_path / "job.json").write_text(json.dumps({**table, "method": "support.missing:Method"}))
+    with pytest.raises(SettingsError, match="can't be imported"):
+        read_job(tmp_path)
+
+
+def test_wrong_input_is_refused_before_the_scene_is_loaded(tmp_path):
+    job = toy_job(tmp_path, path=slide(2, size=(65, 48)))
+    with pytest.raises(SettingsError, match="65x48"):
+        dataclasses.replace(job, settings=job.settings.replace(VideoSettings, codec="av1")).check()
+    with pytest.raises(SettingsError, match="no method 'fast'"):
+        dataclasses.replace(job, method="fast").check()
+    job.scene.file.unlink()
+    with pytest.raises(SceneError, match="no scene file"):
+        job.check()

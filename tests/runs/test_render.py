@@ -1,0 +1,290 @@
+"""Runs from end to end: continued, refused, repaired, shared out; always the same bytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import pytest
+
+from enfilade.errors import (
+    NoSpaceError,
+    RunFolderError,
+    SceneError,
+    SettingsError,
+    UnfinishedError,
+)
+from enfilade.images import open_sequence
+from enfilade.monitor import Silence
+from enfilade.runs.executor import Workers
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.render import Shard, prepare, render, render_shard, resume
+from enfilade.scene.opener import Scene
+from enfilade.settings import OutputSettings, TraceSettings, VideoSettings, WarpSettings
+from support.toys import Recorder, attempts, digest, flip, little_room, order, slide, toy_job
+
+
+@pytest.fixture
+def job(tmp_path):
+    return toy_job(tmp_path)
+
+
+@pytest.fixture
+def run(tmp_path):
+    return tmp_path / "run"
+
+
+def changed(job, kind, **values):
+    return dataclasses.replace(job, settings=job.settings.replace(kind, **values))
+
+
+def test_a_finished_run_is_not_done_again(job, run, tmp_path, whole, monkeypatch):
+    summary = render(job, run, Silence())
+    before = {
+        file: file.read_bytes() for file in run.rglob("*") if file.is_file() and file.name != "summary.json"
+    }
+    monkeypatch.setattr("enfilade.runs.scheduler.open_executor", None)
+    monitor = Recorder()
+    again = resume(run, monitor)
+    assert (monitor.done, monitor.said) == ([], [])
+    assert {file: file.read_bytes() for file in before} == before
+    assert (
+        again["per_frame"]
+        == summary["per_frame"]
+        == json.loads((run / "summary.json").read_text())["per_frame"]
+    )
+    assert set(attempts(tmp_path).values()) == {1}
+    assert digest(run) == whole
+    assert summary["video"] == "video.mkv"
+    assert len(open_sequence(run / "video.mkv")) == 4
+
+
+def test_settings_that_the_method_does_not_read_do_not_orphan_a_run(job, run, tmp_path, whole):
+    render(job, run, Silence())
+    other = changed(job, WarpSettings, max_magnification=2.0)
+    render(other, run, Silence())
+    assert digest(run) == whole
+    assert set(attempts(tmp_path).values()) == {1}
+    assert json.loads((run / "job.json").read_text())["settings"]["warp"]["max_magnification"] == 2.0
+
+
+def test_settings_of_the_frames_are_refused_by_name(job, run, whole):
+    render(job, run, Silence())
+    before = (run / "job.json").read_bytes()
+    other = changed(changed(job, TraceSettings, seed=7), OutputSettings, layers="Z")
+    with pytest.raises(RunFolderError) as refused:
+        render(other, run, Silence())
+    assert "\n  settings.trace.seed: 0 there, 7 now" in str(refused.value)
+    assert 'settings.output.layers: "forward,backward,provenance" there, "Z" now' in str(refused.value)
+    assert (run / "job.json").read_bytes() == before
+    assert digest(run) == whole
+
+
+def test_other_settings_of_the_video_encode_again_and_nothing_else(job, run, tmp_path, whole):
+    render(job, run, Silence())
+    monitor = Recorder()
+    summary = render(changed(job, VideoSettings, codec="prores"), run, monitor, Workers("processes", 1))
+    assert monitor.done == ["clips", "video"]
+    assert (summary["video"], len(open_sequence(run / "video.mov"))) == ("video.mov", 4)
+    assert set(attempts(tmp_path).values()) == {1}
+    render(job, run, Silence())
+    assert digest(run) == whole
+
+
+def test_damaged_files_are_found_by_verifying_and_missing_ones_at_once(job, run, tmp_path, whole):
+    render(job, run, Silence())
+    flip(run / "frames" / "0002.exr")
+    flip(run / "light" / "0003.exr")
+    monitor = Recorder()
+    render(job, run, monitor)
+    assert monitor.done == []  # their sizes are right
+    render(job, run, monitor, is_verified=True)
+    assert monitor.said == [
+        f"{name} is missing or damaged: its task is done again"
+        for name in ("light/0003.exr", "frames/0002.exr")
+    ]
+    assert sorted(monitor.done) == ["frames", "light"]
+    (run / "mean" / "0001.npz").unlink(missing_ok=True)
+    (run / "mean" / "0001.exr").unlink(missing_ok=True)
+    (run / "frames" / "0004.exr").write_bytes(b"short")
+    render(job, run, monitor)
+    assert sorted(monitor.done[2:]) == ["frames", "mean"]
+    assert RunFolder.read(run).damaged() == []
+    assert digest(run) == whole
+    counts = attempts(tmp_path)
+    assert {name for name, count in counts.items() if count == 2} == {
+        "light-3",
+        "mean-1",
+        "frames-2",
+        "frames-4",
+    }
+
+
+@pytest.mark.parametrize("place", [400, -1])
+def test_damaged_lines_of_the_ledger_cost_their_task_and_no_more(job, run, tmp_path, whole, place):
+    render(job, run, Silence())
+    flip(run / "ledger.jsonl", place)
+    monitor = Recorder()
+    render(job, run, monitor)
+    assert len(monitor.done) == 1
+    assert [("damaged and left out" in text) for text in monitor.said] == ([True] if place > 0 else [])
+    assert digest(run) == whole
+    assert sum(attempts(tmp_path).values()) <= len(attempts(tmp_path)) + 1
+
+
+def test_a_damaged_job_is_written_again(job, run, whole):
+    prepare(job, run)
+    (run / "job.json").write_text("{")
+    with pytest.raises(RunFolderError, match=r"job\.json is damaged"):
+        resume(run, Silence())
+    render(job, run, Silence())
+    assert digest(run) == whole
+    resume(run, Silence())
+
+
+def test_an_edited_job_is_another_run(job, run):
+    prepare(job, run)
+    text = (run / "job.json").read_text()
+    (run / "job.json").write_text(text.replace('"seed": 0', '"seed": 1'))
+    with pytest.raises(RunFolderError, match=r"settings\.trace\.seed: 0 there, 1 now"):
+        resume(run, Silence())
+    with pytest.raises(RunFolderError, match="is not that with which the run began"):
+        render_shard(run, Shard("analysis"), Silence())
+
+
+def test_two_commands_on_one_folder(job, run, whole):
+    def second():
+        with pytest.raises(RunFolderError, match="another command is writing"):
+            render(job, run, Silence())
+        with pytest.raises(RunFolderError, match="another command is writing"):
+            render_shard(run, Shard("light"), Silence())
+
+    render(job, run, Recorder(3, second))
+    assert digest(run) == whole
+
+
+def test_an_interrupted_command_is_continued(job, run, tmp_path, whole):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render(job, run, Recorder(4, interrupt))
+    render(job, run, Silence())
+    assert digest(run) == whole
+    assert set(attempts(tmp_path).values()) == {1}
+
+
+@pytest.mark.parametrize("room", [500, 3_000, 9_000, 20_000])
+def test_a_full_disk_loses_nothing_that_is_finished(tmp_path, run, room):
+    job = toy_job(tmp_path, path=slide(4, size=(64, 48)))
+    with little_room(room), pytest.raises(NoSpaceError, match="no room on the disk"):
+        render(job, run, Silence())
+    assert not list(run.rglob(".*writing*"))
+    done = RunFolder.read(run).digest() if (run / "run.json").exists() else ""
+    monitor = Recorder()
+    render(job, run, monitor)
+    assert monitor.said == []
+    assert RunFolder.read(run).damaged() == []
+    render(job, tmp_path / "whole", Silence())
+    assert digest(run) == digest(tmp_path / "whole") != done
+
+
+def test_a_refused_run_leaves_nothing_behind(job, tmp_path, monkeypatch):
+    def refuse(*_arguments):
+        raise SceneError("it crashed")
+
+    monkeypatch.setattr(Scene, "preflight", refuse)
+    with pytest.raises(SceneError, match="it crashed"):
+        render(job, tmp_path / "deep" / "run", Silence(), has_preflight=True)
+    with pytest.raises(SettingsError, match="view"):
+        prepare(changed(job, VideoSettings, view="Film"), tmp_path / "deep" / "run")
+    assert not (tmp_path / "deep").exists()
+    prepare(job, tmp_path / "run")
+    render(job, tmp_path / "run", Silence(), has_preflight=True)  # not again for a run that was begun
+
+
+def test_the_video_is_described_before_it_is_encoded(tmp_path):
+    monitor = Recorder()
+    render(
+        toy_job(tmp_path, path=slide(2, size=(65, 48)), video={"codec": "h264"}), tmp_path / "run", monitor
+    )
+    assert len(monitor.said) == 1
+    assert "65x48" in monitor.said[0]
+
+
+# Shards.
+
+PASSES = ("analysis", "light", "mean", "frames", "clips")
+
+
+@pytest.fixture(scope="module")
+def long_whole(tmp_path_factory):
+    """Digest of a run of 20 frames in two shots."""
+    folder = tmp_path_factory.mktemp("long")
+    render(long_job(folder), folder / "run", Silence())
+    return digest(folder / "run")
+
+
+def long_job(folder):
+    return toy_job(folder, path=slide(20, cuts=(7,)))
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_shards_in_any_order_make_the_same_run(tmp_path, run, long_whole, count):
+    prepare(long_job(tmp_path), run)
+    for name in PASSES:
+        for number in reversed(range(1, count + 1)):
+            render_shard(run, Shard(name, number, count), Silence())
+            again = Recorder()
+            render_shard(run, Shard(name, number, count), again)
+            assert again.done == []
+    summary = resume(run, Silence())
+    assert digest(run) == long_whole
+    assert (run / summary["video"]).exists()
+    assert set(attempts(tmp_path).values()) == {1}
+
+
+def test_shards_that_come_too_early_are_refused(tmp_path, run):
+    prepare(long_job(tmp_path), run)
+    with pytest.raises(
+        UnfinishedError, match=rf"pass 'analysis' is not finished; run `enfilade work {run} --pass anal"
+    ):
+        render_shard(run, Shard("light", 1, 2), Silence())
+    render_shard(run, Shard("analysis"), Silence())
+    render_shard(run, Shard("light", 1, 2), Silence())
+    with pytest.raises(
+        UnfinishedError, match=r"pass 'light' is not finished \(light 11, light 12, .* and 5 more\)"
+    ):
+        render_shard(run, Shard("mean", 1, 2), Silence())
+    with pytest.raises(
+        SettingsError, match="no pass 'dark'; it has analysis, light, mean, frames, clips, video"
+    ):
+        render_shard(run, Shard("dark"), Silence())
+    with pytest.raises(SettingsError, match="no shard 3 of 2"):
+        Shard("frames", 3, 2)
+
+
+def test_a_shard_makes_damaged_files_of_earlier_passes_again(tmp_path, run, long_whole):
+    prepare(long_job(tmp_path), run)
+    for name in PASSES[:3]:
+        render_shard(run, Shard(name), Silence())
+    flip(run / "light" / "0003.exr")
+    flip(run / "light" / "0004.exr")
+    (run / "light" / "0005.exr").unlink()
+    monitor = Recorder()
+    render_shard(run, Shard("frames", 1, 2), monitor)
+    assert monitor.done.count("light") == 3
+    resume(run, Silence())
+    assert digest(run) == long_whole
+
+
+def test_a_shard_with_a_task_that_fails_does_the_rest(tmp_path, run, long_whole):
+    order(tmp_path, light_2="raise raise raise")
+    prepare(long_job(tmp_path), run)
+    render_shard(run, Shard("analysis"), Silence())
+    with pytest.raises(UnfinishedError, match="light 2"):
+        render_shard(run, Shard("light"), Silence())
+    with pytest.raises(UnfinishedError, match=r"pass 'light' is not finished \(light 2\)"):
+        render_shard(run, Shard("mean"), Silence())
+    assert resume(run, Silence())["frames"] == 20
+    assert digest(run) == long_whole

@@ -1,0 +1,180 @@
+"""Tasks that fail, in process: tried again, set aside, done with fewer paths; damaged files are made again."""
+
+from __future__ import annotations
+
+import pytest
+
+from enfilade.errors import EnfiladeError, NoSpaceError, SettingsError, UnfinishedError
+from enfilade.methods.base import Method, Pass, Task, TaskId
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.render import render
+from enfilade.runs.scheduler import shortened
+from support.toys import Recorder, attempts, digest, flip, order, toy_job
+
+
+@pytest.fixture
+def rendered(tmp_path):
+    """Render into ``run``; returns the monitor."""
+
+    def do(frames=4, monitor=None, **tables):
+        monitor = monitor or Recorder()
+        render(toy_job(tmp_path, frames, **tables), tmp_path / "run", monitor)
+        return monitor
+
+    return do
+
+
+def test_failed_tasks_are_tried_again_with_the_same_result(tmp_path, rendered, whole):
+    order(tmp_path, light_2="raise raise", mean_1="disk", frames_4="raise")
+    monitor = rendered()
+    assert digest(tmp_path / "run") == whole
+    tries = attempts(tmp_path)
+    assert (tries["light-2"], tries["mean-1"], tries["frames-4"], tries["light-1"]) == (3, 2, 2, 1)
+    assert "light 2: ZeroDivisionError: by nought; it is tried again" in monitor.said
+    assert not (tmp_path / "run" / "failed").exists()
+
+
+def test_attempts_are_some_time_apart(tmp_path, rendered, monkeypatch):
+    monkeypatch.setattr("enfilade.runs.scheduler.DELAYS_S", (7.0, 50.0))
+    now, slept = [0.0], []
+
+    def sleep(seconds):
+        slept.append(seconds)
+        now[0] += seconds
+
+    monkeypatch.setattr("enfilade.runs.scheduler.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("enfilade.runs.scheduler.time.sleep", sleep)
+    order(tmp_path, light_2="raise raise")
+    rendered()
+    assert slept == [7.0, 50.0]  # all other tasks that could be done are done
+
+
+def test_a_task_that_fails_again_and_again_is_set_aside(tmp_path, rendered, whole):
+    order(tmp_path, frames_2="raise raise raise")
+    monitor = Recorder()
+    with pytest.raises(
+        UnfinishedError, match=r"1 tasks failed 3 times each: frames 2 \(Zero.*2 more"
+    ) as error:
+        rendered(monitor=monitor)
+    assert error.value.tasks == ("frames 2",)
+    assert "frames 2: ZeroDivisionError: by nought; it is set aside" in monitor.said
+    log = (tmp_path / "run" / "failed" / "frames-2.log").read_text()
+    assert log.count("Traceback") == 3
+    assert "attempt 3: ZeroDivisionError: by nought" in log
+    assert monitor.done.count("frames") == 3
+    rendered()
+    assert digest(tmp_path / "run") == whole
+
+
+def test_successors_of_a_task_that_is_set_aside_wait(tmp_path, rendered):
+    order(tmp_path, light_2="raise raise raise")
+    with pytest.raises(UnfinishedError, match="7 more"):
+        rendered()
+    assert attempts(tmp_path) == {"light-1": 1, "light-2": 3, "light-3": 1, "light-4": 1}
+
+
+def test_many_failures_without_a_success_end_the_run(tmp_path, rendered):
+    always = "raise raise raise"
+    order(tmp_path, **{f"light_{number}": always for number in range(1, 9)})
+    with pytest.raises(UnfinishedError, match="4 tasks failed"):
+        rendered(8)
+    assert sum(count == 3 for count in attempts(tmp_path).values()) == 4
+
+
+@pytest.mark.parametrize(("how", "error"), [("full", NoSpaceError), ("refuse", SettingsError)])
+def test_full_disks_and_wrong_input_end_the_run_at_once(tmp_path, rendered, whole, how, error):
+    order(tmp_path, mean_1=how)
+    with pytest.raises(error):
+        rendered()
+    assert attempts(tmp_path)["mean-1"] == 1
+    rendered()
+    assert digest(tmp_path / "run") == whole
+    assert attempts(tmp_path)["light-1"] == 1
+
+
+def test_after_a_lack_of_memory_fewer_paths_are_in_flight(tmp_path, rendered, whole):
+    order(tmp_path, light_2="memory memory")
+    monitor = rendered(limits={"paths_in_flight": 1 << 20})
+    assert digest(tmp_path / "run") == whole
+    paths = [int(line.split()[1]) for line in (tmp_path / "attempts" / "light-2").read_text().splitlines()]
+    assert paths == [1 << 20, 1 << 18, 1 << 16]
+    assert "light 2: MemoryError: out of it; it is tried again, with fewer paths in flight" in monitor.said
+    assert (tmp_path / "attempts" / "frames-4").read_text().split()[1] == str(1 << 16)  # and it stays so
+
+
+def damaged_after(tmp_path, name, tasks):
+    """A monitor that damages a file when so many tasks are done."""
+    return Recorder(tasks, lambda: flip(tmp_path / "run" / name))
+
+
+def test_a_damaged_file_is_made_again(tmp_path, rendered, whole):
+    monitor = rendered(monitor=damaged_after(tmp_path, "light/0002.exr", 1 + 4))
+    assert "light/0002.exr is missing or damaged: its task is done again" in monitor.said
+    assert digest(tmp_path / "run") == whole
+    assert attempts(tmp_path)["light-2"] == 2
+    assert RunFolder.read(tmp_path / "run").damaged() == []
+
+
+def test_a_file_that_is_lost_during_the_run_is_made_again(tmp_path, rendered, whole):
+    lost = tmp_path / "run" / "frames" / "0003.exr"
+    rendered(monitor=Recorder(1 + 4 + 1 + 4, lost.unlink))  # before it is encoded
+    assert digest(tmp_path / "run") == whole
+    assert attempts(tmp_path)["frames-3"] == 2
+
+
+def test_a_file_that_is_damaged_again_and_again_ends_the_run(tmp_path, rendered):
+    class Destructive(Recorder):
+        def progress(self, name, done, total):
+            if name == "frames" and done == 4:
+                flip(tmp_path / "run" / "frames" / "0002.exr")
+
+    with pytest.raises(
+        EnfiladeError, match=r"frames/0002\.exr was damaged 3 times during the run; check its disk"
+    ):
+        rendered(monitor=Destructive())
+    assert attempts(tmp_path)["frames-2"] == 3
+
+
+class Circular(Method):
+    """Tasks that need each other."""
+
+    name = "circular"
+    passes = (Pass("frames"),)
+
+    def tasks(self, analysis):
+        yield Task("frames", 0, needs=(TaskId("frames", 1),))
+        yield Task("frames", 1, needs=(TaskId("frames", 0),))
+
+    def run(self, task, inputs, walk):
+        raise NotImplementedError
+
+
+class Hasty(Circular):
+    """A task that reads a record that no task has written."""
+
+    passes = (Pass("light", int), Pass("frames"))
+
+    def tasks(self, analysis):
+        yield Task("frames", 0)
+
+    def run(self, task, inputs, walk):
+        inputs.record("light", 0)
+
+
+@pytest.fixture
+def own_methods(monkeypatch):
+    kinds = {"circular": Circular, "hasty": Hasty}
+    monkeypatch.setattr("enfilade.runs.job.open_method", lambda name: kinds[name]())
+
+
+@pytest.mark.usefixtures("own_methods")
+def test_defects_of_a_method_are_said(tmp_path):
+    with pytest.raises(EnfiladeError, match=r"need each other: frames 1, frames 2"):
+        render(toy_job(tmp_path, 2, method="circular"), tmp_path / "circular", Recorder())
+    with pytest.raises(UnfinishedError, match=r"no finished task has written light/0001\.exr"):
+        render(toy_job(tmp_path, 2, method="hasty"), tmp_path / "hasty", Recorder())
+
+
+def test_long_lists_of_tasks_are_shortened():
+    assert shortened(["a", "b"]) == "a, b"
+    assert shortened([str(n) for n in range(8)]) == "0, 1, 2, 3, 4 and 3 more"

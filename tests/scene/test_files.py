@@ -1,0 +1,163 @@
+"""Plugins and files of a scene: only Mitsuba's own, and only those of the allowed folders."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from enfilade.errors import SceneError
+from enfilade.executors.executor import Failure, FailureKind
+from enfilade.scene.mitsuba.files import check_scene, fingerprint
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+from enfilade.settings import LimitSettings, TraceSettings
+from studies.scenes import write_scene
+
+BALL = '<shape type="sphere"/><emitter type="constant"/>'
+
+
+def texture(name):
+    return f'<texture type="bitmap"><string name="filename" value="{name}"/></texture>'
+
+
+def include(name):
+    return f'<include filename="{name}"/>'
+
+
+def default(name, value):
+    return f'<default name="{name}" value="{value}"/>'
+
+
+def refused(file, words, **limits):
+    with pytest.raises(SceneError, match=words) as error:
+        check_scene(file, LimitSettings(**limits))
+    assert str(file.parent) in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["room", "atrium"])
+def test_the_generated_scenes_pass(name, tmp_path):
+    file = write_scene(name, tmp_path, preset="small").scene
+    check_scene(file, LimitSettings())
+    before = fingerprint(file)
+    mesh = next(tmp_path.rglob("*.ply"))
+    mesh.write_bytes(mesh.read_bytes() + b" ")
+    assert fingerprint(file) != before
+
+
+@pytest.mark.parametrize("kind", ["../../evil", "/tmp/evil", "Sphere", "", "prb", "blender"])  # noqa: S108
+def test_plugins_other_than_mitsubas_are_refused(scene, kind):
+    refused(scene(f'<shape type="{kind}"/>'), rf"scene\.xml \(line 1, .*'{kind}' is not one of Mitsuba's")
+    scene(f'<shape type="{kind}"/>', "part.xml")
+    refused(scene(include("part.xml")), rf"part\.xml .*'{kind}' is not one of Mitsuba's plugins")
+
+
+def test_a_plugin_in_the_folder_of_the_scene_is_refused(scene):
+    file = scene(BALL)
+    check_scene(file, LimitSettings())
+    (file.parent / "plugins").mkdir()
+    (file.parent / "plugins" / "sphere.so").write_bytes(b"")  # which Mitsuba would load
+    refused(file, "'sphere' is not one of Mitsuba's plugins")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        texture("/etc/hostname"),
+        texture("/etc/gone"),
+        texture("../../../../../../../../../../etc/hostname"),
+        default("at", "/etc") + texture("$at/hostname"),
+        '<path value="/etc"/>' + texture("hostname"),
+        texture("link"),
+        include("../outside.xml"),
+    ],
+)
+def test_files_in_other_folders_are_refused(scene, tmp_path, body):
+    file = scene(body)
+    (tmp_path / "outside.xml").write_text(f'<scene version="3.0.0">{BALL}</scene>')
+    (file.parent / "link").symlink_to("/etc/hostname")
+    refused(file, r"outside the scene's folder; allow it with --allow /")
+    if "gone" not in body:
+        check_scene(file, LimitSettings(allow=os.pathsep.join(["/nowhere", "/etc", str(tmp_path)])))
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (texture("gone.exr"), r"uses .*scene/gone\.exr, which is missing"),
+        (texture("pipe"), "uses .*pipe, which is missing or not a regular file"),
+        (texture("x" * 5000), "File name too long"),
+        (include("gone.xml"), 'included file "gone.xml" not found'),
+        (include("scene.xml"), "recursion depth"),
+        (texture("$which"), r"undefined parameter: \$which"),
+        ('<spectrum name="x" filename="gone.spd"/>', 'spectrum from file "gone.spd"$'),
+    ],
+)
+def test_what_is_missing_is_named(scene, body, words):
+    file = scene(body)
+    os.mkfifo(file.parent / "pipe")
+    refused(file, words)
+
+
+def test_no_file_is_quoted(scene, tmp_path):
+    (tmp_path / "secret").write_text("password\n")
+    file = scene('<spectrum name="x" filename="../secret"/>')
+    with pytest.raises(SceneError, match="failed to load spectrum") as error:
+        check_scene(file, LimitSettings())
+    assert "password" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\0", b"<scene>", b"BLENDER-v402", b'<scene version="3">\xff</scene>']
+)
+def test_what_is_no_scene(tmp_path, data):
+    file = tmp_path / "scene.xml"
+    file.write_bytes(data.replace(b"\xff", b'<shape type="\xff"/>'))
+    refused(file, "Mitsuba can't parse|is not UTF-8")
+    file.unlink()
+    refused(file, "there is no scene file")
+
+
+NAMED = {
+    '<path value="alt"/>' + texture("a"): "alt/a",
+    '<path value="alt"/>' + texture("both"): "alt/both",
+    texture("both"): "both",
+    include("sub/part.xml"): "both",
+    include("sub/part.xml") + " ": "sub/part.xml",
+    default("which", "kept") + texture("$which"): "kept",
+    '<spectrum name="x" filename="kept"/>': "kept",
+}
+
+
+@pytest.mark.parametrize(("body", "file"), NAMED.items())
+def test_the_fingerprint_follows_the_files_that_mitsuba_reads(scene, body, file):
+    written = scene(body)
+    scene(texture("both"), "sub/part.xml")
+    for name in ("alt/a", "alt/both", "both", "kept", "sub/both"):
+        (written.parent / name).parent.mkdir(exist_ok=True)
+        (written.parent / name).write_text("400 1\n500 2")
+    before = fingerprint(written)
+    (written.parent / "sub" / "both").write_text("other")
+    assert fingerprint(written) == before
+    named = written.parent / file
+    named.write_text(named.read_text().replace("2", "3") + " ")
+    assert fingerprint(written) != before
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
+def test_the_error_of_the_operating_system_is_kept(scene, monkeypatch, number):
+    file = scene('<shape type="ply"><string name="filename" value="ball.ply"/></shape>')
+    (file.parent / "ball.ply").write_text("no mesh")
+    really = Path.open
+
+    def fails(self, *how, **more):
+        if self.name == "ball.ply":
+            raise OSError(number, os.strerror(number), str(self))
+        return really(self, *how, **more)
+
+    monkeypatch.setattr(Path, "open", fails)
+    with pytest.raises(SceneError, match=rf"can't read .*ball\.ply, which .* uses: {os.strerror(number)}"):
+        fingerprint(file)
+    with pytest.raises(SceneError, match="can't read") as said:
+        MitsubaRenderer(file, TraceSettings())
+    kind = FailureKind.IO if number == errno.EIO else FailureKind.REFUSED
+    assert Failure.of(said.value).kind is kind

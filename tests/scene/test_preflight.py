@@ -1,0 +1,106 @@
+"""The preflight process reports problems of a scene, and outlives neither its time limit nor its parent."""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from PIL import Image
+
+from enfilade.errors import SceneError
+from enfilade.scene.preflight import preflight
+from enfilade.settings import LimitSettings, Settings, TraceSettings
+
+BALL = '<shape type="sphere"/><emitter type="constant"/>'
+
+
+def checked(file, max_depth=0, **limits):
+    return preflight(file, TraceSettings(max_depth=max_depth), LimitSettings(**limits), "llvm_ad_rgb")
+
+
+def test_it_reports_why_lobes_are_inseparable(scene):
+    assert checked(scene(BALL)) == ""
+    assert checked(scene(BALL), max_depth=3) == "its paths end at depth 3, below 4"
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ('<shape type="nonesuch"/>', "'nonesuch' is not one of Mitsuba's plugins"),
+        ('<shape type="sphere"><integer name="a" value="1"/></shape>', r"can't load .*scene\.xml"),
+        (f'<integrator type="direct"/>{BALL}', "leave --trace-max-depth out"),
+    ],
+)
+def test_it_refuses_what_mitsuba_refuses(scene, body, words):
+    with pytest.raises(SceneError, match=words):
+        checked(scene(body), max_depth=7)
+
+
+def test_a_scene_that_takes_too_much_is_refused(scene):
+    image = '<texture type="bitmap"><string name="filename" value="large.png"/></texture>'
+    file = scene(f'<shape type="sphere"><bsdf type="diffuse">{image}</bsdf></shape>')
+    Image.new("L", (12_000, 12_000)).save(file.parent / "large.png", compress_level=1)
+    with pytest.raises(SceneError, match=r"was too much for the preflight process|can't load"):
+        checked(file, preflight_mb=512)
+    with pytest.raises(SceneError, match=r"was not loaded in 0\.1 s"):  # in which Mitsuba does not start
+        checked(file, preflight_s=0.1)
+
+
+@pytest.fixture
+def endless(scene):
+    """A scene with a spectrum that is never read to its end, and the pipe that stands for it."""
+    file = scene('<shape type="sphere"><spectrum name="x" filename="pipe"/></shape>')
+    os.mkfifo(file.parent / "pipe")
+    return file, file.parent / "pipe"
+
+
+def opened(pipe, seconds=60.0):
+    """The end to write to, as soon as a process reads from the other."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:  # nobody reads yet
+            time.sleep(0.05)
+    raise TimeoutError(pipe)
+
+
+PREFLIGHT = """
+import sys
+from pathlib import Path
+from enfilade.scene.preflight import preflight
+from enfilade.settings import LimitSettings, TraceSettings
+preflight(Path(sys.argv[1]), TraceSettings(), LimitSettings(), "llvm_ad_rgb")
+"""
+
+
+def test_it_ends_with_the_command_that_began_it(endless):
+    scene, pipe = endless
+    with subprocess.Popen([sys.executable, "-c", PREFLIGHT, str(scene)]) as command:  # noqa: S603
+        writing = opened(pipe)
+        try:
+            command.kill()
+            ended = select.poll()
+            ended.register(writing, select.POLLERR)  # nobody reads any more
+            assert ended.poll(20_000), "the preflight process is still there"
+        finally:
+            os.close(writing)
+
+
+def run(file, parent, seconds=60.0):
+    tables = Settings(limits=LimitSettings(preflight_s=seconds)).to_tables()
+    line = [sys.executable, "-P", "-m", "enfilade.scene.preflight", str(file)]
+    line += [json.dumps(tables), "llvm_ad_rgb", str(parent)]
+    return subprocess.run(line, check=False, timeout=60, capture_output=True).returncode  # noqa: S603
+
+
+def test_it_ends_itself_when_its_time_is_over(endless):
+    assert run(endless[0], os.getpid(), 0.5) == -signal.SIGALRM
+
+
+def test_it_does_not_begin_without_its_parent(scene):
+    assert run(scene(BALL), 0) == 1
