@@ -140,6 +140,7 @@ def _difference(
         ("visible difference", f"{found['score_jnd']:.2f} JND", found["meaning"]),
         ("pixels above 1 JND", f"{percent(found['percent_visible']['mean'])} %", "mean over the frames"),
         ("PSNR", psnr, "sRGB-encoded values"),
+        ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
     ]
     if reference is not None and summary["video"] and reference["video"]:
         own, other = (of["table2"]["cpu_s"] / of["frames"] for of in (summary, reference))

@@ -15,7 +15,8 @@ from enfilade.monitor import Monitor, Silence
 from enfilade.reports.contents import contents
 from enfilade.reports.film import Film
 from enfilade.reports.run import ReportedRun
-from enfilade.runs.folder import RUN_FILE, RunFolder
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import RUN_FILE
 from enfilade.runs.statistics import statistics
 
 __all__ = ["LEAST_MB", "PAGE", "write_report"]
