@@ -35,8 +35,7 @@ from enfilade.cli.options import quiet_option
 def command(*, run: Path, file: Path | None, reference: Path | None, max_mb: float, quiet: bool) -> None:
     """Write the finished or running run in the folder RUN as one HTML page.
 
-    The page needs neither other files nor a network. A running run is shown as far as it is finished. Nothing is
-    rendered.
+    The page needs neither other files nor a network. A running run is shown as far as it is finished.
     """
     from enfilade.cli.progress import watch
     from enfilade.device import activate

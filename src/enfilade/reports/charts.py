@@ -118,12 +118,9 @@ def draw(ax: Any, panel: Panel) -> None:
         if series.mark == "bar":
             below = _stack(ax, series, below)
         else:
-            style = MARKS[series.mark]
-            lone = (
-                {"marker": "o", "markersize": 4} if len(series.values) == 1 and "marker" not in style else {}
-            )
+            mark = "circle" if len(series.values) == 1 and series.mark == "line" else series.mark
             frames, values = list(series.values), list(series.values.values())
-            ax.plot(frames, values, color=series.color, label=series.name, **style, **lone)
+            ax.plot(frames, values, color=series.color, label=series.name, **MARKS[mark])
     if panel.level is not None:
         value, name = panel.level
         ax.axhline(value, color=INK, linestyle="--", linewidth=1.0, label=name)

@@ -46,11 +46,9 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
     left, bottom, width, height = SVG_AXES
     return {
         "name": run.folder.resolve().name,
-        "summary": summary,
         "state": _state(run),
         "glance": _glance(run),
         "layers": film.layers,
-        "has_frames": bool(film.frames),
         "charts": [(panel, svg(panel, span)) for panel in charted],
         "span": span,
         "edges": {"left": left, "right": left + width, "top": 1.0 - bottom - height, "bottom": bottom},
@@ -115,9 +113,7 @@ def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _stages(run: ReportedRun) -> list[dict[str, str]]:
     """Rows of Table 2, with the number of tasks of the stages that are passes."""
     times, tasks = run.summary["table2"], Counter(line["pass"] for line in run.lines)
-    rows = [
-        (name, tasks.get(name), spent["wall_s"], spent["cpu_s"]) for name, spent in times["stages"].items()
-    ]
+    rows = [(name, tasks.get(name), of["wall_s"], of["cpu_s"]) for name, of in times["stages"].items()]
     rows.append(("total", sum(tasks.values()), times["total_s"], times["cpu_s"]))
     return [
         {
@@ -144,15 +140,12 @@ def _difference(
         ("visible difference", f"{found['score_jnd']:.2f} JND", found["meaning"]),
         ("pixels above 1 JND", f"{percent(found['percent_visible']['mean'])} %", "mean over the frames"),
         ("PSNR", psnr, "sRGB-encoded values"),
+        ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
     ]
     if reference is not None and summary["video"] and reference["video"]:
         own, other = (of["table2"]["cpu_s"] / of["frames"] for of in (summary, reference))
         rows += [
-            (
-                "CPU time per frame",
-                seconds(own),
-                f"{100.0 * own / max(other, 1e-9):.0f} % of the reference's",
-            ),
+            ("CPU time per frame", seconds(own), f"{100.0 * own / max(other, 1e-9):.0f} % of the reference"),
             ("", seconds(other), "the reference; comparable on the same machine"),
         ]
     return rows
@@ -160,13 +153,10 @@ def _difference(
 
 def _settings(run: ReportedRun) -> list[dict[str, Any]]:
     """Settings by section; those of built-in sections with their defaults and help."""
-    tables = {
-        **run.identity["settings"],
-        "viewing": run.viewing_settings.to_table(),
-        "video": run.video.to_table(),
-    }
+    also = {"viewing": run.viewing_settings.to_table(), "video": run.video.to_table()}
+    shown = {**run.identity["settings"], **also}
     known: dict[str, Section] = {kind.table: kind() for kind in SECTIONS}
-    return [{"name": name, "rows": _section(table, known.get(name))} for name, table in tables.items()]
+    return [{"name": name, "rows": _section(table, known.get(name))} for name, table in shown.items()]
 
 
 def _section(table: Mapping[str, Any], default: Section | None) -> list[dict[str, Any]]:
@@ -210,14 +200,15 @@ def _data(run: ReportedRun, film: Film, panels: Sequence[Panel]) -> dict[str, An
     """Data of the player: pictures, and the values of all charts at their frames."""
     numbers = [frame["number"] for frame in film.frames]
     keyframes = {row["frame"] for row in run.summary["per_frame"] if row["keyframe"] > 0.0}
-    is_told = 0 < len(keyframes) < len(run.summary["per_frame"])  # else all frames are alike
-    for frame in film.frames:
-        frame["kind"] = "keyframe" if is_told and frame["number"] in keyframes else ""
+    if len(keyframes) == len(
+        run.summary["per_frame"]
+    ):  # every frame is traced whole: there is nothing to tell
+        keyframes = set()
     return {
         "fps": run.identity["path"]["fps"],
         "size": film.size,
         "last": run.numbers[-1],
-        "frames": film.frames,
+        "frames": [{**f, "kind": "keyframe" if f["number"] in keyframes else ""} for f in film.frames],
         "layers": [
             {"name": layer.name, "title": layer.title, "isOverlay": layer.is_overlay} for layer in film.layers
         ],

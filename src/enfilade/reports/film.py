@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from enfilade.comparison import ComparedFrame, Terms, compare
-from enfilade.images import open_sequence
+from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import encode_webp, resized
 from enfilade.images.view import View
-from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Monitor, Silence
 from enfilade.records import F32, U8
-from enfilade.reports.layers import LAYERS, Comparison, Layer, painted
+from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
 from enfilade.reports.run import ReportedRun
 from enfilade.viewing import Viewing
 
@@ -97,7 +96,7 @@ class Film:
 
     def _fit(self, most: float, *, is_compared: bool) -> int:
         """Scale the pictures; returns every how many frames one is kept."""
-        found = self._encoded(self._run.there[len(self._run.there) // 2])
+        found = self._encoded(self._painted(self._run.there[len(self._run.there) // 2]))
         # Maps of differences take about as much as the result.
         each = sum(map(len, found.values())) + (2 * len(found["result"]) if is_compared else 0)
         total = each * len(self._run.there)
@@ -110,39 +109,56 @@ class Film:
     def _compare(self, reference: Path, kept: set[int], monitor: Monitor) -> dict[str, Any]:
         """Compare all finished frames with the reference, and add those that are kept."""
         run, indices = self._run, {number: index for index, number in enumerate(self._run.numbers)}
-        exposure_ev = run.viewing_settings.exposure_ev
+        absolute = AbsoluteDifference()
 
-        def show(judged: Iterator[ComparedFrame], _viewing: Viewing) -> None:
-            others = open_sequence(reference)
-            # Frames of a video are as shown; those of a renderer are not exposed yet.
-            other_ev = exposure_ev if others.name(0).lower().endswith(".exr") else 0.0
-            for count, (found, other) in enumerate(zip(judged, others, strict=True), 1):
+        def show(frames: Iterator[ComparedFrame], _viewing: Viewing) -> None:
+            for count, frame in enumerate(frames, 1):
                 monitor.progress("report", count, len(run.there))
-                index = indices[found.difference.number]
+                index = indices[frame.difference.number]
                 if index in kept:
-                    ours = _shown(run.frame(index).color, exposure_ev)
-                    percent = np.float32(100.0) * np.abs(ours - _shown(other, other_ev)).mean(axis=2)
-                    self._add(index, Comparison(found.jnd, found.grey, percent))
+                    self._add(index, painted_difference(frame, absolute.map_percent))
 
-        terms = Terms(viewing=run.viewing_settings, exposure_ev=exposure_ev)
+        of = run.viewing_settings
+        terms = Terms(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
         return compare(run.folder, reference, terms, Silence(), show=show).to_dict()
 
-    def _add(self, index: int, compared: Comparison | None = None) -> None:
-        layers = self._encoded(index, compared)
+    def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
+        layers = {**self._encoded(self._painted(index)), **self._encoded(differences or {})}
         self.frames.append({"number": self._run.numbers[index], "index": index, "layers": layers})
 
-    def _encoded(self, index: int, compared: Comparison | None = None) -> dict[str, str]:
-        pictures = painted(self._run.frame(index), compared, self._view, self._run.viewing)
-        return {layer.name: self._webp(layer, pictures) for layer in LAYERS if layer.name in pictures}
+    def _painted(self, index: int) -> dict[str, U8]:
+        return painted(self._run.frame(index), self._view, self._run.viewing)
 
-    def _webp(self, layer: Layer, pictures: Mapping[str, U8]) -> str:
-        picture = resized(pictures[layer.name], self.size, is_mixed=not layer.is_overlay)
-        return base64.b64encode(encode_webp(picture, quality=layer.quality)).decode()
+    def _encoded(self, pictures: Mapping[str, U8]) -> dict[str, str]:
+        """As WebP in base64."""
+        found = {}
+        for layer in LAYERS:
+            if layer.name in pictures:
+                picture = resized(pictures[layer.name], self.size, is_mixed=not layer.is_overlay)
+                found[layer.name] = base64.b64encode(encode_webp(picture, quality=layer.quality)).decode()
+        return found
 
 
-def _shown(linear: F32, exposure_ev: float) -> F32:
-    """Encoded for an sRGB screen, 0..1."""
-    return srgb_encode(np.clip(linear * np.float32(2.0**exposure_ev), 0.0, 1.0).astype(np.float32))
+class AbsoluteDifference:
+    """Mean absolute difference of sRGB-encoded values, percent of white.
+
+    Attributes
+    ----------
+    map_percent : (H, W) float32
+        Of the last frame, mean of the channels.
+    """
+
+    name = "absolute"
+    map_percent: F32
+
+    def measure(self, pair: DisplayedPair) -> float:
+        """Of the next frame."""
+        self.map_percent = np.float32(100.0) * np.abs(pair.test - pair.reference).mean(axis=2)
+        return float(self.map_percent.mean())
+
+    def pool(self, values: Sequence[float | None]) -> float:
+        """Of the whole sequence."""
+        return float(np.mean([value for value in values if value is not None]))
 
 
 def _scaled(size: tuple[int, int], factor: float) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.comparison import ComparedFrame
 from enfilade.images.view import View
 from enfilade.records import F32, U8, Provenance
 from enfilade.reports import heatmap
@@ -16,29 +17,10 @@ from enfilade.reports.run import DeliveredFrame
 from enfilade.reports.scales import DIFFERENCE, VELOCITY, VISIBLE, Scale
 from enfilade.viewing import Viewing
 
-__all__ = ["LAYERS", "Comparison", "Layer", "painted"]
+__all__ = ["LAYERS", "Layer", "painted", "painted_difference"]
 
 QUALITY = 92  # of WebP
 LEGEND_STEPS = 33  # colours
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """A frame beside the same frame of a reference.
-
-    Attributes
-    ----------
-    jnd : (H, W) float32
-        Map of visible differences.
-    grey : (H, W) float32
-        The reference without colours, encoded for a screen, 0..1.
-    difference_percent : (H, W) float32
-        Absolute difference of sRGB-encoded values, mean over the channels, percent of white.
-    """
-
-    jnd: F32
-    grey: F32
-    difference_percent: F32
 
 
 @dataclass(frozen=True)
@@ -70,16 +52,12 @@ class Layer:
         return None if self.is_overlay else QUALITY
 
 
-def painted(
-    frame: DeliveredFrame, compared: Comparison | None, view: View, viewing: Viewing
-) -> dict[str, U8]:
-    """Paint all layers of a frame for which there is data.
+def painted(frame: DeliveredFrame, view: View, viewing: Viewing) -> dict[str, U8]:
+    """Paint the layers of a frame: result, provenance and velocity, as far as its file has them.
 
     Parameters
     ----------
     frame
-    compared
-        None: without a reference.
     view
         View transform of the video.
     viewing
@@ -92,16 +70,18 @@ def painted(
     pictures = {"result": _bytes(view.encode(frame.color))}
     if frame.provenance is not None:
         pictures["provenance"] = _provenance_colors()[frame.provenance]
-    if compared is not None:
-        pictures["visible"] = _bytes(heatmap.overlay(compared.jnd, compared.grey))
     if frame.flow is not None:
         fastest_px = np.float32(np.hypot(viewing.width_px, viewing.height_px))  # points near the eye
         pictures["velocity"] = VELOCITY.paint(
             viewing.velocity_deg_s(np.minimum(frame.flow.speed, fastest_px))
         )
-    if compared is not None:
-        pictures["difference"] = DIFFERENCE.paint(compared.difference_percent)
     return pictures
+
+
+def painted_difference(compared: ComparedFrame, difference_percent: F32) -> dict[str, U8]:
+    """Paint the difference of a frame from the reference, visible and absolute, (H, W) percent of white."""
+    visible = _bytes(heatmap.overlay(compared.jnd, compared.grey))
+    return {"visible": visible, "difference": DIFFERENCE.paint(difference_percent)}
 
 
 def _provenance_colors() -> U8:

@@ -69,7 +69,7 @@ def write_report(
     """
     if not max_mb >= LEAST_MB:
         raise SettingsError(f"a page of {max_mb:g} MB is too small; give {LEAST_MB:g} or more")
-    monitor = monitor or Silence()
+    monitor = Silence() if monitor is None else monitor
     source = None if reference is None else Path(reference)
     shown = ReportedRun(run)
     view = open_view(shown.video, shown.viewing_settings.exposure_ev)

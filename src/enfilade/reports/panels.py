@@ -58,7 +58,7 @@ def quality_panel(difference: Mapping[str, Any]) -> Panel:
         "Visible difference from the reference",
         "JND",
         f"Visible difference from the reference: {least:.2f} to {most:.2f} just noticeable differences.",
-        (Series("JND", GREEN, scores),),
+        (Series("score", GREEN, scores),),
         top=1.1 * max(most, 1.0),
         level=(1.0, "1 JND: noticed in 3 of 4 cases"),
     )

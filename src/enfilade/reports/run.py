@@ -16,8 +16,8 @@ from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
 from enfilade.records import F32, U8, Flow
 from enfilade.runs.folder import RunFolder
-from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.job import JOB_FILE
+from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import holder_of
 from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings, ViewingSettings
