@@ -75,7 +75,7 @@ def test_swapping_changes_little(sequence, fault):
     screen = display_named("paper")
     there, back = (compared(*pair, display=screen).score for pair in ((one, other), (other, one)))
     assert there > 0.2
-    assert back == pytest.approx(there, rel=0.1)  # docs/compare.md
+    assert back == pytest.approx(there, rel=0.1)  # docs/metric.md
 
 
 def test_a_frame_at_the_end_of_a_shot_moves_as_fast_as_the_others(sequence):
