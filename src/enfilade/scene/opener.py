@@ -10,9 +10,9 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.metadata
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from enfilade.device import active
 from enfilade.errors import SceneError, SettingsError
@@ -67,8 +67,7 @@ def open_renderer(scene: Path, settings: TraceSettings, renderer: str | None = N
         No usable LLVM or CUDA.
     """
     if renderer is not None:
-        opened: Renderer = _imported(renderer)(scene, settings)
-        return opened
+        return _imported(renderer)(scene, settings)
     _check_suffix(scene)
     from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
@@ -112,8 +111,8 @@ def identify_scene(scene: Path, renderer: str | None = None) -> SceneIdentity:
     _check_suffix(scene)
     from enfilade.scene.mitsuba.files import fingerprint
 
-    name = f"Mitsuba {importlib.metadata.version('mitsuba')}"
-    return SceneIdentity(name, active().variant, fingerprint(scene))
+    version = importlib.metadata.version("mitsuba")
+    return SceneIdentity(f"Mitsuba {version}", active().variant, fingerprint(scene))
 
 
 def _check_suffix(scene: Path) -> None:
@@ -123,11 +122,12 @@ def _check_suffix(scene: Path) -> None:
         raise SceneError(f"{scene} is not a scene in Mitsuba's XML format (.xml){advice}")
 
 
-def _imported(renderer: str) -> Any:
+def _imported(renderer: str) -> Callable[[Path, TraceSettings], Renderer]:
     module, _, function = renderer.partition(":")
     try:
-        return getattr(importlib.import_module(module), function)
+        found: Callable[[Path, TraceSettings], Renderer] = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
         raise SettingsError(
             f"there is no renderer {renderer!r}: {error}; give it as module:function, of an importable module"
         ) from error
+    return found
