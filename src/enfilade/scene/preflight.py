@@ -61,8 +61,7 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
     answer = json.loads(done.stdout)
     if answer["error"]:
         raise SceneError(answer["error"])
-    why_inseparable: str = answer["why_inseparable"]
-    return why_inseparable
+    return str(answer["why_inseparable"])
 
 
 def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
