@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from enfilade.reports.charts import Panel, Series, draw, new_figure, svg
+from enfilade.reports.charts import PALETTE, Panel, Series, draw, new_figure, svg
 from enfilade.reports.panels import plan_panels, quality_panel, run_panels, time_panel
 from made_up_runs import made_up_plan, made_up_summary
 
@@ -64,8 +64,9 @@ def test_a_reference_has_no_marks_and_no_predictions():
 def test_time_by_pass_without_analysis_and_video():
     cost = {"gbuffer": {"wall_s": 1.0}, "trace": {"wall_s": 2.0}}
     names = ("analysis", "hash_grid", "frames", "clips", "video")
-    panel = time_panel([{"pass": name, "frame": 3, "cost": cost} for name in names])
+    panel = time_panel([{"pass": name, "frame": 3, "cost": cost} for name in names], {"frames": 1.0})
     assert values(panel) == {"hash grid": {3: 3.0}, "frames": {3: 3.0}}
+    assert panel.series[1].color == PALETTE[0]  # as of rays of that name
 
 
 def test_quality_and_plan():

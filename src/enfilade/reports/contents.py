@@ -11,10 +11,10 @@ from typing import Any
 from enfilade import __version__
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
-from enfilade.reports.panels import quality_panel, run_panels, spoken, time_panel
+from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
-from enfilade.reports.tables import TRACED, percent, seconds
+from enfilade.reports.tables import TRACED, percent, seconds, spoken
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -41,7 +41,7 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
     panels = run_panels(summary, split_percent_of(run.identity))
     if film.difference is not None:
         panels.append(quality_panel(film.difference))
-    charted = [panel for panel in [*panels, time_panel(run.lines)] if panel.series]
+    charted = [panel for panel in [*panels, time_panel(run.lines, summary["rays"])] if panel.series]
     span = (run.numbers[0] - 0.5, run.numbers[-1] + 0.5)
     left, bottom, width, height = SVG_AXES
     return {
