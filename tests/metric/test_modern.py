@@ -71,7 +71,7 @@ def test_defects_light_up_where_they_are_and_nowhere_else(full, scene):
     away = scipy.ndimage.distance_transform_edt(~np.any(list(places.values()), axis=0))
     assert np.mean(jnd[away > 0.9 * VIEWING.pixels_per_degree] > 1.0) < 0.05
     assert jnd[away > 2.0 * VIEWING.pixels_per_degree].max() < 1.0
-    assert compared.percent_visible == pytest.approx(22.9, abs=0.3)  # docs/compare.md
+    assert compared.percent_visible == pytest.approx(22.9, abs=0.3)  # docs/metric.md
 
 
 def test_a_pan_hides_upright_bars_and_not_level_ones(full, scene):

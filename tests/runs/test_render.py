@@ -247,7 +247,7 @@ def test_shards_in_any_order_make_the_same_run(tmp_path, run, long_whole, count)
 def test_shards_that_come_too_early_are_refused(tmp_path, run):
     prepare(long_job(tmp_path), run)
     with pytest.raises(
-        UnfinishedError, match=rf"pass 'analysis' is not finished; run `enfilade work {run} --pass anal"
+        UnfinishedError, match=rf"pass 'analysis' is not finished; first run `enfilade work {run} --pass anal"
     ):
         render_shard(run, Shard("light", 1, 2), Silence())
     render_shard(run, Shard("analysis"), Silence())

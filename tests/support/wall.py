@@ -1,4 +1,4 @@
-"""A flat wall that any scene file shows, for tests of everything around the renderer: its pixels cost nothing."""
+"""A flat wall, for tests of everything around the renderer: its pixels cost nothing."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from enfilade.arrays import Array3f, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
-from enfilade.settings import LimitSettings, Settings
 
 
-def load(file: Path, settings: Settings) -> Wall:
+def load(file: Path, *, max_depth: int, chunk: int) -> Wall:
     """For ``Scene(file, renderer="support.wall:load")``."""
-    return Wall(file, settings[LimitSettings].paths_in_flight)
+    del max_depth
+    return Wall(file, chunk)
 
 
 class Wall:
@@ -28,7 +28,7 @@ class Wall:
         self.paths_in_flight = paths_in_flight
 
     def describe(self) -> SceneFacts:
-        return SceneFacts("wall", "none", ("wall",), "")
+        return SceneFacts("wall", "none", ("wall",))
 
     def surfaces(self, rays: Rays) -> Surfaces:
         distance = -rays.origin.z / rays.direction.z
@@ -50,6 +50,7 @@ class Wall:
         spp: int,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
+        del pixel_filter
         seed = (random.seed, random.frame, int(random.purpose), spp)
         image = np.random.default_rng(seed).random((camera.height * camera.width, 3), np.float32)
         color: F32 = image[pixels]

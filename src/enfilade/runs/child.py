@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enfilade.confined import die_with
+from enfilade.resource_limits import die_with
 from enfilade.device import activate, load
 from enfilade.runs.failure import Failure
 
