@@ -176,24 +176,27 @@ def _section(table: Mapping[str, Any], default: Section | None) -> list[dict[str
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
     return f"{value:g}" if isinstance(value, float) else str(value) or "none"
 
 
 def _identity(run: ReportedRun) -> list[tuple[str, str]]:
-    identity, of, numbers = run.identity, run.viewing, run.numbers
-    method, path = identity["method"], identity["path"]
+    """Folder, frames, screen, and everything in the identity but frames and settings."""
+    of, numbers = run.viewing, run.numbers
     size = f"{of.diagonal_m:g} m diagonal at {of.distance_m:g} m"
-    return [
+    rows = [
         ("folder", str(run.folder.resolve())),
-        ("method", f"{method['name']}, revision {method['revision']}"),
-        ("renderer", f"{identity['renderer']['name']}, {identity['renderer']['variant']}"),
-        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}, {path['fps']:g} per second"),
-        ("cuts before frames", ", ".join(map(str, path["cuts"])) or "none"),
+        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}"),
         ("screen", f"{size}: {of.pixels_per_degree:.1f} pixels per degree"),
-        ("scene", str(identity["scene"])),
-        ("camera poses", str(path["poses"])),
-        ("enfilade", str(identity["enfilade"])),
     ]
+    for name, value in run.identity.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        if name != "settings":
+            rows += [
+                (f"{name} {key}".strip(), _value(part)) for key, part in parts.items() if key != "frames"
+            ]
+    return rows
 
 
 def _data(run: ReportedRun, film: Film, panels: Sequence[Panel]) -> dict[str, Any]:
