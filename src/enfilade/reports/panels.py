@@ -136,12 +136,12 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
     """Predictions of the metric for the middles of segments, before and after segments are split (§4.3)."""
     judged = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
     chosen = {
-        ("before splitting", "square"): [s for s in judged if s["depth"] == 0],
-        ("after splitting", "circle"): [s for s in judged if not s["is_split"]],
+        ("before split", "square"): [s for s in judged if s["depth"] == 0],
+        ("after split", "circle"): [s for s in judged if not s["is_split"]],
     }
     eyes = (
         ("pursuit", "percent_visible", VERMILION),
-        ("eye at rest", "percent_visible_no_pursuit", BLUE),
+        ("at rest", "percent_visible_no_pursuit", BLUE),
     )
     series = [
         Series(f"{eye}, {when}", color, {s["middle"]: s[key] for s in of if s.get(key) is not None}, mark)
@@ -152,7 +152,7 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
     split = sum(s["is_split"] for s in judged)
     return Panel(
         "predictions",
-        "Predicted visible pixels of segment middles",
+        "Predicted visible pixels",
         "%",
         f"Visible pixels that the metric predicts for segment middles: at most {most:.1f} percent; "
         f"{split} of {len(judged)} segments were split.",
