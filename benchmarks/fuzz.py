@@ -215,7 +215,7 @@ def finish_units(run: "Run", numbers: range) -> None:
 
 def read_run(file: Path) -> None:
     """Read a run as the report does, and a copy of it as the command does that goes on with it."""
-    from enfilade.reports.seen import SeenRun
+    from enfilade.reports.run import ReportedRun
     from enfilade.store import Run
 
     folder = file.parent if file.name != LATE else file.parents[1]
@@ -223,7 +223,7 @@ def read_run(file: Path) -> None:
     shutil.copytree(folder, copy)
     identity = json.loads((folder.parent / IDENTITY).read_text())
     try:
-        for opening in (lambda: SeenRun(folder), lambda: Run.open(copy, identity).close()):
+        for opening in (lambda: ReportedRun(folder), lambda: Run.open(copy, identity).close()):
             try:
                 opening()
             except ValueError as error:  # ours are among them

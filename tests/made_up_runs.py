@@ -131,8 +131,7 @@ def made_up_run(folder, *, noise=0.0, finished=None, has_video=True, facts=None,
     known = {
         "enfilade": "0.1.0",
         "method": {"name": "mine", "revision": 1},
-        "renderer": {"name": "mine:open", "variant": "llvm"},
-        "scene": "abcd",
+        "scene": {"renderer": "mine:open", "variant": "llvm", "fingerprint": "abcd"},
         "path": path,
         "settings": {"probe": {"count": 3}, "trace": {"seed": 7, "max_depth": 0}},
     }

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from enfilade.reports.charts import Panel, Series, draw, new_figure, svg
+from enfilade.reports.charts import PALETTE, Panel, Series, draw, new_figure, svg
 from enfilade.reports.panels import plan_panels, quality_panel, run_panels, time_panel
 from made_up_runs import made_up_plan, made_up_summary
 
@@ -27,9 +27,9 @@ def test_predictions_before_and_after_splitting():
     segments, panel = made_up_summary()["segments"], panels(12.5)["predictions"]
     before = {s["middle"]: s["percent_visible"] for s in segments if s["depth"] == 0}
     after = {s["middle"]: s["percent_visible"] for s in segments if not s["is_split"]}
-    assert values(panel)["pursuit, before splitting"] == before
-    assert values(panel)["pursuit, after splitting"] == after
-    at_rest = values(panel)["eye at rest, before splitting"]
+    assert values(panel)["pursuit, before split"] == before
+    assert values(panel)["pursuit, after split"] == after
+    at_rest = values(panel)["at rest, before split"]
     assert at_rest == pytest.approx({middle: 0.4 * visible for middle, visible in before.items()})
     assert panel.level == (12.5, "split above 12.5 %")
     assert "1 of 8 segments were split" in panel.text
@@ -41,8 +41,8 @@ def test_segments_without_a_middle_or_a_second_prediction():
     empty = {"first": 1, "last": 2, "middle": None, "depth": 0, "is_split": False, "percent_visible": 0.0}
     summary["segments"] = [{**s, "percent_visible_no_pursuit": None} for s in summary["segments"]] + [empty]
     panel = run_panels(summary)[-1]
-    assert list(values(panel)) == ["pursuit, before splitting", "pursuit, after splitting"]
-    assert None not in values(panel)["pursuit, before splitting"]
+    assert list(values(panel)) == ["pursuit, before split", "pursuit, after split"]
+    assert None not in values(panel)["pursuit, before split"]
 
 
 def test_traced_pixels_by_reason_and_rays_by_kind():
@@ -64,8 +64,9 @@ def test_a_reference_has_no_marks_and_no_predictions():
 def test_time_by_pass_without_analysis_and_video():
     cost = {"gbuffer": {"wall_s": 1.0}, "trace": {"wall_s": 2.0}}
     names = ("analysis", "hash_grid", "frames", "clips", "video")
-    panel = time_panel([{"pass": name, "frame": 3, "cost": cost} for name in names])
+    panel = time_panel([{"pass": name, "frame": 3, "cost": cost} for name in names], {"frames": 1.0})
     assert values(panel) == {"hash grid": {3: 3.0}, "frames": {3: 3.0}}
+    assert panel.series[1].color == PALETTE[0]  # as of rays of that name
 
 
 def test_quality_and_plan():

@@ -30,7 +30,7 @@ __all__ = [
 
 BLUE, ORANGE, GREEN, VERMILION, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#BBBBBB"
 PINK, YELLOW = "#CC79A7", "#F0E442"
-PALETTE = (SKY, ORANGE, GREEN, PINK, BLUE, VERMILION, GREY, YELLOW)
+PALETTE = (SKY, ORANGE, GREEN, PINK, BLUE, VERMILION, GREY, YELLOW, "#882255", "#999933")
 PROVENANCE_COLORS = {"slow": SKY, "specular": ORANGE, "disoccluded": GREEN, "keyframe": PINK}
 INK, RULE = "#333333", "#DDDDDD"
 THEMED = {INK: "currentColor", RULE: "var(--grid)"}  # colours of the page, light or dark

@@ -11,10 +11,10 @@ from typing import Any
 from enfilade import __version__
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
-from enfilade.reports.panels import quality_panel, run_panels, spoken, time_panel
+from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
-from enfilade.reports.tables import TRACED, percent, seconds
+from enfilade.reports.tables import TRACED, percent, seconds, spoken
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -41,7 +41,7 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
     panels = run_panels(summary, split_percent_of(run.identity))
     if film.difference is not None:
         panels.append(quality_panel(film.difference))
-    charted = [panel for panel in [*panels, time_panel(run.lines)] if panel.series]
+    charted = [panel for panel in [*panels, time_panel(run.lines, summary["rays"])] if panel.series]
     span = (run.numbers[0] - 0.5, run.numbers[-1] + 0.5)
     left, bottom, width, height = SVG_AXES
     return {
@@ -176,24 +176,27 @@ def _section(table: Mapping[str, Any], default: Section | None) -> list[dict[str
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
     return f"{value:g}" if isinstance(value, float) else str(value) or "none"
 
 
 def _identity(run: ReportedRun) -> list[tuple[str, str]]:
-    identity, of, numbers = run.identity, run.viewing, run.numbers
-    method, path = identity["method"], identity["path"]
+    """Folder, frames, screen, and everything in the identity but frames and settings."""
+    of, numbers = run.viewing, run.numbers
     size = f"{of.diagonal_m:g} m diagonal at {of.distance_m:g} m"
-    return [
+    rows = [
         ("folder", str(run.folder.resolve())),
-        ("method", f"{method['name']}, revision {method['revision']}"),
-        ("renderer", f"{identity['renderer']['name']}, {identity['renderer']['variant']}"),
-        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}, {path['fps']:g} per second"),
-        ("cuts before frames", ", ".join(map(str, path["cuts"])) or "none"),
+        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}"),
         ("screen", f"{size}: {of.pixels_per_degree:.1f} pixels per degree"),
-        ("scene", str(identity["scene"])),
-        ("camera poses", str(path["poses"])),
-        ("enfilade", str(identity["enfilade"])),
     ]
+    for name, value in run.identity.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        if name != "settings":
+            rows += [
+                (f"{name} {key}".strip(), _value(part)) for key, part in parts.items() if key != "frames"
+            ]
+    return rows
 
 
 def _data(run: ReportedRun, film: Film, panels: Sequence[Panel]) -> dict[str, Any]:

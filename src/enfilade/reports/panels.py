@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from enfilade.reports.charts import BLUE, GREEN, PALETTE, PROVENANCE_COLORS, VERMILION, Panel, Series
+from enfilade.reports.tables import spoken
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 
-__all__ = ["plan_panels", "quality_panel", "run_panels", "spoken", "time_panel"]
+__all__ = ["plan_panels", "quality_panel", "run_panels", "time_panel"]
 
 DELIVERY = frozenset({ANALYSIS.name, CLIPS.name, VIDEO.name})  # passes whose tasks cover many frames
 
@@ -64,21 +66,24 @@ def quality_panel(difference: Mapping[str, Any]) -> Panel:
     )
 
 
-def time_panel(lines: Iterable[Mapping[str, Any]]) -> Panel:
-    """Wall time of the tasks of each frame by pass, without analysis and video, from lines of the ledger."""
+def time_panel(lines: Iterable[Mapping[str, Any]], rays: Mapping[str, float]) -> Panel:
+    """Wall time of the tasks of each frame by pass, without analysis and video.
+
+    Parameters
+    ----------
+    lines
+        Of the ledger.
+    rays
+        Of the summary: a pass has the colour of the rays of its name.
+    """
     spent: dict[str, dict[int, float]] = {}
     for line in lines:
         if line["pass"] not in DELIVERY:
             seconds = sum(stage["wall_s"] for stage in line["cost"].values())
             spent.setdefault(line["pass"], {})[line["frame"]] = seconds
-    series, totals = _stacked(spent)
+    series, totals = _stacked(spent, [*(kind for kind, mean in rays.items() if mean), *spent])
     text = f"Time of the tasks of each frame, by pass: at most {max(totals, default=0.0):.1f} seconds."
     return Panel("time", "Time, by pass", "s", text, series, top=1.05 * max(totals, default=1.0) or 1.0)
-
-
-def spoken(name: str) -> str:
-    """The name of a pass or of a kind of rays as words: ``hash_grid`` is "hash grid"."""
-    return name.replace("_", " ")
 
 
 def _velocity_panel(speeds: Mapping[int, float], keyframes: Iterable[int]) -> Panel:
@@ -97,7 +102,7 @@ def _rays_panel(summary: Mapping[str, Any]) -> Panel:
         for kind, mean in summary["rays"].items()
         if mean
     }
-    series, totals = _stacked(counts)
+    series, totals = _stacked(counts, counts)
     mean = sum(summary["rays"].values())
     return Panel(
         "rays",
@@ -131,12 +136,12 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
     """Predictions of the metric for the middles of segments, before and after segments are split (§4.3)."""
     judged = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
     chosen = {
-        ("before splitting", "square"): [s for s in judged if s["depth"] == 0],
-        ("after splitting", "circle"): [s for s in judged if not s["is_split"]],
+        ("before split", "square"): [s for s in judged if s["depth"] == 0],
+        ("after split", "circle"): [s for s in judged if not s["is_split"]],
     }
     eyes = (
         ("pursuit", "percent_visible", VERMILION),
-        ("eye at rest", "percent_visible_no_pursuit", BLUE),
+        ("at rest", "percent_visible_no_pursuit", BLUE),
     )
     series = [
         Series(f"{eye}, {when}", color, {s["middle"]: s[key] for s in of if s.get(key) is not None}, mark)
@@ -147,7 +152,7 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
     split = sum(s["is_split"] for s in judged)
     return Panel(
         "predictions",
-        "Predicted visible pixels of segment middles",
+        "Predicted visible pixels",
         "%",
         f"Visible pixels that the metric predicts for segment middles: at most {most:.1f} percent; "
         f"{split} of {len(judged)} segments were split.",
@@ -157,11 +162,14 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
     )
 
 
-def _stacked(values: Mapping[str, Mapping[int, float]]) -> tuple[tuple[Series, ...], list[float]]:
-    """Bars of equal frames by name, in the colours of the palette, and their sum at each frame."""
+def _stacked(
+    values: Mapping[str, Mapping[int, float]], names: Iterable[str]
+) -> tuple[tuple[Series, ...], list[float]]:
+    """Bars of equal frames, in colours by the order of names, and their sum at each frame."""
+    colors = dict(zip(dict.fromkeys(names), itertools.cycle(PALETTE), strict=False))
     frames = sorted({frame for of in values.values() for frame in of})
     series = tuple(
-        Series(spoken(name), PALETTE[i % len(PALETTE)], {f: of.get(f, 0.0) for f in frames}, "bar")
-        for i, (name, of) in enumerate(values.items())
+        Series(spoken(name), colors[name], {f: of.get(f, 0.0) for f in frames}, "bar")
+        for name, of in values.items()
     )
     return series, [sum(s.values[f] for s in series) for f in frames]

@@ -16,6 +16,7 @@ from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
 from enfilade.records import F32, U8, Flow
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import RUN_FILE
 from enfilade.runs.job import JOB_FILE
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import holder_of
@@ -91,7 +92,9 @@ class ReportedRun:
         self.viewing_settings, self.video = _settings(folder)
         self.viewing = Terms(viewing=self.viewing_settings).conditions(tuple(path["size"]), path["fps"])
         self.holder = holder_of(folder)
-        self.last_result = datetime.fromtimestamp((folder / LEDGER_FILE).stat().st_mtime, UTC)
+        ledger = folder / LEDGER_FILE
+        changed = ledger if ledger.exists() else folder / RUN_FILE
+        self.last_result = datetime.fromtimestamp(changed.stat().st_mtime, UTC)
         there = {self.numbers[i] for i in self.there}
         lost = [str(n) for n in self.numbers if self._run.was_finished(FRAMES, n) and n not in there]
         self.notes = list(self._run.notes)

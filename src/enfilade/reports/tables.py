@@ -9,9 +9,16 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from enfilade.reports.panels import spoken
-
-__all__ = ["TRACED", "comparison_table", "percent", "plan_tables", "result_line", "run_tables", "seconds"]
+__all__ = [
+    "TRACED",
+    "comparison_table",
+    "percent",
+    "plan_tables",
+    "result_line",
+    "run_tables",
+    "seconds",
+    "spoken",
+]
 
 TRACED = {  # columns of Table 1, by key of the summary
     "slow": "slow",
@@ -64,6 +71,11 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
     whole = {**found, "velocity_deg_s": velocity}
     table.add_row("sequence", *_difference(whole, found["percent_visible"]["mean"]))
     return table
+
+
+def spoken(name: str) -> str:
+    """The name of a pass or of a kind of rays as words: ``hash_grid`` is "hash grid"."""
+    return name.replace("_", " ")
 
 
 def percent(value: float) -> str:
