@@ -45,14 +45,15 @@ def render(
     out
         The run folder. With the same arguments the call continues where it stopped.
     method
-        ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can import.
+        ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can
+        import.
     settings
         A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``.
     device
         ``cpu``, ``gpu``, or ``auto``: the GPU where there is one.
     executor
-        ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module: guard its
-        work by ``if __name__ == "__main__"``.
+        ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module:
+        guard its work by ``if __name__ == "__main__"``.
     workers
         Number of worker processes; None: one for each GPU, or CPU core.
     monitor
