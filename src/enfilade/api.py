@@ -112,7 +112,7 @@ def plan(
 
 
 def compare(
-    test: File, reference: File, *, device: Choice = "auto", monitor: Monitor | None = None, **terms: Any
+    test: File, reference: File, *, monitor: Monitor | None = None, **terms: Any
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
 
@@ -120,7 +120,6 @@ def compare(
     ----------
     test, reference
         Run folders, videos, folders of images, or patterns such as ``frames/%04d.exr``.
-    device
     monitor
     terms
         Fields of :class:`enfilade.comparison.Terms`.
@@ -134,7 +133,6 @@ def compare(
     ImageError
         A sequence can't be read, or the two can't be compared.
     """
-    activate(device)
     from enfilade.comparison import Terms
     from enfilade.comparison import compare as compare_sequences
 
