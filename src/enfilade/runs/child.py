@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enfilade.resource_limits import die_with
 from enfilade.device import activate, load
+from enfilade.resource_limits import die_with
 from enfilade.runs.failure import Failure
 
 if TYPE_CHECKING:

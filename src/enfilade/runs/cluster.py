@@ -101,8 +101,8 @@ class Cluster:
             yield
         except (self._ray.exceptions.RayError, ConnectionError) as error:
             raise EnfiladeError(
-                f"the Ray cluster does not answer: {_first_line(error)}; start one, then run the same command "
-                "again"
+                f"the Ray cluster does not answer: {_first_line(error)}; start one, then run the same "
+                "command again"
             ) from error
 
     def _connect(self, address: str, *, cpus: int) -> None:

@@ -239,7 +239,7 @@ class RunFolder:
         return found
 
     def forget(self, name: str) -> None:
-        """Remove a damaged file, so that its task counts as not done; one that was made again meanwhile stays.
+        """Remove a damaged file, so that its task counts as not done; one that was made again stays.
 
         Raises
         ------
