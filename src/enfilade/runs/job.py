@@ -148,8 +148,8 @@ class Job:
     def _check_lobes(self, why_inseparable: str) -> None:
         if why_inseparable and self.opened_method().needs_lobes:
             raise SettingsError(
-                f"--method {self.method} can't render {self.scene.file}: {why_inseparable}; take --method paper "
-                "or --method reference"
+                f"--method {self.method} can't render {self.scene.file}: {why_inseparable}; take --method "
+                "paper or reference"
             )
 
     def to_json(self) -> dict[str, Any]:
