@@ -204,7 +204,8 @@ def make_run(folder: Path) -> Path:
 
 
 def read_run(file: Path) -> None:
-    """Read a run, and continue a copy of it."""
+    """Read a run as the report does, and continue a copy of it."""
+    from enfilade.reports.run import ReportedRun
     from enfilade.runs.folder import RunFolder
 
     folder = file.parent
@@ -212,10 +213,11 @@ def read_run(file: Path) -> None:
     shutil.copytree(folder, copy)
     identity = json.loads((folder.parent / IDENTITY).read_text())
     try:
-        for opening in (lambda: RunFolder.read(folder), lambda: RunFolder.create(copy, identity)):
-            with contextlib.suppress(EnfiladeError), opening() as run:
-                run.damaged()
-                run.digest()
+        with contextlib.suppress(EnfiladeError):
+            ReportedRun(folder)
+        with contextlib.suppress(EnfiladeError), RunFolder.create(copy, identity) as run:
+            run.damaged()
+            run.digest()
     finally:
         shutil.rmtree(copy)
 

@@ -45,14 +45,15 @@ def render(
     out
         The run folder. With the same arguments the call continues where it stopped.
     method
-        ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can import.
+        ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can
+        import.
     settings
         A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``.
     device
         ``cpu``, ``gpu``, or ``auto``: the GPU where there is one.
     executor
-        ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module: guard its
-        work by ``if __name__ == "__main__"``.
+        ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module:
+        guard its work by ``if __name__ == "__main__"``.
     workers
         Number of worker processes; None: one for each GPU, or CPU core.
     monitor
@@ -111,7 +112,7 @@ def plan(
 
 
 def compare(
-    test: File, reference: File, *, device: Choice = "auto", monitor: Monitor | None = None, **terms: Any
+    test: File, reference: File, *, monitor: Monitor | None = None, **terms: Any
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
 
@@ -119,7 +120,6 @@ def compare(
     ----------
     test, reference
         Run folders, videos, folders of images, or patterns such as ``frames/%04d.exr``.
-    device
     monitor
     terms
         Fields of :class:`enfilade.comparison.Terms`.
@@ -133,7 +133,6 @@ def compare(
     ImageError
         A sequence can't be read, or the two can't be compared.
     """
-    activate(device)
     from enfilade.comparison import Terms
     from enfilade.comparison import compare as compare_sequences
 

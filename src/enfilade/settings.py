@@ -151,7 +151,7 @@ class ReferenceSettings(Section):
 
 @dataclass(frozen=True)
 class ViewingSettings(Section):
-    """Who looks at the video, and on what (§5.2): this fixes pixels per degree."""
+    """Viewing conditions of the video (§5.2), from which the pixels per degree follow."""
 
     table = "viewing"
 
@@ -187,7 +187,10 @@ class WarpSettings(Section):
     table = "warp"
 
     max_magnification: float = option(
-        4.0, "Splats stretch to at most this many pixels a side; beyond is a hole.", least=1.0, most=16.0
+        4.0,
+        "Splats stretch to at most this many pixels a side; beyond, a pixel is disoccluded.",
+        least=1.0,
+        most=16.0,
     )
     depth_tolerance: float = option(
         0.02, "Relative difference of depth within which two samples are one surface.", least=1e-5, most=0.5
@@ -217,7 +220,10 @@ class MaskSettings(Section):
         2.0, "A specular region with a difference above this is traced, JND.", least=0.0
     )
     specular_percent: float = option(
-        25.0, "... or with more of its pixels above 1 JND than this, percent.", least=0.0, most=100.0
+        25.0,
+        "A specular region with more of its pixels above 1 JND is traced, percent.",
+        least=0.0,
+        most=100.0,
     )
     split_percent: float = option(
         10.0, "A segment with more of its unmasked pixels above 1 JND is split, percent.",

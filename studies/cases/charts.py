@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, SOURCE_COLORS, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, PROVENANCE_COLORS, VERMILION, Figure, save
 
 __all__ = [
     "draw_placement",
@@ -23,7 +23,7 @@ COLORS = (BLUE, VERMILION, GREEN, ORANGE, "#56B4E9", "#CC79A7", "#000000", "#999
 MARKS = ("o", "s", "^", "D", "v", "X", "P", "*")
 WAYS = {"art": "ART", "rt": "RT", "ibr_rt": "IBR+RT (paper)", "decoupled": "decoupled"}
 STAGE_COLORS = {
-    "trace": SOURCE_COLORS["keyframe"],
+    "trace": PROVENANCE_COLORS["keyframe"],
     "warp": GREEN,
     "antialias": BLUE,
     "metric": VERMILION,

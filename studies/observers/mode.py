@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from enfilade.metric import Aqm
-from enfilade.metric.castlecsf import castle_sensitivity
+from enfilade.metric.castlecsf import castlecsf_sensitivity
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import EYE_DRIFT_DEG_S
 from enfilade.viewing import Viewing
@@ -44,7 +44,7 @@ def _eq_4(frequency_cpd: float, temporal_hz: float, _luminance_cd_m2: float, _ar
 
 
 def _castlecsf(frequency_cpd: float, temporal_hz: float, luminance_cd_m2: float, area_deg2: float) -> float:
-    return float(castle_sensitivity(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2))
+    return float(castlecsf_sensitivity(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2))
 
 
 PAPER = Mode("paper", Aqm.paper, _eq_4)

@@ -1,12 +1,15 @@
 import json
-import sys
-from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from enfilade.cli import main
-from made_up_runs import made_up_summary
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="path"/>
+  <shape type="sphere"><point name="center" x="0" y="0" z="-4"/></shape>
+  <emitter type="constant"/>
+</scene>"""
 
 
 @pytest.fixture
@@ -19,9 +22,11 @@ def run():
 
 @pytest.fixture
 def camera_path(tmp_path):
-    """Three frames of nerfstudio's format, 64x48."""
-    identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-    cameras = [{"camera_to_world": identity, "fov": 50, "aspect": 4 / 3} for _ in range(3)]
+    """Three frames of nerfstudio's format, 64x48, that move sideways."""
+    cameras = [
+        {"camera_to_world": [1, 0, 0, 0.02 * x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "fov": 50}
+        for x in range(3)
+    ]
     file = tmp_path / "camera_path.json"
     values = {"render_width": 64, "render_height": 48, "fps": 24, "camera_type": "perspective"}
     file.write_text(json.dumps({**values, "seconds": 0.125, "camera_path": cameras}))
@@ -29,34 +34,38 @@ def camera_path(tmp_path):
 
 
 @pytest.fixture
+def scene(tmp_path):
+    """A white sphere under a white sky."""
+    file = tmp_path / "scene.xml"
+    file.write_text(SCENE)
+    return file
+
+
+@pytest.fixture
+def line(scene, camera_path, tmp_path):
+    """A quick `enfilade render` command."""
+    size = ("--size", "16x12", "--method", "reference", "--spp", "2", "--device", "cpu", "--quiet")
+    return ("render", scene, "--path", camera_path, "--out", tmp_path / "run", *size)
+
+
+@pytest.fixture
 def jobs(monkeypatch):
-    """Stands for the pipeline: takes the jobs that the command line makes, and does what it is told."""
-    told = SimpleNamespace(seen=[], answer=made_up_summary(), error=None)
+    """Jobs that `render` and `plan` are called with, in place of the work; `jobs.error` is raised."""
+    from enfilade.runs import plan, render
 
-    def take(job):
-        told.seen.append(job)
-        if told.error is not None:
-            raise told.error
-        return told.answer
+    class Jobs(list):
+        error = None
+        workers = None
 
-    def render(job, folder, monitor, crew, *, is_verified, is_tried):
-        told.crew, told.is_verified = crew, is_verified
-        answer = take(job)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "summary.json").write_text(json.dumps(answer))
-        return answer
+    seen = Jobs()
 
-    def prepare(job, folder, *, is_tried):
-        take(job)
+    def take(job, *arguments, **options):
+        seen.append(job)
+        seen.workers = arguments[2] if len(arguments) > 2 else None
+        if seen.error is not None:
+            raise seen.error
+        raise SystemExit(0)
 
-    def plan(job, monitor, *, is_tried):
-        answer = take(job)
-        return SimpleNamespace(to_dict=lambda: answer)
-
-    def fake(name, **members):
-        monkeypatch.setitem(sys.modules, f"enfilade.pipeline.{name}", SimpleNamespace(**members))
-
-    fake("job", Job=SimpleNamespace)
-    fake("walkthrough", render=render, prepare=prepare)
-    fake("plan", plan=plan)
-    return told
+    monkeypatch.setattr(render, "render", take)
+    monkeypatch.setattr(plan, "plan", take)
+    return seen

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from enfilade.pipeline import installation
-from enfilade.pipeline.installation import Check, examine
+from enfilade import installation
+from enfilade.installation import Check, examine
 
 
 def test_this_machine_is_ready(run):

@@ -1,4 +1,4 @@
-"""Every option says what it does, and help answers at once."""
+"""Every option has help, and help loads nothing heavy."""
 
 import subprocess
 import sys
@@ -11,8 +11,7 @@ from enfilade.cli import main
 from enfilade.cli.group import COMMANDS
 
 HEAVY = (
-    "mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "numpy", "scipy", "trimesh", "PIL", "rich", "jinja2",
-    "plotly",
+    "mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "numpy", "scipy", "PIL", "rich", "jinja2", "ray",
 )  # fmt: skip
 
 
@@ -34,11 +33,9 @@ def test_help_answers(run, arguments):
     assert result.output.startswith("Usage: enfilade")
 
 
-def test_help_of_render_lists_the_settings_by_stage(run):
-    output = run("render", "--help").output
-    assert "Initial placement of keyframes (§4.2) [keyframes]:" in output
-    assert "--keyframes-spacing INTEGER" in output
-    assert "[default: 25; at least 2]" in " ".join(output.split())
+def test_render_has_at_most_30_flags():
+    options = [p for p in main.get_command(click.Context(main), "render").params if isinstance(p, click.Option)]
+    assert len(options) <= 30
 
 
 def test_version(run):

@@ -1,6 +1,6 @@
 import pytest
 
-from comparisons import write_sequence
+from support.sequences import write_sequence
 
 
 @pytest.fixture

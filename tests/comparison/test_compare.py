@@ -9,17 +9,18 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from comparisons import SIZE, Notes, judged, terms, textured
 from enfilade.comparison import compare
 from enfilade.errors import ImageError, InputError
+from enfilade.metric import SequenceAqm
 from enfilade.viewing import display_named
+from support.sequences import SIZE, Notes, compared, terms, textured
 
 
 @pytest.mark.parametrize("mode", ["paper", "modern"])
 @pytest.mark.parametrize("flow", ["none", "estimate"])
 def test_equal_sequences_have_exactly_no_difference(sequence, mode, flow):
     folder = sequence("a", [textured(2.0 * i) for i in range(4)])
-    found = judged(folder, folder, mode=mode, flow=flow)
+    found = compared(folder, folder, mode=mode, flow=flow)
     assert found.score == 0.0
     assert [f.percent_visible for f in found.frames] == [0.0] * 4
     assert not any(any(part.bands) for f in found.frames for part in (f.steady, f.transient))
@@ -32,7 +33,7 @@ def test_equal_sequences_have_exactly_no_difference(sequence, mode, flow):
 def test_a_visible_difference_is_found_in_its_frame(sequence, mode):
     good = [textured(), textured(), textured()]
     bad = [textured(), textured(3.0), textured()]
-    found = judged(sequence("bad", bad), sequence("good", good), mode=mode, flow="none").to_dict()
+    found = compared(sequence("bad", bad), sequence("good", good), mode=mode, flow="none").to_dict()
     assert found["per_frame"][0]["score_jnd"] == 0.0
     assert found["per_frame"][1]["percent_visible"] > 50.0
     assert found["worst_frame"] == 1
@@ -46,15 +47,15 @@ def test_flicker_counts_as_transient_and_blur_as_steady(sequence):
     blurred = np.stack([gaussian_filter(still[..., c], 2.0) for c in range(3)], axis=-1)
     noisy = [np.clip(still + rng.normal(0.0, 0.05, (*SIZE, 1)), 0, 1).astype(np.float32) for _ in range(4)]
     reference = sequence("reference", [still] * 4)
-    blur = judged(sequence("blur", [blurred] * 4), reference, flow="none").to_dict()
-    noise = judged(sequence("noise", noisy), reference, flow="none").to_dict()
+    blur = compared(sequence("blur", [blurred] * 4), reference, flow="none").to_dict()
+    noise = compared(sequence("noise", noisy), reference, flow="none").to_dict()
     assert blur["transient_jnd"] < 0.01 * blur["steady_jnd"]
     assert noise["transient_jnd"] > 0.2 * noise["steady_jnd"]
 
 
 def test_psnr_is_that_of_the_encoded_images(sequence):
     white, black = np.ones((*SIZE, 3), np.float32), np.zeros((*SIZE, 3), np.float32)
-    found = judged(sequence("white", [white, white]), sequence("black", [black, white]), flow="none")
+    found = compared(sequence("white", [white, white]), sequence("black", [black, white]), flow="none")
     assert found.psnr_db == pytest.approx(10.0 * math.log10(2.0))  # one of two frames is wrong by 1
 
 
@@ -72,15 +73,15 @@ def test_swapping_changes_little(sequence, fault):
             image[20:28, 30:38] *= 0.6
     one, other = sequence("bad", bad), sequence("good", good)
     screen = display_named("paper")
-    there, back = (judged(*pair, display=screen).score for pair in ((one, other), (other, one)))
+    there, back = (compared(*pair, display=screen).score for pair in ((one, other), (other, one)))
     assert there > 0.2
-    assert back == pytest.approx(there, rel=0.1)  # docs/compare.md
+    assert back == pytest.approx(there, rel=0.1)  # docs/metric.md
 
 
 def test_a_frame_at_the_end_of_a_shot_moves_as_fast_as_the_others(sequence):
     forward = np.full((*SIZE, 2), 2.0, np.float32)
     folder = sequence("a", [textured()], layers={"forward": forward, "backward": np.zeros_like(forward)})
-    found = judged(folder, folder)
+    found = compared(folder, folder)
     expected = found.viewing.velocity_deg_s(math.hypot(2.0, 2.0))
     assert found.frames[0].velocity_deg_s == pytest.approx(expected, rel=1e-5)
 
@@ -89,7 +90,7 @@ def test_fast_motion_hides_what_is_seen_at_rest_by_a_resting_eye(sequence):
     reference = sequence("still", [textured()])
     moving = sequence("moving", [textured()], flow_px=40.0)
     test = sequence("test", [textured(0.2)])
-    scores = [judged(test, r, metering="none").score for r in (moving, reference)]
+    scores = [compared(test, r, metering="none").score for r in (moving, reference)]
     assert scores[0] < scores[1]
 
 
@@ -97,7 +98,7 @@ def test_exposure_is_for_scene_linear_frames_alone(sequence, tmp_path):
     dark = sequence("dark", [np.full((*SIZE, 3), 0.25, np.float32)])
     shown = np.full((*SIZE, 3), 188, np.uint8)  # sRGB of 0.5
     Image.fromarray(shown).save(tmp_path / "shown.png")
-    found = judged(tmp_path / "shown.png", dark, exposure_ev=1.0)
+    found = compared(tmp_path / "shown.png", dark, exposure_ev=1.0)
     assert found.frames[0].percent_visible == 0.0
     assert found.psnr_db > 45.0
 
@@ -107,7 +108,8 @@ def run_of(folder, exposure_ev):
     run = folder.with_name(f"run{exposure_ev:+g}")
     shutil.copytree(folder, run / "frames")
     settings = {"viewing": {"exposure_ev": exposure_ev}}
-    (run / "run.json").write_text(json.dumps({"identity": {"path": {"fps": 30.0}, "settings": settings}}))
+    (run / "run.json").write_text(json.dumps({"identity": {"path": {"fps": 30.0}}}))
+    (run / "job.json").write_text(json.dumps({"settings": settings}))
     return run
 
 
@@ -115,13 +117,13 @@ def test_a_run_is_shown_at_its_own_exposure(sequence, tmp_path):
     dark = sequence("dark", [np.full((*SIZE, 3), 0.25, np.float32)])
     brighter, same = run_of(dark, 1.0), run_of(dark, 0.0)
     Image.fromarray(np.full((*SIZE, 3), 188, np.uint8)).save(tmp_path / "shown.png")  # sRGB of 0.5
-    assert judged(tmp_path / "shown.png", brighter).psnr_db > 45.0
-    assert judged(brighter, dark).psnr_db == math.inf  # scene-linear frames beside a run take its exposure
-    assert judged(tmp_path / "shown.png", same).psnr_db < 20.0
-    assert judged(tmp_path / "shown.png", brighter, exposure_ev=0.0).psnr_db < 20.0
-    with pytest.raises(ImageError, match=r"\+1 stops.*\+0.*--viewing-exposure-ev"):
-        judged(brighter, same)
-    assert judged(brighter, same, exposure_ev=0.0).psnr_db == math.inf
+    assert compared(tmp_path / "shown.png", brighter).psnr_db > 45.0
+    assert compared(brighter, dark).psnr_db == math.inf  # scene-linear frames beside a run take its exposure
+    assert compared(tmp_path / "shown.png", same).psnr_db < 20.0
+    assert compared(tmp_path / "shown.png", brighter, exposure_ev=0.0).psnr_db < 20.0
+    with pytest.raises(ImageError, match=r"\+1 stops.*\+0.*--exposure-ev"):
+        compared(brighter, same)
+    assert compared(brighter, same, exposure_ev=0.0).psnr_db == math.inf
 
 
 def test_the_slope_of_masking_counts_in_the_papers_mode(sequence):
@@ -129,7 +131,7 @@ def test_the_slope_of_masking_counts_in_the_papers_mode(sequence):
     texture = random.uniform(0.1, 0.9, (*SIZE, 1)).repeat(3, axis=2).astype(np.float32)
     folder, other = sequence("a", [texture]), sequence("b", [np.roll(texture, 1, axis=0)])
     scores = {
-        (mode, slope): judged(folder, other, mode=mode, mask_slope=slope).score
+        (mode, slope): compared(folder, other, mode=mode, mask_slope=slope).score
         for mode in ("paper", "modern")
         for slope in (0.0, 0.7)
     }
@@ -157,14 +159,14 @@ def test_the_screen_is_said_where_none_is_named(sequence):
     folder = sequence("a", [textured()])
     for display, said in ((None, True), (display_named("phone"), False)):
         notes = Notes()
-        judged(folder, folder, notes, display=display)
+        compared(folder, folder, notes, display=display)
         assert any("fills a diagonal of 0.25 m" in line for line in notes.said) == said
 
 
 def test_a_display_shows_pixel_for_pixel(sequence):
     folder = sequence("a", [textured()])
     display = display_named("desktop-24-fhd")
-    found = judged(folder, folder, display=display)
+    found = compared(folder, folder, display=display)
     whole = display.viewing(1920, 1080, 30.0)
     assert found.viewing.pixels_per_degree == pytest.approx(whole.pixels_per_degree)
     assert found.viewing.peak_cd_m2 == 200.0
@@ -176,6 +178,6 @@ def test_what_the_metric_refuses_names_the_frame(sequence, monkeypatch):
     def refuse(*_arguments, **_options):
         raise InputError("metric: no")
 
-    monkeypatch.setattr("enfilade.comparison.judge.SequenceAqm.compare", refuse)
-    with pytest.raises(ImageError, match=r"0001\.exr can't be judged: metric: no"):
-        judged(folder, folder)
+    monkeypatch.setattr(SequenceAqm, "compare", refuse)
+    with pytest.raises(ImageError, match=r"0001\.exr can't be compared: metric: no"):
+        compared(folder, folder)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons import SIZE, Notes, judged, textured, write_run
 from enfilade.comparison.motion import flow_of_layers
 from enfilade.errors import ImageError
+from support.sequences import SIZE, Notes, compared, textured, write_run
 
 RIGHT, DOWN = 3.0, -2.0  # of the surface, pixels per frame
 
@@ -39,7 +39,7 @@ def test_the_vector_pass_that_blender_writes_is_read_from_its_file(sequence):
     layers = {f"View Layer.Vector.{c}": plane(v) for c, v in zip("XYZW", (-3, -2, -3, -2), strict=True)}
     notes = Notes()
     folder = sequence("blender", [textured(), textured(3.0)], layers=layers)
-    found = judged(folder, folder, notes)
+    found = compared(folder, folder, notes)
     assert found.flow == "layers"
     assert "Blender's Vector pass" in notes.said[0]
     assert found.frames[0].velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(np.hypot(3.0, 2.0)))
@@ -55,7 +55,7 @@ def test_flow_comes_from_the_layers_of_the_reference_or_the_test(sequence):
     plain, told = sequence("plain", [textured(1.0)]), sequence("told", [textured()], flow_px=2.0)
     for test, reference, role in ((plain, told, "reference"), (told, plain, "test")):
         notes = Notes()
-        found = judged(test, reference, notes)
+        found = compared(test, reference, notes)
         assert found.flow == "layers"
         assert f"the {role}'s layers" in notes.said[0]
         assert found.frames[0].velocity_deg_s == pytest.approx(found.viewing.velocity_deg_s(2.0), rel=1e-5)
@@ -67,7 +67,7 @@ def test_without_layers_it_is_estimated_and_that_is_said(tmp_path):
     for i in range(3):
         Image.fromarray(wide[:, 2 * i : 2 * i + 120]).convert("RGB").save(tmp_path / f"{i}.png")
     notes = Notes()
-    found = judged(tmp_path, tmp_path, notes)
+    found = compared(tmp_path, tmp_path, notes)
     assert found.flow == "estimate"
     assert "estimated from the reference" in notes.said[0]
     for frame in found.frames:  # ends included; at the borders it can't be exact
@@ -79,7 +79,7 @@ def test_none_and_a_single_image_stand_still(sequence):
     two = sequence("two", [textured(), textured(2.0)], flow_px=2.0)
     for folder, flow in ((one, "auto"), (one, "estimate"), (two, "none")):
         notes = Notes()
-        found = judged(folder, folder, notes, flow=flow)
+        found = compared(folder, folder, notes, flow=flow)
         assert (found.flow, found.frames[0].velocity_deg_s) == ("none", 0.0)
         assert "stood still" in notes.said[0]
 
@@ -89,7 +89,7 @@ def test_layers_that_are_asked_for_have_to_be_there(sequence):
     with pytest.raises(
         ImageError, match=r"neither .*0001\.exr.* has layers of image flow; known are: .*Vector"
     ):
-        judged(plain, plain, flow="layers")
+        compared(plain, plain, flow="layers")
 
 
 def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
@@ -97,12 +97,12 @@ def test_layers_that_end_or_hold_a_nan_name_the_frame(sequence):
     sequence("rest", [textured(), textured()])
     (ends.parent / "rest" / "0002.exr").rename(ends / "0002.exr")
     with pytest.raises(ImageError, match=r"0002\.exr has no layers forward"):
-        judged(ends, ends)
+        compared(ends, ends)
     bad = np.zeros((*SIZE, 2), np.float32)
     bad[3, 4] = np.nan
     broken = sequence("broken", [textured()], layers={"forward": bad, "backward": bad})
     with pytest.raises(ImageError, match=r"0001\.exr has NaN or infinite values in its image flow"):
-        judged(broken, broken)
+        compared(broken, broken)
 
 
 def moving_right(step_px):
@@ -118,7 +118,7 @@ def test_a_cut_between_shots_that_move_is_found_without_flow_to_the_last_frame(s
     test, reference = (
         sequence(name, images, layers=moving_right(2.0)) for name, images in (("t", faulty), ("r", shots))
     )
-    found = judged(test, reference)
+    found = compared(test, reference)
     assert found.flow == "layers"
     assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 6, abs=1e-3)
     assert min(f.steady.score for f in found.frames) > 0.1
@@ -134,7 +134,7 @@ def test_motion_that_changes_the_whole_image_is_no_cut(sequence):
     test, reference = (
         sequence(name, images, layers=moving_right(16.0)) for name, images in (("t", faulty), ("r", shots))
     )
-    found = judged(test, reference)
+    found = compared(test, reference)
     assert [f.transient.score > 1.0 for f in found.frames] == [False, True, True]
 
 
@@ -150,7 +150,7 @@ def test_what_flickers_at_a_cut_is_not_counted(sequence, levels):
     for image in faulty:
         image[10:30, 10:30] *= 0.5
     test, reference = sequence("t", faulty, layers=layers), sequence("r", shots, layers=layers)
-    found = judged(test, reference)
+    found = compared(test, reference)
     assert [f.transient.score for f in found.frames] == [0.0] * 4
     assert min(f.steady.score for f in found.frames) > 0.1
 
@@ -169,7 +169,7 @@ def test_noise_before_a_resting_camera_is_no_cut(sequence):
     noisy = [(still * rng.uniform(0.6, 1.4, (*SIZE, 1))).astype(np.float32) for _ in range(3)]
     layers = {"forward": STILL, "backward": STILL}
     test, reference = sequence("t", flickering(noisy), layers=layers), sequence("r", noisy, layers=layers)
-    transient = [f.transient.score for f in judged(test, reference).frames]
+    transient = [f.transient.score for f in compared(test, reference).frames]
     assert transient[0] == 0.0
     assert min(transient[1:]) > 0.5
 
@@ -183,6 +183,6 @@ def test_a_run_says_where_shots_begin_and_what_is_missing(tmp_path, flow):
         options = {"selected": selected, "cuts": [2], "flow_px": 0.5}
         test = write_run(tmp_path / name / "t", flickering(images), (1, 2, 3, 6), **options)
         reference = write_run(tmp_path / name / "r", images, (1, 2, 3, 6), **options)
-        found = judged(test, reference, flow=flow)
+        found = compared(test, reference, flow=flow)
         transients.append([f.transient.score > 0.1 for f in found.frames])
     assert transients == [[False, False, True, False], [False, False, True, True]]

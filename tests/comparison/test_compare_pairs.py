@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons import SIZE, Notes, judged, terms, textured, write_run
 from enfilade.comparison import compare
 from enfilade.errors import ImageError
 from enfilade.images import encode_video
 from enfilade.images.imagefiles import ImageFiles
 from enfilade.settings import VideoSettings
+from support.sequences import SIZE, Notes, compared, terms, textured, write_run
 
 
 def video(file, images, fps):
@@ -23,25 +23,25 @@ def video(file, images, fps):
 
 def test_fps_is_given_or_the_sequences_or_the_default(sequence, tmp_path):
     folder = sequence("a", [textured()])
-    assert judged(folder, folder).viewing.fps == 30.0
-    assert judged(folder, folder, fps=60.0).viewing.fps == 60.0
+    assert compared(folder, folder).viewing.fps == 30.0
+    assert compared(folder, folder, fps=60.0).viewing.fps == 60.0
     film = video(tmp_path / "a.mkv", [textured()], Fraction(24))
-    assert judged(folder, film).viewing.fps == judged(film, folder).viewing.fps == 24.0
+    assert compared(folder, film).viewing.fps == compared(film, folder).viewing.fps == 24.0
 
 
 def test_frame_rates_that_differ(tmp_path):
     slow = video(tmp_path / "slow.mkv", [textured()] * 2, Fraction(24))
     fast = video(tmp_path / "fast.mkv", [textured()] * 2, Fraction(30))
     with pytest.raises(ImageError, match=r"24 frames .*slow\.mkv.* 30 .*fast\.mkv.*--fps"):
-        judged(slow, fast)
-    assert judged(slow, fast, fps=25.0).viewing.fps == 25.0
+        compared(slow, fast)
+    assert compared(slow, fast, fps=25.0).viewing.fps == 25.0
     ntsc = video(tmp_path / "ntsc.mkv", [textured()] * 2, Fraction(30000, 1001))
-    assert judged(ntsc, fast).viewing.fps == pytest.approx(30.0)
+    assert compared(ntsc, fast).viewing.fps == pytest.approx(30.0)
 
 
 def test_a_video_and_its_frames_are_the_same(sequence, tmp_path):
     images = [textured(float(i)) for i in range(3)]
-    found = judged(video(tmp_path / "a.mkv", images, 30), sequence("a", images), flow="none")
+    found = compared(video(tmp_path / "a.mkv", images, 30), sequence("a", images), flow="none")
     assert found.psnr_db > 60.0  # 12 bits
     assert found.score < 0.2
 
@@ -49,10 +49,10 @@ def test_a_video_and_its_frames_are_the_same(sequence, tmp_path):
 def test_sequences_that_differ_in_length_or_size(sequence, tmp_path):
     one, two = sequence("one", [textured()]), sequence("two", [textured(), textured()])
     with pytest.raises(ImageError, match=r"1 frames .*one.* and the reference 2 .*two"):
-        judged(one, two)
+        compared(one, two)
     Image.fromarray(np.zeros((10, 20, 3), np.uint8)).save(tmp_path / "small.png")
     with pytest.raises(ImageError, match=r"20x10 .*small\.png.* and the reference's 64x48"):
-        judged(tmp_path / "small.png", one)
+        compared(tmp_path / "small.png", one)
 
 
 @pytest.mark.parametrize(
@@ -73,19 +73,19 @@ def test_runs_of_other_frames_are_refused(tmp_path, ours, theirs, message):
         for name, numbers in (("t", ours), ("r", theirs))
     )
     with pytest.raises(ImageError, match=message):
-        judged(test, reference)
+        compared(test, reference)
 
 
 def test_numbers_that_differ_are_paired_in_order_and_that_is_said_once(sequence):
     images = [textured()] * 3
     one, other = sequence("one", images, numbers=(1, 2, 3)), sequence("other", images, numbers=(1, 3, 4))
     notes = Notes()
-    assert judged(one, other, notes).score == 0.0
+    assert compared(one, other, notes).score == 0.0
     (said,) = [text for text in notes.said if "numbers differ" in text]
     assert said.endswith(f"{one}/0002.exr with {other}/0003.exr, and so on")
     for pair in ((one, one), (one / "0001.exr", other / "0003.exr")):
         notes = Notes()
-        judged(*pair, notes)
+        compared(*pair, notes)
         assert not any("numbers differ" in text for text in notes.said)
 
 
@@ -103,7 +103,7 @@ def test_another_camera_path_is_told(tmp_path, poses, selected, is_said):
     test = write_run(tmp_path / "t", images, numbers, poses="a")
     reference = write_run(tmp_path / "r", images, numbers, selected=selected, poses=poses)
     notes = Notes()
-    judged(test, reference, notes)
+    compared(test, reference, notes)
     said = [text for text in notes.said if "different camera paths" in text]
     assert len(said) == is_said
     assert all(str(test) in text and str(reference) in text for text in said)
@@ -123,7 +123,7 @@ def test_pixels_that_are_no_numbers_are_named(sequence, value, role):
     other = sequence("other", [bad])
     (other / "0001.exr").rename(folders[role] / "0002.exr")
     with pytest.raises(ImageError, match=rf"{role}/0002\.exr has 2 pixels .*row 7, column 5"):
-        judged(folders["test"], folders["reference"])
+        compared(folders["test"], folders["reference"])
 
 
 def test_negative_values_are_black_and_that_is_said_once(sequence):
@@ -132,7 +132,7 @@ def test_negative_values_are_black_and_that_is_said_once(sequence):
     below = dark.copy()
     below[:10] = -0.5
     notes = Notes()
-    found = judged(sequence("below", [below] * 3), sequence("dark", [dark] * 3), notes)
+    found = compared(sequence("below", [below] * 3), sequence("dark", [dark] * 3), notes)
     assert found.score == 0.0
     (said,) = [text for text in notes.said if "negative" in text]
     assert "below/0001.exr holds negative values" in said
@@ -147,14 +147,14 @@ def test_a_frame_that_cannot_be_read_is_named_when_it_comes(sequence, flow):
     with pytest.raises(ImageError, match=r"bad/0003\.exr is cut off or damaged"):
         compare(bad, good, terms(flow=flow), Notes(), show=lambda frames, _: seen.extend(frames))
     with pytest.raises(ImageError, match=r"bad/0003\.exr"):
-        judged(good, bad, flow=flow)
+        compared(good, bad, flow=flow)
 
 
 def test_transparent_frames_are_named(tmp_path):
     for name, alpha in (("1", 255), ("2", 255), ("3", 200)):
         Image.fromarray(np.full((*SIZE, 4), alpha, np.uint8)).save(tmp_path / f"{name}.png")
     with pytest.raises(ImageError, match=r"3\.png has transparent pixels"):
-        judged(tmp_path, tmp_path)
+        compared(tmp_path, tmp_path)
 
 
 def test_each_frame_is_read_once(sequence, monkeypatch):
@@ -164,7 +164,7 @@ def test_each_frame_is_read_once(sequence, monkeypatch):
     original = images.read_exr
     monkeypatch.setattr(images, "read_exr", lambda file: read.append(file.name) or original(file))
     test, reference = sequence("t", [textured()] * 5), sequence("r", [textured(0.5)] * 5, flow_px=1.0)
-    judged(test, reference)
+    compared(test, reference)
     later = [name for name in read if name != "0001.exr"]  # the first also tells size and layers
     assert sorted(later) == sorted(2 * [f"{i:04}.exr" for i in range(2, 6)])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.metric import Pursuit
-from enfilade.metric.castlecsf import castle_sensitivity
+from enfilade.metric.castlecsf import castlecsf_sensitivity
 from enfilade.metric.cortex import bands
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.pyramid import Pyramid
@@ -39,7 +39,7 @@ def test_table_is_the_formula(table):
 
 def test_table_by_luminance_is_the_formula():
     def csf(rho, speed, luminance):
-        return castle_sensitivity(rho, speed * rho, luminance, 1.0)
+        return castlecsf_sensitivity(rho, speed * rho, luminance, 1.0)
 
     table = SensitivityTable(csf, LADDER, PPD, by_luminance=True)
     speed, luminance = np.float32([0.15, 1.0, 7.0]), np.float32([0.01, 3.0, 900.0])

@@ -24,7 +24,9 @@ def test_twin(count):
         test = (reference + 8.0 * smooth[1] * (np.arange(shape[1]) > 30)).astype(np.float32)
         shown.append((reference, test))
         channels = zip(reference, test, strict=True)
-        maps = [[aperture.coarse(m, 1) for m in energy_difference(*pair)] for pair in channels]
+        maps = [
+            [aperture.coarse(m, 1) for m in energy_difference(*(c.copy() for c in pair))] for pair in channels
+        ]
         energies.append(aperture.integrate(np.stack(maps, axis=1), 1))
     places = [(0, 32), (24, 32), (24, 40), (40, 8), (24, 56)]
     found, expected = np.zeros(len(places)), np.zeros(len(places))

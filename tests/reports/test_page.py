@@ -1,4 +1,4 @@
-"""The page says what the run's files say, whatever state they are in."""
+"""The page contains the results of a run, in whatever state it is."""
 
 import base64
 import io
@@ -10,314 +10,218 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import enfilade
 from enfilade.comparison import Terms, compare
-from enfilade.errors import RunFolderError, SettingsError
-from enfilade.images import read_exr, write_exr
+from enfilade.errors import DamagedFileError, ImageError, RunFolderError, SettingsError
+from enfilade.images import read_exr
 from enfilade.images.view import open_view
 from enfilade.kernels.tone import srgb_encode
 from enfilade.monitor import Silence
 from enfilade.records import Provenance
-from enfilade.reports.film import encode_film
-from enfilade.reports.layers import SOURCE_COLORS
-from enfilade.reports.page import Wishes, write_page
-from enfilade.reports.seen import SeenRun
+from enfilade.reports.charts import PROVENANCE_COLORS
+from enfilade.reports.film import Film
+from enfilade.reports.page import write_report
+from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import percent
-from enfilade.settings import Settings, VideoSettings
-from enfilade.store.ledger import sealed
-from enfilade.store.lock import Lock
-from small_runs import TABLES
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.lock import Lock
+from enfilade.runs.statistics import statistics
+from enfilade.settings import VideoSettings
+from made_up_runs import made_up_run
 
-FRAMES = 10
+
+class Notes(Silence, list):
+    """A monitor that keeps messages."""
+
+    say = list.append
 
 
-def written(folder, tmp_path, **wishes):
+def written(folder, tmp_path, **terms):
     """Notes, text and data of a page."""
-    file = tmp_path / "report.html"
-    notes = write_page(folder, file, Wishes(**wishes), Silence())
-    text = file.read_text(encoding="utf-8")
+    notes = Notes()
+    text = write_report(folder, out=tmp_path / "report.html", monitor=notes, **terms).read_text()
     return notes, text, data_of(text)
 
 
 def data_of(text):
-    return json.loads(
-        re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1]
-    )
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    return json.loads(found[1])
+
+
+def numbers_of(data):
+    return [frame["number"] for frame in data["frames"]]
+
+
+def series_of(text, data):
+    """Values of the charts by panel and series."""
+    figures = re.findall(r"<figure>(.*?)</figure>", text, re.DOTALL)
+    found = {}
+    for figure, values in zip(figures, data["values"], strict=True):
+        names = re.findall(r"</span> (.*?) <b></b>", figure)
+        found[re.search(r'data-panel="(\w+)"', figure)[1]] = dict(zip(names, values, strict=True))
+    return found
 
 
 def picture(data, index, layer):
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(data["frames"][index]["layers"][layer]))))
 
 
-def unit_lines(folder):
-    return (folder / "ledger.jsonl").read_text().splitlines(keepends=True)
-
-
-def keep_lines(folder, is_kept):
-    read = [(line, json.loads(line)) for line in unit_lines(folder)]
-    kept = [line for line, value in read if "unit" not in value or is_kept(value["unit"])]
-    (folder / "ledger.jsonl").write_text("".join(kept))
-
-
-def test_it_says_what_the_summary_says(runs, page_file):
-    text, summary = page_file.read_text(), json.loads((runs / "paper" / "summary.json").read_text())
-    for share in summary["table1"].values():
-        assert f">{percent(share)}</td>" in text
-    for stage in summary["table2"]["stages"]:
+def test_charts_and_tables_have_the_figures_of_the_run(runs, page_file):
+    text = page_file.read_text()
+    summary = statistics(RunFolder.read(runs / "run"))
+    assert "finished</span> all 10 frames and the video" in text
+    for name in ("slow", "specular", "occlusion", "keyframes"):
+        assert f"<td>{percent(summary['table1'][name])}</td>" in text
+    for stage in ("gbuffer", "analysis", "probe", "frames", "video"):
         assert f'<th scope="row">{stage}</th>' in text
-    data = data_of(text)
-    assert [frame["effort"] for frame in data["frames"]] == [row["traced"] for row in summary["per_frame"]]
-    names = [panel["name"] for panel in data["panels"]]
-    assert names == ["velocity", "traced", "predictions", "score"]
-    assert data["panels"][0]["traces"][0]["y"] == pytest.approx(
-        [row["velocity_deg_s"] for row in summary["per_frame"]], abs=1e-4
-    )
+    series = series_of(text, data_of(text))
+    assert list(series) == ["velocity", "rays", "quality", "time"]
+    assert series["velocity"]["mean over the image"] == [
+        row["velocity_deg_s"] for row in summary["per_frame"]
+    ]
+    assert series["velocity"]["keyframes"] == [0.5, *[None] * 8, 5.0]
+    assert series["rays"]["probe rays"] == [2.0] * 10  # kinds of rays are words of the method
+    assert series["time"]["probe"] == [0.75] * 10
+    assert re.search(r'class="changed"><th scope="row" title="Seed[^"]*">seed</th><td>7 <small>\(0\)', text)
+    assert '<th scope="row" title="">count</th><td>3</td>' in text  # of a section of the method
 
 
 def test_nothing_comes_from_elsewhere(page_file):
     own = page_file.read_text().partition('id="data">')[0]
-    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", own)
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:|#)""", own)
     assert "default-src 'none'" in own
+    names = re.findall(r'\sid="([^"]*)"', own)
+    assert len(names) == len(set(names))
 
 
 def test_the_score_is_that_of_compare(runs, page_file):
-    terms = Terms(viewing=Settings.from_tables(TABLES).viewing)
-    found = compare(str(runs / "paper"), str(runs / "reference"), terms, Silence()).to_dict()
-    frames = data_of(page_file.read_text())["frames"]
+    found = compare(runs / "run", runs / "reference", Terms(), Silence()).to_dict()
+    text = page_file.read_text()
     scores = [row["score_jnd"] for row in found["per_frame"]]
-    assert [frame["score"] for frame in frames] == pytest.approx(scores, rel=1e-5)
-    assert [frame["psnr"] for frame in frames] == pytest.approx(
-        [row["psnr_db"] for row in found["per_frame"]], abs=1e-4
-    )
-    assert f"{found['score_jnd']:.2f} JND" in page_file.read_text()
+    assert series_of(text, data_of(text))["quality"]["score"] == pytest.approx(scores, abs=1e-3)
+    assert f"{found['score_jnd']:.2f} JND" in text
+    assert f"{found['psnr_db']:.2f} dB" in text
 
 
 def test_the_pictures_are_those_of_the_files(runs, page_file):
     data = data_of(page_file.read_text())
-    layers = read_exr(runs / "paper" / "frames" / "0004.exr")
-    expected = 255.0 * srgb_encode(np.clip(layers["RGB"].astype(np.float32), 0.0, 1.0))
-    shown = picture(data, 3, "result").astype(float)
-    assert np.abs(shown - expected).mean() < 6.0  # WebP loses a little, most at edges of colour
-    mapped = picture(data, 3, "source")
-    assert set(np.unique(layers["source"])) >= {Provenance.REUSED, Provenance.SPECULAR}
-    assert (mapped[layers["source"] == Provenance.REUSED][:, 3] == 0).all()
-    for source, color in SOURCE_COLORS.items():
-        assert (mapped[layers["source"] == source] == [*bytes.fromhex(color[1:]), 255]).all()
+    layers, other = (read_exr(runs / name / "frames" / "0004.exr") for name in ("run", "reference"))
+    ours, theirs = (255.0 * srgb_encode(of["RGB"].astype(np.float32)) for of in (layers, other))
+    assert np.abs(picture(data, 3, "result") - ours).mean() < 6.0  # WebP loses a little
+    painted = picture(data, 3, "provenance")
+    assert (painted[layers["provenance"] == Provenance.REUSED][:, 3] == 0).all()
+    for name, color in PROVENANCE_COLORS.items():
+        is_there = layers["provenance"] == Provenance[name.upper()]
+        assert (painted[is_there] == [*bytes.fromhex(color[1:]), 255]).all()
+    brightness, error = picture(data, 3, "difference").mean(axis=2), np.abs(ours - theirs).mean(axis=2)
+    assert np.corrcoef(brightness.ravel(), error.ravel())[0, 1] > 0.7
+    assert data["frames"][0]["kind"] == data["frames"][-1]["kind"] == "keyframe"
+    assert data["frames"][3]["kind"] == ""
 
 
-def test_without_a_reference_layers_are_missing_and_it_says_so(runs, tmp_path):
-    notes, _, data = written(runs / "paper", tmp_path)
-    assert [layer["key"] for layer in data["layers"]] == [1, 2, 4]
-    assert any("no map of probability" in note for note in notes)
+def test_without_a_reference_its_layers_are_missing(copied, tmp_path):
+    notes, text, data = written(copied, tmp_path)
+    assert [layer["name"] for layer in data["layers"]] == ["result", "provenance", "velocity"]
+    assert "Difference from the reference" not in text
+    assert notes == []
+    assert enfilade.report(copied) == copied / "report.html"
+    assert data_of((copied / "report.html").read_text()) == data
 
 
-def test_without_the_metric_there_is_a_difference(runs, tmp_path):
-    _, text, data = written(runs / "paper", tmp_path, reference=runs / "reference", has_metric=False)
-    assert [layer["name"] for layer in data["layers"]] == ["result", "source", "velocity", "difference"]
-    assert data["panels"][-1]["name"] == "psnr"
-    assert ">pixels above 1 JND<" not in text
-
-
-def test_a_running_run_is_shown_as_far_as_it_has_come(copied, tmp_path):
-    keep_lines(copied, lambda unit: unit not in ("frame 9", "frame 10", "video"))
-    with (copied / "ledger.jsonl").open("a") as ledger:
-        ledger.write('{"unit": "frame 9", "fil')  # being written just now
-    (copied / "summary.json").unlink()
-    before = {file: file.read_bytes() for file in copied.rglob("*") if file.is_file()}
-    lock = Lock(copied)
+def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
+    folder = made_up_run(tmp_path / "run", finished=(1, 2, 3, 5))
+    with (folder / "ledger.jsonl").open("a") as ledger:
+        ledger.write('{"pass": "frames", "fra')  # being written just now
+    before = {file: file.read_bytes() for file in folder.rglob("*.[!l]*")}
+    notes, text, data = written(folder, tmp_path)
+    assert "state-unfinished" in text
+    assert "4 of 10 frames, last result" in text
+    lock = Lock(folder)
     try:
-        notes, text, data = written(copied, tmp_path)
+        assert re.search(r"state-running.*4 of 10 frames, .*; process \d+ on", written(folder, tmp_path)[1])
     finally:
         lock.release()
-    assert "state-running" in text
-    assert "8 of 10 frames finished; process" in text
-    assert re.search(r"About \d+ s left, at the pace of the last 8 frames", text)
-    assert [frame["number"] for frame in data["frames"]] == list(range(1, FRAMES + 1))
-    assert [frame["number"] for frame in data["frames"] if frame["isRaw"]] == [9, 10]
-    assert "2 frames are shown before they are filtered over time, which the run has still to do" in notes
-    assert "velocity" not in data["frames"][-1]["layers"]
-    assert not any("damaged" in note for note in notes)
-    unchanged = {file: data for file, data in before.items() if file.name != "run.lock"}
-    assert all(file.read_bytes() == data for file, data in unchanged.items())
+    assert numbers_of(data) == [1, 2, 3, 5]
+    assert notes == []
+    assert {file: file.read_bytes() for file in folder.rglob("*.[!l]*")} == before  # of all but run.lock
 
 
-def test_a_run_that_was_stopped_early(copied, tmp_path):
-    keep_lines(copied, lambda unit: unit == "survey")
-    notes, text, data = written(copied, tmp_path)
-    assert "state-unfinished" in text
+def test_before_the_first_frame(tmp_path):
+    notes, text, data = written(made_up_run(tmp_path / "run", finished=()), tmp_path)
     assert "No frame to show yet" in text
-    assert notes == ["there is no frame to show yet"]
-    assert [panel["name"] for panel in data["panels"]] == ["velocity"]
+    assert notes == ["no frame is finished yet"]
+    assert data["frames"] == data["values"] == []
 
 
-def test_a_damaged_frame_is_named_and_left_out(copied, tmp_path):
-    file = copied / "frames" / "0003.exr"
-    file.write_bytes(file.read_bytes()[:500])
+def test_lost_and_damaged_files(copied, tmp_path):
+    (copied / "frames" / "0003.exr").write_bytes(b"no image")
+    (copied / "frames" / "0004.exr").unlink()
     notes, text, data = written(copied, tmp_path)
-    assert [frame["number"] for frame in data["frames"]] == [1, 2, *range(4, FRAMES + 1)]
-    assert any("frame 3 is left out" in note and "0003.exr" in note for note in notes)
-    assert "frame 3 is left out" in text
-
-
-def test_a_damaged_line_of_the_ledger_is_named_and_left_out(copied, tmp_path):
-    lines = unit_lines(copied)
-    number = next(i for i, line in enumerate(lines) if '"frame 5"' in line)
-    lines[number] = lines[number][:40] + "\n"
-    (copied / "ledger.jsonl").write_text("".join(lines))
+    assert numbers_of(data) == [1, 2, *range(5, 11)]
+    assert notes == ["the files of these frames are missing or damaged: 3, 4"]
+    assert notes[0] in text
+    file = copied / "frames" / "0005.exr"
+    file.write_bytes(file.read_bytes()[:-1] + b"?")
+    with pytest.raises(DamagedFileError, match=r"0005\.exr is missing or damaged"):
+        written(copied, tmp_path)
+    (copied / "ledger.jsonl").write_text((copied / "ledger.jsonl").read_text().replace("0005.exr", "9.exr"))
     notes, _, data = written(copied, tmp_path)
-    assert any(f"ledger.jsonl, line {number + 1} is damaged" in note for note in notes)
-    assert data["frames"][4]["isRaw"]  # its line of before antialiasing is whole
+    assert any("ledger.jsonl: line 12 is damaged" in note for note in notes)
+    assert numbers_of(data) == [1, 2, *range(6, 11)]
 
 
-def test_a_damaged_reference_leaves_the_frame(runs, copied, tmp_path):
-    reference = shutil.copytree(runs / "reference", tmp_path / "reference")
-    (reference / "frames" / "0002.exr").write_bytes(b"no image")
-    notes, _, data = written(copied, tmp_path, reference=reference)
-    assert any("frame 2 is shown without the reference" in note for note in notes)
-    assert "difference" not in data["frames"][1]["layers"]
-    assert data["frames"][1]["score"] is None
-    assert "difference" in data["frames"][2]["layers"]
-
-
-def test_what_is_no_run_is_refused(copied, tmp_path):
-    with pytest.raises(RunFolderError, match="no folder"):
-        written(tmp_path / "none", tmp_path)
-    with pytest.raises(RunFolderError, match="no run folder"):
-        written(tmp_path, tmp_path)
-    (copied / "run.json").write_text("{")
-    with pytest.raises(RunFolderError, match=r"run\.json is damaged"):
+def test_refused(runs, copied, tmp_path):
+    for folder in (tmp_path / "none", tmp_path):
+        with pytest.raises(RunFolderError, match="no run folder"):
+            written(folder, tmp_path)
+    for size in (0.5, float("nan")):
+        with pytest.raises(SettingsError, match="give 1 or more"):
+            written(copied, tmp_path, max_mb=size)
+    with pytest.raises(ImageError, match="run has the frame 4"):
+        written(copied, tmp_path, reference=made_up_run(tmp_path / "part", finished=(1, 2, 3)))
+    (copied / "job.json").write_text("{}")
+    with pytest.raises(RunFolderError, match=r"job\.json is damaged"):
         written(copied, tmp_path)
 
 
-def change_identity(folder, change):
-    table = json.loads((folder / "run.json").read_text())
-    change(table)
-    (folder / "run.json").write_text(json.dumps(table))
-    rest = [line for line in unit_lines(folder) if "unit" in json.loads(line)]
-    (folder / "ledger.jsonl").write_text("".join(rest))  # without the checksum of run.json
-
-
-def test_a_run_of_another_version(copied, tmp_path):
-    def older(table):
-        table["identity"]["versions"]["enfilade"] = "0.0.1"
-        del table["identity"]["settings"]["viewing"]["persistence"]
-        table["identity"]["settings"]["viewing"]["forgotten"] = 3
-
-    change_identity(copied, older)
-    notes, _, _ = written(copied, tmp_path)
-    assert any("made with version 0.0.1" in note for note in notes)
-    change_identity(copied, lambda table: table["identity"].pop("path"))
-    with pytest.raises(RunFolderError, match=r"can't be shown: .* another version \(0\.0\.1"):
-        written(copied, tmp_path)
-    change_identity(copied, lambda table: table.update(format=99))
-    with pytest.raises(RunFolderError, match="format 99"):
-        written(copied, tmp_path)
-
-
-def test_a_reference_of_the_bench_will_do(runs, tmp_path):
-    def trimmed(table):
-        table["identity"]["trace"] = {"spp": table["identity"].pop("settings")["trace"]["spp"]}
-
-    reference = shutil.copytree(runs / "reference", tmp_path / "reference")
-    change_identity(reference, trimmed)
-    keep_lines(reference, lambda unit: unit.startswith("frame "))
-    notes, text, data = written(runs / "paper", tmp_path, reference=reference, has_metric=False)
-    assert "difference" in data["frames"][0]["layers"]
-    assert "its paths a pixel" in text
-    assert not any("not finished" in note for note in notes)
-
-
-def test_a_reference_of_another_size_is_refused(runs, copied, tmp_path):
-    change_identity(copied, lambda table: table["identity"]["path"].update(size=[64, 48]))
-    with pytest.raises(RunFolderError, match="give one of equal size"):
-        written(runs / "paper", tmp_path, reference=copied)
-
-
-def test_chosen_frames(runs, tmp_path):
-    _, _, data = written(runs / "paper", tmp_path, numbers=(2, 5))
-    assert [frame["number"] for frame in data["frames"]] == [2, 5]
-    with pytest.raises(SettingsError, match="has no frame 11"):
-        written(runs / "paper", tmp_path, numbers=(2, 11))
-
-
-def decoupled(folder):
-    """Make a run one of the method that counts rays, as its ledger has it before any were sent."""
-    change_identity(folder, lambda table: table["identity"].update(method="decoupled"))
-    keep_lines(folder, lambda unit: unit == "survey")
-
-
-def send_rays(folder):
-    """One for each pixel of each frame."""
-    path = json.loads((folder / "run.json").read_text())["identity"]["path"]
-    count = path["size"][0] * path["size"][1] * len(path["frames"])
-    with (folder / "ledger.jsonl").open("ab") as ledger:
-        ledger.write(sealed({"unit": "draft 1", "files": {}, "frame": 1, "rays": {"drafts": count}}))
-
-
-def test_a_method_that_counts_rays_traces_no_paths_also_before_it_has_counted_any(copied, tmp_path):
-    decoupled(copied)
-    _, text, data = written(copied, tmp_path)
-    assert "<dt>paths a pixel</dt>" not in text
-    assert "Pixels traced" not in text
-    assert "<h2>Rays per pixel and frame</h2>" in text
-    assert '<td class="sum">–</td>' in text
-    assert data["unit"] == ""
-    send_rays(copied)
-    assert "<dt>rays a pixel</dt><dd>1.0</dd>" in written(copied, tmp_path)[1]
-
-
-def test_a_reference_that_counts_rays_is_told_by_them(runs, tmp_path):
-    reference = shutil.copytree(runs / "reference", tmp_path / "reference")
-    change_identity(reference, lambda table: table["identity"].update(method="decoupled"))
-    send_rays(reference)
-    _, text, _ = written(runs / "paper", tmp_path, reference=reference, has_metric=False)
-    assert "its paths a pixel" not in text
-    assert re.search(r"its rays a pixel</th>\s*<td[^>]*>1\.0<", text)
-
-
-def test_keyframes_are_named_where_other_frames_are_made_of_them(runs, tmp_path):
-    kinds = [frame["kind"] for frame in written(runs / "paper", tmp_path)[2]["frames"]]
-    assert (kinds[0], kinds[-1]) == ("keyframe", "keyframe")
-    assert "in-between" in kinds
-    _, _, data = written(runs / "reference", tmp_path)
-    assert {frame["kind"] for frame in data["frames"]} == {""}
-
-
-def test_a_page_that_can_not_be_kept_small_says_so(runs, tmp_path, monkeypatch):
-    monkeypatch.setattr("enfilade.reports.page.LEAST_MB", 1.0)
-    notes, text, _ = written(runs / "paper", tmp_path, max_mb=4.0)
-    assert any("MB, more than the 4 that --max-mb asks for" in note for note in notes)
-    assert "more than the 4 that --max-mb asks for" in text
-    assert not any("--max-mb asks" in note for note in written(runs / "paper", tmp_path)[0])
-
-
-def test_a_page_too_small_for_anything_is_refused(runs, tmp_path):
-    for size in (1.0, float("nan")):
-        with pytest.raises(SettingsError, match="give 8 or more"):
-            written(runs / "paper", tmp_path, max_mb=size)
+def film_of(folder, max_bytes):
+    film = Film(ReportedRun(folder), open_view(VideoSettings(), 0.0), None, max_bytes, Silence())
+    return film, sum(len(text) for frame in film.frames for text in frame["layers"].values())
 
 
 def test_where_there_is_little_room_frames_are_left_out_evenly(runs):
-    seen = SeenRun(runs / "paper")
-    view = open_view(VideoSettings(), 0.0)
-    everything = encode_film(seen, seen.finished, None, view, Silence(), room_bytes=1e9)
-    taken = sum(len(t) for f in everything.frames for t in f["layers"].values())
-    film = encode_film(seen, seen.finished, None, view, Silence(), room_bytes=taken / 2.2)
-    numbers = [frame["number"] for frame in film.frames]
-    assert numbers[0] == 1
-    assert len(numbers) < FRAMES / 2 + 1
-    assert any(f"{len(numbers)} of 10 frames are on the page" in note for note in film.notes)
-    assert sum(len(t) for f in film.frames for t in f["layers"].values()) <= taken / 2.2
+    most = film_of(runs / "run", 1e9)[1] / 2.5
+    film, size = film_of(runs / "run", most)
+    numbers = numbers_of({"frames": film.frames})
+    assert (numbers[0], numbers[-1]) == (1, 10)
+    assert np.ptp(np.diff(numbers)[:-1]) == 0
+    assert film.notes == [
+        f"the player has {len(numbers)} of 10 frames, to keep the page small; charts and tables have all"
+    ]
+    assert size <= 1.1 * most
+
+
+def test_wide_pictures_are_scaled(runs, monkeypatch):
+    monkeypatch.setattr("enfilade.reports.film.WIDEST_PX", 32)
+    film, _ = film_of(runs / "run", 1e9)
+    assert film.size == (32, 24)
+    assert picture({"frames": film.frames}, 1, "provenance").shape == (24, 32, 4)
+    assert film.notes == ["pictures are scaled from 64x48 to 32x24 pixels"]
 
 
 def test_names_are_text_and_not_markup(runs, tmp_path):
-    folder = shutil.copytree(runs / "paper", tmp_path / "<img src=x onerror=alert(1)>")
-    _, text, _ = written(folder, tmp_path)
-    assert "<img" not in text.partition('id="data">')[0]
+    folder = shutil.copytree(runs / "run", tmp_path / "<img src=x onerror=alert(1)>")
+    identity = {"method": {"name": "<b>", "revision": 1}}
+    for run in (folder, made_up_run(tmp_path / "b", facts={"rays": {"<img>": 1}}, **identity)):
+        _, text, _ = written(run, tmp_path)
+        assert "<img" not in text.partition('id="data">')[0]
+        assert "<b>" not in text.partition("<dd>")[2].partition("</dd>")[0]
 
 
-def test_a_file_without_the_layers_of_a_frame(copied, tmp_path):
-    # as of a run whose frames another program wrote anew: the checksum tells
-    layers = read_exr(copied / "frames" / "0001.exr")
-    write_exr(copied / "frames" / "0001.exr", {"RGB": layers["RGB"]})
-    notes, _, _ = written(copied, tmp_path)
-    assert any("0001.exr isn't what unit 'frame 1' wrote" in note for note in notes)
+def test_methods_without_rays_or_layers(tmp_path):
+    folder = made_up_run(tmp_path / "run", facts={"dropped": 2}, layers=["RGB"])
+    notes, text, data = written(folder, tmp_path)
+    assert list(series_of(text, data)) == ["velocity", "traced", "time"]
+    assert [layer["name"] for layer in data["layers"]] == ["result"]
+    assert notes == ["20 samples were NaN or infinite and were left out"]
+    assert "Rays per pixel" not in text

@@ -1,4 +1,4 @@
-"""Keyed poses: a short JSON format of times, eyes, and targets or rotations (docs/camera-paths.md).
+"""Keyed poses: a short JSON format of times, eyes, and targets or rotations (docs/formats.md).
 
 Values are interpolated by PCHIP (Fritsch and Butland 1984): the velocity is continuous, no coordinate leaves
 the range of the two keys around it, and the camera is at rest between two equal keys. Rotations follow the

@@ -16,13 +16,13 @@ ASPECT_TOLERANCE = 0.01  # relative; even sizes of a few hundred pixels deviate 
 
 
 def load_path(
-    file: Path,
+    file: Path | str,
     *,
     size: tuple[int, int] | None = None,
     frames: tuple[int, ...] | None = None,
     fps: float | None = None,
 ) -> CameraPath:
-    """Read a camera path: nerfstudio's ``camera_path.json`` or keyed poses (docs/camera-paths.md).
+    """Read a camera path: nerfstudio's ``camera_path.json`` or keyed poses (docs/formats.md).
 
     Parameters
     ----------
@@ -44,6 +44,7 @@ def load_path(
     """
     if fps is not None and not FPS[0] <= fps <= FPS[1]:
         raise CameraPathError(f"{fps:g} frames per second is out of range; give {FPS[0]:g} to {FPS[1]:g}")
+    file = Path(file)
     document = read_object(file)
     if document.values.get("format") == KEYED_FORMAT:
         from enfilade.camera.keyed import read_keyed  # imports parts of SciPy that load slowly

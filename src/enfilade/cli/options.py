@@ -164,7 +164,7 @@ def settings_options(*flags: str, default: str = "") -> Callable[[Command], Comm
         "assignments",
         metavar="SECTION.NAME=VALUE",
         multiple=True,
-        help="Any setting of docs/settings.md; as often as wanted.",
+        help="Any setting of docs/formats.md; as often as wanted.",
         expose_value=False,
         callback=lambda ctx, _, value: _keep(ctx, "set", value),
     )

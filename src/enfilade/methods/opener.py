@@ -33,12 +33,12 @@ def open_method(name: str) -> Method:
             f"there is no method {name!r}; choose one of {', '.join(METHODS)}, or give your own as module:Class"
         )
     try:
-        method = getattr(importlib.import_module(module), attribute)()
+        kind = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise SettingsError(f"the method {name!r} can't be imported: {error}") from error
-    if not isinstance(method, Method):
-        raise SettingsError(f"{name!r} is no method: it must be a subclass of enfilade.methods.Method")
-    return method
+    if not (isinstance(kind, type) and issubclass(kind, Method)):
+        raise SettingsError(f"{name!r} is no method: it must be a subclass of enfilade.Method")
+    return kind()
 
 
 def name_of(method: str | Method | type[Method]) -> str:

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["castle_sensitivity", "sustained_sensitivity", "transient_sensitivity"]
+__all__ = ["castlecsf_sensitivity", "transient_sensitivity"]
 
 F64: TypeAlias = npt.NDArray[np.float64]
 
@@ -59,46 +59,7 @@ def _arrays(*quantities: npt.ArrayLike) -> tuple[F64, ...]:
     return tuple(np.asarray(quantity, dtype=np.float64) for quantity in quantities)
 
 
-def sustained_sensitivity(
-    frequency_cpd: npt.ArrayLike,
-    temporal_hz: npt.ArrayLike,
-    luminance_cd_m2: npt.ArrayLike,
-    area_deg2: npt.ArrayLike,
-) -> F64:
-    """Sensitivity of the sustained channel; arguments and result as in `castle_sensitivity`.
-
-    The temporal response is exp(-w^1.3314 / 10.5795).
-    """
-    rho, hertz, luminance, area = _arrays(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2)
-    luminance = np.maximum(luminance, LEAST_CD_M2)
-    peak = 56.4947 * (1.0 + 7.54726 / luminance) ** -0.144532
-    peak *= -np.expm1(-9.66862e9 * np.log1p(5.58341e-7 / luminance))  # 1 - (1 + k2 / L)^-k3
-    peak_cpd = 1.78119 * (1.0 + 91.5718 / luminance) ** -0.256682
-    response = np.exp(-(hertz**SUSTAINED_EXPONENT) / SUSTAINED_SCALE)
-    return response * _spatial(SUSTAINED, peak, peak_cpd, rho, area)
-
-
-def transient_sensitivity(
-    frequency_cpd: npt.ArrayLike,
-    temporal_hz: npt.ArrayLike,
-    luminance_cd_m2: npt.ArrayLike,
-    area_deg2: npt.ArrayLike,
-) -> F64:
-    """Sensitivity of the transient channel; arguments and result as in `castle_sensitivity`.
-
-    The temporal response is exp(-(w^0.1898 - w0^0.1898)^2 / 0.0844836), w0 = 2.41482 log10 L +
-    4.7036 Hz: 9.5 Hz at 100 cd/m2, close to nothing at 0 Hz.
-    """
-    rho, hertz, luminance, area = _arrays(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2)
-    luminance = np.maximum(luminance, LEAST_CD_M2)
-    peak = 2748.09 * luminance**0.193434
-    peak_hz = np.maximum(TRANSIENT_PEAK_RISE_HZ * np.log10(luminance) + TRANSIENT_PEAK_HZ, 0.0)
-    distance = hertz**TRANSIENT_EXPONENT - peak_hz**TRANSIENT_EXPONENT
-    response = np.exp(-(distance**2) / TRANSIENT_SCALE)
-    return response * _spatial(TRANSIENT, peak, 0.000316696, rho, area)
-
-
-def castle_sensitivity(
+def castlecsf_sensitivity(
     frequency_cpd: npt.ArrayLike,
     temporal_hz: npt.ArrayLike,
     luminance_cd_m2: npt.ArrayLike,
@@ -106,7 +67,8 @@ def castle_sensitivity(
 ) -> F64:
     """Contrast sensitivity to a patch of grating that moves or flickers (castleCSF, achromatic).
 
-    The sum of a sustained and a transient channel.
+    The sum of `transient_sensitivity` and a sustained channel with the temporal response
+    exp(-w^1.3314 / 10.5795).
 
     Parameters
     ----------
@@ -125,5 +87,31 @@ def castle_sensitivity(
     array of float64
         1 / (threshold contrast of luminance), broadcast over the arguments.
     """
-    arguments = frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2
-    return sustained_sensitivity(*arguments) + transient_sensitivity(*arguments)
+    rho, hertz, luminance, area = _arrays(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2)
+    luminance = np.maximum(luminance, LEAST_CD_M2)
+    peak = 56.4947 * (1.0 + 7.54726 / luminance) ** -0.144532
+    peak *= -np.expm1(-9.66862e9 * np.log1p(5.58341e-7 / luminance))  # 1 - (1 + k2 / L)^-k3
+    peak_cpd = 1.78119 * (1.0 + 91.5718 / luminance) ** -0.256682
+    response = np.exp(-(hertz**SUSTAINED_EXPONENT) / SUSTAINED_SCALE)
+    sustained = response * _spatial(SUSTAINED, peak, peak_cpd, rho, area)
+    return sustained + transient_sensitivity(rho, hertz, luminance, area)
+
+
+def transient_sensitivity(
+    frequency_cpd: npt.ArrayLike,
+    temporal_hz: npt.ArrayLike,
+    luminance_cd_m2: npt.ArrayLike,
+    area_deg2: npt.ArrayLike,
+) -> F64:
+    """Sensitivity of the transient channel; arguments and result as in `castlecsf_sensitivity`.
+
+    The temporal response is exp(-(w^0.1898 - w0^0.1898)^2 / 0.0844836), w0 = 2.41482 log10 L +
+    4.7036 Hz: 9.5 Hz at 100 cd/m2, close to nothing at 0 Hz.
+    """
+    rho, hertz, luminance, area = _arrays(frequency_cpd, temporal_hz, luminance_cd_m2, area_deg2)
+    luminance = np.maximum(luminance, LEAST_CD_M2)
+    peak = 2748.09 * luminance**0.193434
+    peak_hz = np.maximum(TRANSIENT_PEAK_RISE_HZ * np.log10(luminance) + TRANSIENT_PEAK_HZ, 0.0)
+    distance = hertz**TRANSIENT_EXPONENT - peak_hz**TRANSIENT_EXPONENT
+    response = np.exp(-(distance**2) / TRANSIENT_SCALE)
+    return response * _spatial(TRANSIENT, peak, 0.000316696, rho, area)

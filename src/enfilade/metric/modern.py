@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from enfilade.metric.adaptation import adapting_luminance
 from enfilade.metric.aperture import APERTURE_SIGMA_DEG, REFERENCE_AREA_DEG2, Aperture, patch_gain
-from enfilade.metric.castlecsf import castle_sensitivity
+from enfilade.metric.castlecsf import castlecsf_sensitivity
 from enfilade.metric.channels import ChannelBank
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.cortex import Band, Complex64
@@ -146,9 +146,9 @@ class ModernMetric:
         return found
 
     def _csf(self, frequency_cpd: float, velocity_deg_s: F64, luminance_cd_m2: F64) -> F64:
-        """Sensitivity to what moves over the retina, scaled for the aperture (castleCSF)."""
+        """Sensitivity to patterns that move over the retina, scaled for the aperture (castleCSF)."""
         hertz = velocity_deg_s * frequency_cpd
-        return self._gain * castle_sensitivity(frequency_cpd, hertz, luminance_cd_m2, REFERENCE_AREA_DEG2)
+        return self._gain * castlecsf_sensitivity(frequency_cpd, hertz, luminance_cd_m2, REFERENCE_AREA_DEG2)
 
     def _csf_within_band(self, rho_cpp: F32, band: Band, base: Band) -> F32:
         """The CSF of a still image relative to that of the band's centre, level below half the base's."""
@@ -156,7 +156,7 @@ class ModernMetric:
         rho = np.maximum(rho_cpp, 0.5 * base.centre_cpp).astype(np.float64) * density
         grey = MIDDLE_GREY * self.viewing.peak_cd_m2
         here, centre = (
-            castle_sensitivity(f, EYE_DRIFT_DEG_S * f, grey, REFERENCE_AREA_DEG2)
+            castlecsf_sensitivity(f, EYE_DRIFT_DEG_S * f, grey, REFERENCE_AREA_DEG2)
             for f in (rho, np.asarray(band.centre_cpp * density))
         )
         return np.asarray(here / centre, dtype=np.float32)

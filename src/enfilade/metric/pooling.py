@@ -91,24 +91,20 @@ class Pool:
 
     def _map(self, *kinds: bool) -> F32:
         """J from the sums of channels: coarse ones interpolated, the root, interpolated to full size."""
-        shape = self._valid.shape
-        reduction = max(max(self._sums[kind], default=1) for kind in kinds)
-        finest = min(min(self._sums[kind], default=1) for kind in kinds)
+        shape, sums = self._valid.shape, [self._sums[kind] for kind in kinds]
+        sizes = {size for of_kind in sums for size in of_kind} or {1}
+        reduction = max(sizes)
         total = np.zeros(halved_shape(shape, reduction), dtype=np.float32)
         while True:
-            for kind in kinds:
-                if reduction in self._sums[kind]:
-                    total += self._sums[kind][reduction]
-            if reduction == finest:
-                break
+            for of_kind in sums:
+                if reduction in of_kind:
+                    total += of_kind[reduction]
+            if reduction == min(sizes) and self._exponent != 1.0:
+                total **= np.float32(1.0 / self._exponent)
+            if reduction == 1:
+                return total * self._valid
             reduction //= 2
             total = double(total, halved_shape(shape, reduction))
-        if self._exponent != 1.0:
-            total **= np.float32(1.0 / self._exponent)
-        while reduction > 1:
-            reduction //= 2
-            total = double(total, halved_shape(shape, reduction))
-        return total * self._valid
 
     def _score(self, jnd: F32) -> float:
         count = max(int(np.count_nonzero(self._valid)), 1)

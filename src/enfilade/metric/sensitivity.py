@@ -145,7 +145,7 @@ class ChannelSensitivity:
             yield self._weight(self._moving(band, orientation), band)
 
     def at_rest(self, band: Band) -> F32:
-        """Weight of what does not move over the retina."""
+        """Weight of patterns at rest on the retina."""
         return self._weight(self._table.row(band)[self._luminance(_reduction(band))], band)
 
     def towards(self, band: Band, velocity: F32, theta_deg: F32, reduction: int) -> F32:
@@ -164,7 +164,7 @@ class ChannelSensitivity:
         return retinal_velocity(velocity, eye), held_smear(velocity, eye, self._hold_s)
 
     def _moving(self, band: Band, orientation: int | None) -> F32:
-        """Sensitivity of a channel to what moves, the largest over eye movements."""
+        """Sensitivity of a channel to moving patterns, the largest over eye movements."""
         theta = None if orientation is None else ORIENTATIONS_DEG[orientation]
         row, rho, reduction = self._table.row(band), self._table.frequency_cpd(band), _reduction(band)
         best = np.zeros((), dtype=np.float32)

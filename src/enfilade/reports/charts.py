@@ -1,15 +1,19 @@
-"""How our charts look: size, palette, axes over frame numbers. The owner of matplotlib.
+"""Charts over frame numbers, as PNG files and as SVG inside a page. The owner of matplotlib.
 
-Colours are Okabe and Ito's, told apart by readers with any of the common colour deficiencies; what
-matters is told apart by shape, line style or place as well.
+Colours are those of Okabe and Ito (2008), for readers with colour vision deficiencies; series also differ in
+shape, line style or place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -20,99 +24,135 @@ from matplotlib.ticker import MaxNLocator
 from enfilade.files import whole_file
 
 __all__ = [
-    "BLUE",
-    "GREEN",
-    "GREY",
-    "INK",
-    "ORANGE",
-    "SOURCE_COLORS",
-    "VERMILION",
-    "Figure",
-    "frame_edges",
-    "legend",
-    "mark_keyframes",
-    "new_figure",
-    "pixels",
-    "save",
-    "save_picture",
-    "stack",
-]
+    "BLUE", "GREEN", "GREY", "INK", "ORANGE", "PALETTE", "PROVENANCE_COLORS", "SKY", "SVG_AXES", "VERMILION",
+    "Figure", "Panel", "Series", "draw", "legend", "new_figure", "pixels", "save", "save_picture", "svg",
+]  # fmt: skip
 
 BLUE, ORANGE, GREEN, VERMILION, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#BBBBBB"
-SOURCE_COLORS = {"slow": BLUE, "specular": ORANGE, "hole": GREEN, "keyframe": GREY}
-INK = "#333333"
+PINK, YELLOW = "#CC79A7", "#F0E442"
+PALETTE = (SKY, ORANGE, GREEN, PINK, BLUE, VERMILION, GREY, YELLOW, "#882255", "#999933")
+PROVENANCE_COLORS = {"slow": SKY, "specular": ORANGE, "disoccluded": GREEN, "keyframe": PINK}
+INK, RULE = "#333333", "#DDDDDD"
+THEMED = {INK: "currentColor", RULE: "var(--grid)"}  # colours of the page, light or dark
 WIDTH_IN, PANEL_IN = 10.0, 2.7
 DPI = 120
+SVG_WIDTH, SVG_HEIGHT, SVG_TEXT = 400.0, 118.0, 10.5  # points
+SVG_AXES = (0.085, 0.185, 0.9, 0.76)  # left, bottom, width, height, as parts of the chart
+MARKS: dict[str, dict[str, Any]] = {
+    "line": {"linewidth": 1.5},
+    "dashed": {"linewidth": 1.5, "linestyle": "--"},
+    "triangle": {
+        "linestyle": "none", "marker": "v", "markersize": 6, "markeredgecolor": "white",
+        "markeredgewidth": 0.5, "clip_on": False, "zorder": 3,
+    },
+    "square": {"linewidth": 0.9, "marker": "s", "markersize": 5, "markerfacecolor": "none", "clip_on": False},
+    "circle": {"linewidth": 0.9, "marker": "o", "markersize": 4, "clip_on": False},
+}  # fmt: skip
 
 
-def new_figure(title: str, panels: Sequence[str]) -> tuple[Figure, list[Any]]:
-    """Make a figure with panels above each other that share the frame axis.
+@dataclass(frozen=True)
+class Series:
+    """Values over frame numbers.
 
-    Parameters
+    Attributes
     ----------
-    title
-    panels
-        Heading of each panel; ``(a)``, ``(b)`` are put before them.
-
-    Returns
-    -------
-    Figure, list of Axes
+    name : str
+        In the legend.
+    color : str
+    values : mapping of int to float
+        By frame number, rising.
+    mark : str
+        ``bar``, stacked on the earlier bars of the panel, or a key of :data:`MARKS`.
     """
-    figure = Figure(figsize=(WIDTH_IN, 0.6 + PANEL_IN * len(panels)), dpi=DPI, layout="constrained")
+
+    name: str
+    color: str
+    values: Mapping[int, float]
+    mark: str = "line"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A chart over frame numbers.
+
+    Attributes
+    ----------
+    name : str
+        Identifier.
+    title, unit : str
+    text : str
+        Its content in a sentence, for readers that do not see it.
+    series : tuple of Series
+    top : float
+        Of the vertical axis, which begins at 0.
+    level : tuple of float and str, or None
+        A horizontal line and its name.
+    """
+
+    name: str
+    title: str
+    unit: str
+    text: str
+    series: tuple[Series, ...]
+    top: float
+    level: tuple[float, str] | None = None
+
+
+def new_figure(title: str, headings: Sequence[str]) -> tuple[Figure, list[Any]]:
+    """Make a figure of panels above each other that share the frame axis, and its axes."""
+    figure = Figure(figsize=(WIDTH_IN, 0.6 + PANEL_IN * len(headings)), dpi=DPI, layout="constrained")
     figure.suptitle(title, fontsize=12, color=INK)
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for letter, heading, ax in zip("abcdef", panels, axes, strict=False):
+    axes = figure.subplots(len(headings), 1, sharex=True, squeeze=False)[:, 0]
+    for letter, heading, ax in zip("abcdef", headings, axes, strict=False):
         ax.set_title(f"({letter}) {heading}", loc="left", fontsize=10, color=INK)
-        ax.grid(axis="y", color="#DDDDDD", linewidth=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
         ax.margins(x=0.01)
-        ax.tick_params(colors=INK, labelsize=9)
+        _style(ax, text_pt=9)
     axes[-1].set_xlabel("frame")
-    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     return figure, list(axes)
 
 
-def frame_edges(frames: Sequence[int]) -> npt.NDArray[np.float64]:
-    """Borders between neighbouring frames, one more than there are frames."""
-    numbers = np.asarray(frames, np.float64)
-    if len(numbers) == 1:
-        return np.array([numbers[0] - 0.5, numbers[0] + 0.5])
-    inner = 0.5 * (numbers[1:] + numbers[:-1])
-    first, last = 2.0 * numbers[0] - inner[0], 2.0 * numbers[-1] - inner[-1]
-    return np.concatenate([[first], inner, [last]])
+def draw(ax: Any, panel: Panel) -> None:
+    """Draw the series and the level of a panel."""
+    below: dict[int, float] = {}
+    for series in panel.series:
+        if series.mark == "bar":
+            below = _stack(ax, series, below)
+        else:
+            mark = "circle" if len(series.values) == 1 and series.mark == "line" else series.mark
+            frames, values = list(series.values), list(series.values.values())
+            ax.plot(frames, values, color=series.color, label=series.name, **MARKS[mark])
+    if panel.level is not None:
+        value, name = panel.level
+        ax.axhline(value, color=INK, linestyle="--", linewidth=1.0, label=name)
+    ax.set_ylim(0.0, panel.top)
 
 
-def stack(ax: Any, frames: Sequence[int], shares: dict[str, tuple[str, Sequence[float]]]) -> None:
-    """Stack percentages over the frames.
-
-    Parameters
-    ----------
-    ax
-    frames
-    shares
-        Colour and percentage per frame, by the name in the legend; the first lies lowest.
-    """
-    edges = frame_edges(frames)
-    below = np.zeros(len(frames))
-    for name, (color, values) in shares.items():
-        top = below + np.asarray(values, np.float64)
-        ax.stairs(top, edges, baseline=below, fill=True, color=color, linewidth=0.0, label=name)
-        below = top
-
-
-def mark_keyframes(ax: Any, frames: Sequence[int], values: Sequence[float], keyframes: Sequence[int]) -> None:
-    """Put a triangle on a curve at each keyframe."""
-    value_at = dict(zip(frames, values, strict=True))
-    heights = [value_at[k] for k in keyframes]
-    style = {"color": VERMILION, "markeredgecolor": "white", "markeredgewidth": 0.6}
-    ax.plot(list(keyframes), heights, "v", markersize=7, label="keyframes", clip_on=False, zorder=3, **style)
-
-
-def legend(ax: Any, columns: int = 4) -> None:
+def legend(ax: Any, columns: int = 5) -> None:
     """Put the legend above the panel on the right, where no data is."""
     place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.99), "borderaxespad": 0.2}
     ax.legend(ncols=columns, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2, **place)
+
+
+def svg(panel: Panel, span: tuple[float, float]) -> str:
+    """Draw a panel as an SVG element, whose text takes the colour and the font of a page.
+
+    Parameters
+    ----------
+    panel
+    span
+        Frame numbers at the left and the right end of the axes, which lie at :data:`SVG_AXES`.
+    """
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": panel.name}):
+        figure = Figure(figsize=(SVG_WIDTH / 72.0, SVG_HEIGHT / 72.0), dpi=72)
+        ax = figure.add_axes(SVG_AXES)
+        _style(ax, text_pt=SVG_TEXT)
+        draw(ax, panel)
+        ax.set_xlim(span)
+        ax.yaxis.set_major_locator(MaxNLocator(4))
+        out = io.StringIO()
+        nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure.savefig(out, format="svg", transparent=True, metadata=nothing)
+    return _inlined(out.getvalue())
 
 
 def save(figure: Figure, file: Path) -> Path:
@@ -130,14 +170,38 @@ def pixels(figure: Figure) -> npt.NDArray[np.uint8]:
 
 
 def save_picture(values: npt.NDArray[np.uint8], file: Path) -> Path:
-    """Write an image as a PNG, whole or not at all.
-
-    Parameters
-    ----------
-    values : (H, W, 3) uint8
-        Encoded for an sRGB screen.
-    file
-    """
+    """Write an image, (H, W, 3) uint8 sRGB, as a PNG, whole or not at all."""
     with whole_file(file) as beside:
         imsave(beside, values, format="png", metadata={"Software": "enfilade"})
     return file
+
+
+def _style(ax: Any, *, text_pt: float) -> None:
+    ax.grid(axis="y", color=RULE, linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_color(RULE)
+    ax.tick_params(color=RULE, labelcolor=INK, labelsize=text_pt, length=3)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+
+
+def _stack(ax: Any, series: Series, below: Mapping[int, float]) -> dict[int, float]:
+    """Draw bars on top of earlier ones; returns their tops by frame."""
+    frames = np.array(list(series.values), np.float64)
+    base = np.array([below.get(frame, 0.0) for frame in series.values])
+    top = base + np.array(list(series.values.values()))
+    half = 0.5 * float(np.diff(frames).min(initial=np.inf)) if len(frames) > 1 else 0.5
+    edges = np.stack([frames - half, frames + half], axis=1).ravel()
+    # Between two frames lies a bin of no height, and of no width where they follow each other.
+    filled, floor = (np.zeros(2 * len(frames) - 1) for _ in range(2))
+    filled[::2], floor[::2] = top, base
+    ax.stairs(filled, edges, baseline=floor, fill=True, color=series.color, linewidth=0.0, label=series.name)
+    return dict(zip(series.values, top.tolist(), strict=True))
+
+
+def _inlined(text: str) -> str:
+    """The SVG element of a file, without names that several charts share, in the colours of the page."""
+    element = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
+    for color, themed in THEMED.items():
+        element = re.sub(color, themed, element, flags=re.IGNORECASE)
+    return re.sub(r"\s*\n\s*", " ", element)

@@ -1,290 +1,223 @@
-"""What stands on the page of a run, besides its pictures: state, tables, settings, and the page's data."""
+"""The contents of a report: state, charts, tables, settings, and the data of its player."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from enfilade.metric import sequence_score
+from enfilade import __version__
+from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
-from enfilade.reports.forecast import Forecast, forecast
-from enfilade.reports.layers import LAYERS
-from enfilade.reports.panels import PURPOSES, counts_rays, panels
-from enfilade.reports.seen import SeenRun
-from enfilade.reports.tables import SOURCES, percent, seconds
-from enfilade.settings import Settings
+from enfilade.reports.panels import quality_panel, run_panels, time_panel
+from enfilade.reports.plots import split_percent_of
+from enfilade.reports.run import ReportedRun
+from enfilade.reports.tables import TRACED, percent, seconds, spoken
+from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
 
+SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "square": "□", "circle": "●"}  # of series
+REASONS = (
+    "Slow pixels move slowly, so that errors would be noticed; specular pixels show a glossy, mirroring or "
+    "transparent surface; disoccluded pixels are visible in no keyframe; keyframe pixels belong to a "
+    "keyframe; all others are reused from keyframes."
+)
 
-def contents(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, Any]:
-    """Gather what the page says, by the names that its template knows.
+
+def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Gather the variables of the template.
 
     Parameters
     ----------
-    seen
-    reference
-        None: without one.
+    run
     film
+    reference
+        Summary of the reference, where it is a run.
     """
-    ahead = _ahead(seen)
-    made = panels(seen.figures, seen.numbers, seen.speed_deg_s, film.beside)
+    summary = run.summary
+    panels = run_panels(summary, split_percent_of(run.identity))
+    if film.difference is not None:
+        panels.append(quality_panel(film.difference))
+    charted = [panel for panel in [*panels, time_panel(run.lines, summary["rays"])] if panel.series]
+    span = (run.numbers[0] - 0.5, run.numbers[-1] + 0.5)
+    left, bottom, width, height = SVG_AXES
     return {
-        "name": seen.name,
-        "folder": str(seen.run.folder.resolve()),
-        "figures": seen.figures,
-        "counts_rays": counts_rays(seen.figures),
-        "state": _state(seen),
+        "name": run.folder.resolve().name,
+        "state": _state(run),
+        "glance": _glance(run),
+        "layers": film.layers,
+        "charts": [(panel, svg(panel, span)) for panel in charted],
+        "span": span,
+        "edges": {"left": left, "right": left + width, "top": 1.0 - bottom - height, "bottom": bottom},
+        "symbols": SYMBOLS,
+        "effort": _effort(summary),
+        "difference": _difference(film.difference, summary, reference),
+        "stages": _stages(run),
+        "settings": _settings(run),
+        "identity": _identity(run),
+        "columns": panels,
+        "numbers": run.numbers,
+        "data": json.dumps(_data(run, film, charted)).replace("<", "\\u003c"),
+        "version": __version__,
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "has_frames": bool(film.frames),
-        "video": _video(seen),
-        "layers": [layer for layer in LAYERS if layer.name in film.layers],
-        "panels": made,
-        "effort": _effort(seen.figures),
-        "table2": _times(seen.figures),
-        "ahead": ahead,
-        "left": _left(ahead),
-        "beside": _beside(seen, reference, film),
-        "settings": _settings(seen.identity.get("settings", {})),
-        "identity": _identity(seen),
-        "rows": _rows(seen, film),
-        "data": json.dumps(_data(seen, film, made), ensure_ascii=True).replace("<", "\\u003c"),
-        "has_reference": reference is not None,
     }
 
 
-def _ahead(seen: SeenRun) -> Forecast:
-    found = forecast(seen.identity, seen.lines, workers=sum(one["workers"] for one in seen.writers))
-    if seen.silent_since is None:
-        return found
-    return replace(found, left_s=None, text="the time left is not known: perhaps nobody is at work any more")
+def _state(run: ReportedRun) -> dict[str, str]:
+    count = f"{len(run.there)} of {len(run.numbers)} frames"
+    if run.is_finished:
+        return {"word": "finished", "text": f"all {len(run.numbers)} frames and the video"}
+    last = f"last result {run.last_result:%Y-%m-%d %H:%M} UTC"
+    if run.holder is None:
+        return {"word": "unfinished", "text": f"{count}, {last}; the same command continues the run"}
+    process = f"process {run.holder['pid']} on {run.holder['host']}, since {run.holder['started']}"
+    return {"word": "running", "text": f"{count}, {last}; {process}"}
 
 
-def _effort(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """What was traced, and why: rays where the method counts them, and pixels (Table 1) otherwise."""
-    if counts_rays(figures):
-        rays = figures["rays"]
-        sent = {**rays, "total": sum(rays.values())} if rays else {}
-        named = [*((kind, name) for kind, (name, _) in PURPOSES.items()), ("total", "total")]
-        return {
-            "title": "Rays per pixel and frame",
-            "table": "",
-            "columns": [(name, f"{sent[kind]:.2f}" if sent else "–") for kind, name in named],
-            "text": "Drafts are what tells where light comes from, and how many paths it takes.",
-            "headings": [name for name, _ in PURPOSES.values()] + ["rays"],
-        }
-    known, count = len(figures["per_frame"]), figures["frames"]
-    return {
-        "title": "Pixels traced",
-        "table": "Table 1",
-        "columns": [(name, percent(figures["table1"][key])) for key, name in SOURCES.items()],
-        "text": f"Percent of the pixels of {known}{'' if known == count else f' of {count}'} frames.",
-        "headings": ["slow, %", "specular, %", "holes, %", "keyframe, %", "traced, %"],
-    }
-
-
-def _efforts(figures: Mapping[str, Any]) -> dict[int, list[float]]:
-    """By frame, what stands under the headings of :func:`_effort`."""
-    if counts_rays(figures):
-        rows, keys = figures["rays_per_frame"], tuple(PURPOSES)
-        return {row["frame"]: [*(row[k] for k in keys), sum(row[k] for k in keys)] for row in rows}
-    keys = ("slow", "specular", "hole", "keyframe", "traced")
-    return {row["frame"]: [row[k] for k in keys] for row in figures["per_frame"]}
-
-
-def _state(seen: SeenRun) -> dict[str, str]:
-    count = f"{len(seen.finished)} of {len(seen.numbers)} frames"
-    if seen.is_finished:
-        return {
-            "word": "finished",
-            "text": f"all {len(seen.numbers)} frames" + (" and the video" if _video(seen) else ""),
-        }
-    if seen.writers:
-        first, *others = seen.writers
-        who = f"process {first['pid']} on {first['host']}, since {first['started']}"
-        who += f", and {len(others)} more" if others else ""
-        if seen.silent_since is None:
-            return {"word": "running", "text": f"{count} finished; {who}"}
-        last = f"{seen.silent_since:%Y-%m-%d %H:%M} UTC"
-        gone = f"nothing was finished since {last}: it may be gone, and then the same command goes on"
-        return {"word": "unfinished", "text": f"{count} finished; {who}, but {gone}"}
-    return {
-        "word": "unfinished",
-        "text": f"{count} finished, and nobody is at work; the same command goes on",
-    }
-
-
-def _video(seen: SeenRun) -> str:
-    names = [name for line in seen.lines if line["unit"] == "video" for name in line["files"]]
-    return str(seen.run.folder.resolve() / names[0]) if names else ""
-
-
-def _times(figures: Mapping[str, Any]) -> dict[str, Any]:
-    times, count = figures["table2"], figures["frames"]
-    total = max(times["total_s"], 1e-9)
-    stages = [
-        {
-            "name": name,
-            "wall": seconds(spent["wall_s"]),
-            "cpu": seconds(spent["cpu_s"]),
-            "per_frame": seconds(spent["wall_s"] / count),
-            "share": percent(100.0 * spent["wall_s"] / total),
-        }
-        for name, spent in times["stages"].items()
-    ]
-    sums = {"wall": times["total_s"], "cpu": times["cpu_s"], "per_frame": times["per_frame_s"]}
-    return {"stages": stages, "total": {name: seconds(value) for name, value in sums.items()}}
-
-
-def _left(ahead: Forecast) -> str:
-    if not ahead.left_s:
-        return ""
-    return f"{max(ahead.left_s, 1.0):.0f} s" if ahead.left_s < 100.0 else seconds(ahead.left_s)
-
-
-def _beside(seen: SeenRun, reference: SeenRun | None, film: Film) -> dict[str, Any] | None:
-    if reference is None or not film.beside:
-        return None
-    found = list(film.beside.values())
-    scores = [f["score_jnd"] for f in found if f["score_jnd"] is not None]
-    shares = [f["percent_visible"] for f in found if f["percent_visible"] is not None]
-    psnr = [f["psnr_db"] for f in found if f["psnr_db"] is not None]
-    rows = [
-        ("frames compared", f"{len(found)}", ""),
-        (*_effort_of_a_pixel(reference.figures), "its noise counts as a difference too"),
-    ]
-    if scores:
-        rows += [
-            ("visible difference", f"{sequence_score(scores):.2f} JND", "one score for the sequence"),
-            ("pixels above 1 JND", f"{percent(sum(shares) / len(shares))} %", "mean over the frames"),
-        ]
-    if psnr:
-        rows.append(("PSNR", f"{sum(psnr) / len(psnr):.2f} dB", "mean over the frames, encoded values"))
-    if seen.is_finished and reference.is_finished:
-        own, other = (r.figures["table2"]["cpu_s"] / r.figures["frames"] for r in (seen, reference))
-        rows += [
-            ("CPU time per frame", seconds(own), "this run"),
-            ("", seconds(other), "the reference"),
-            ("", f"{other / max(own, 1e-9):.2f} : 1", "reference : this run; fair on one machine alone"),
-        ]
-    return {"name": reference.name, "folder": str(reference.run.folder.resolve()), "rows": rows}
-
-
-def _effort_of_a_pixel(figures: Mapping[str, Any]) -> tuple[str, str]:
-    if counts_rays(figures):
-        return "its rays a pixel", f"{sum(figures['rays'].values()):.1f}"
-    return "its paths a pixel", str(figures["spp"])
-
-
-def _settings(tables: Mapping[str, Any]) -> list[dict[str, Any]]:
-    default = Settings()
-    known = default.to_tables()
-    return [
-        {
-            "name": section,
-            "rows": [
-                {
-                    "name": name,
-                    "value": _said(value),
-                    "is_changed": name in known.get(section, {}) and known[section][name] != value,
-                    "default": _said(known.get(section, {}).get(name)),
-                    "help": _help(default, section, name),
-                }
-                for name, value in table.items()
-            ],
-        }
-        for section, table in tables.items()
-        if isinstance(table, dict)
-    ]
-
-
-def _said(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:g}"
-    return "none" if value in (None, "") else str(value)
-
-
-def _help(default: Settings, section: str, name: str) -> str:
-    fields = getattr(getattr(default, section, None), "__dataclass_fields__", {})
-    return str(fields[name].metadata["help"]) if name in fields else ""
-
-
-def _identity(seen: SeenRun) -> list[tuple[str, str]]:
-    identity, path = seen.identity, seen.identity["path"]
-    scene, versions = identity.get("scene", {}), identity.get("versions", {})
-    shapes = next((line["shapes"] for line in seen.lines if "shapes" in line), "unknown")
-    numbers, of = seen.numbers, seen.viewing
-    screen = (
-        f"diagonal {of.diagonal_m:g} m at {of.distance_m:g} m: {of.pixels_per_degree:.1f} pixels per degree"
-    )
-    return [
-        ("folder", str(seen.run.folder.resolve())),
-        ("method", str(identity["method"])),
-        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}"),
-        ("cuts before frames", ", ".join(str(n) for n in path.get("cuts", [])) or "none"),
-        ("image", f"{path['size'][0]}x{path['size'][1]} pixels, {path['fps']:g} frames per second"),
-        ("screen", screen),
-        ("scene", f"{scene.get('fingerprint', 'unknown')}"),
-        ("shapes in it", str(scene.get("shapes", shapes))),
-        ("poses", str(path.get("poses", "unknown"))),
-        *((f"version: {name}", str(value)) for name, value in versions.items()),
-    ]
-
-
-def _rows(seen: SeenRun, film: Film) -> list[dict[str, Any]]:
-    efforts = _efforts(seen.figures)
-    rows = []
-    for index, number in enumerate(seen.numbers):
-        found = film.beside.get(number, {})
-        rows.append(
-            {
-                "frame": number,
-                "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[index],
-                "effort": efforts.get(number),
-                "score": found.get("score_jnd"),
-                "psnr": found.get("psnr_db"),
-            }
-        )
+def _glance(run: ReportedRun) -> list[tuple[str, str, str]]:
+    """The main figures: name, value, unit."""
+    summary = run.summary
+    width, height = summary["size"]
+    rows = [("method", summary["method"], ""), ("image", f"{width}×{height}", f"{summary['fps']:g} fps")]
+    if summary["rays"]:
+        rows.append(("rays per pixel", f"{sum(summary['rays'].values()):.1f}", ""))
+    elif summary["per_frame"]:
+        rows.append(("pixels traced", percent(summary["table1"]["total"]), "%"))
+    if run.is_finished:
+        value, unit = seconds(summary["table2"]["cpu_s"] / summary["frames"]).split()
+        rows.append(("CPU time per frame", value, unit))
     return rows
 
 
-def _data(seen: SeenRun, film: Film, made: list[dict[str, Any]]) -> dict[str, Any]:
-    by_number = {row["frame"]: row for row in seen.figures["per_frame"]}
-    efforts = _efforts(seen.figures)
-    # By method reference no frame is made of others: all are traced alike.
-    kinds = ("", "") if seen.figures["method"] == "reference" else ("in-between", "keyframe")
-    frames = []
-    for frame in film.frames:
-        row = by_number.get(frame["number"], {})
-        found = film.beside.get(frame["number"], {})
-        frames.append(
-            {
-                "number": frame["number"],
-                "index": frame["index"],
-                "velocity": None if seen.speed_deg_s is None else seen.speed_deg_s[frame["index"]],
-                "effort": efforts.get(frame["number"], [None])[-1],
-                "isRaw": frame["is_raw"],
-                "kind": kinds[row.get("keyframe", 0.0) > 0.0],
-                "score": found.get("score_jnd"),
-                "psnr": found.get("psnr_db"),
-                "layers": frame["layers"],
-            }
-        )
-    layers = {layer.name: layer for layer in LAYERS}
+def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Tables of rays by kind, where the method counts them, and of pixels by provenance (Table 1)."""
+    tables, rays = [], summary["rays"]
+    if rays:
+        columns = [(spoken(kind), f"{count:.2f}") for kind, count in rays.items()]
+        columns.append(("total", f"{sum(rays.values()):.2f}"))
+        text = "Rays of all tasks so far, divided by the number of pixels of the whole path."
+        tables.append({"title": "Rays per pixel and frame", "columns": columns, "text": text})
+    if summary["per_frame"]:
+        columns = [(title, percent(summary["table1"][key])) for key, title in TRACED.items()]
+        if rays:
+            columns[-1] = ("reused", percent(100.0 - summary["table1"]["total"]))
+        title = "Pixels by provenance, %" if rays else "Pixels traced, %"
+        text = f"Mean of {len(summary['per_frame'])} frames (Table 1 of the paper). {REASONS}"
+        tables.append({"title": title, "columns": columns, "text": text})
+    return tables
+
+
+def _stages(run: ReportedRun) -> list[dict[str, str]]:
+    """Rows of Table 2, with the number of tasks of the stages that are passes."""
+    times, tasks = run.summary["table2"], Counter(line["pass"] for line in run.lines)
+    rows = [(name, tasks.get(name), of["wall_s"], of["cpu_s"]) for name, of in times["stages"].items()]
+    rows.append(("total", sum(tasks.values()), times["total_s"], times["cpu_s"]))
+    return [
+        {
+            "name": spoken(name),
+            "tasks": "" if count is None else str(count),
+            "wall": seconds(wall),
+            "cpu": seconds(cpu),
+            "per_frame": seconds(wall / run.summary["frames"]),
+            "percent": percent(100.0 * wall / max(times["total_s"], 1e-9)),
+        }
+        for name, count, wall, cpu in rows
+    ]
+
+
+def _difference(
+    found: Mapping[str, Any] | None, summary: Mapping[str, Any], reference: Mapping[str, Any] | None
+) -> list[tuple[str, str, str]]:
+    """Rows of the comparison with the reference: name, value, comment."""
+    if found is None:
+        return []
+    psnr = "identical" if found["psnr_db"] is None else f"{found['psnr_db']:.2f} dB"
+    rows = [
+        ("frames compared", str(found["frames"]), "noise of the reference counts as a difference"),
+        ("visible difference", f"{found['score_jnd']:.2f} JND", found["meaning"]),
+        ("pixels above 1 JND", f"{percent(found['percent_visible']['mean'])} %", "mean over the frames"),
+        ("PSNR", psnr, "sRGB-encoded values"),
+        ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
+    ]
+    if reference is not None and summary["video"] and reference["video"]:
+        own, other = (of["table2"]["cpu_s"] / of["frames"] for of in (summary, reference))
+        rows += [
+            ("CPU time per frame", seconds(own), f"{100.0 * own / max(other, 1e-9):.0f} % of the reference"),
+            ("", seconds(other), "the reference; comparable on the same machine"),
+        ]
+    return rows
+
+
+def _settings(run: ReportedRun) -> list[dict[str, Any]]:
+    """Settings by section; those of built-in sections with their defaults and help."""
+    also = {"viewing": run.viewing_settings.to_table(), "video": run.video.to_table()}
+    shown = {**run.identity["settings"], **also}
+    known: dict[str, Section] = {kind.table: kind() for kind in SECTIONS}
+    return [{"name": name, "rows": _section(table, known.get(name))} for name, table in shown.items()]
+
+
+def _section(table: Mapping[str, Any], default: Section | None) -> list[dict[str, Any]]:
+    defaults = {} if default is None else default.to_table()
+    fields = getattr(default, "__dataclass_fields__", {})
+    return [
+        {
+            "name": name,
+            "value": _value(value),
+            "default": _value(defaults[name]) if defaults.get(name, value) != value else None,
+            "help": fields[name].metadata["help"] if name in fields else "",
+        }
+        for name, value in table.items()
+    ]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    return f"{value:g}" if isinstance(value, float) else str(value) or "none"
+
+
+def _identity(run: ReportedRun) -> list[tuple[str, str]]:
+    """Folder, frames, screen, and everything in the identity but frames and settings."""
+    of, numbers = run.viewing, run.numbers
+    size = f"{of.diagonal_m:g} m diagonal at {of.distance_m:g} m"
+    rows = [
+        ("folder", str(run.folder.resolve())),
+        ("frames", f"{len(numbers)}, numbered {numbers[0]} to {numbers[-1]}"),
+        ("screen", f"{size}: {of.pixels_per_degree:.1f} pixels per degree"),
+    ]
+    for name, value in run.identity.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        if name != "settings":
+            rows += [
+                (f"{name} {key}".strip(), _value(part)) for key, part in parts.items() if key != "frames"
+            ]
+    return rows
+
+
+def _data(run: ReportedRun, film: Film, panels: Sequence[Panel]) -> dict[str, Any]:
+    """Data of the player: pictures, and the values of all charts at their frames."""
+    numbers = [frame["number"] for frame in film.frames]
+    keyframes = {row["frame"] for row in run.summary["per_frame"] if row["keyframe"] > 0.0}
+    if len(keyframes) == len(
+        run.summary["per_frame"]
+    ):  # every frame is traced whole: there is nothing to tell
+        keyframes = set()
     return {
-        "fps": seen.identity["path"]["fps"],
+        "fps": run.identity["path"]["fps"],
         "size": film.size,
-        "range": [seen.numbers[0], seen.numbers[-1]],
-        "frames": frames,
+        "last": run.numbers[-1],
+        "frames": [{**f, "kind": "keyframe" if f["number"] in keyframes else ""} for f in film.frames],
         "layers": [
-            {"name": n, "key": layers[n].key, "title": layers[n].title, "isOverlay": layers[n].is_overlay}
-            for n in film.layers
+            {"name": layer.name, "title": layer.title, "isOverlay": layer.is_overlay} for layer in film.layers
         ],
-        "panels": made,
-        "unit": "" if counts_rays(seen.figures) else "%",
+        "values": [[[_rounded(s.values.get(n)) for n in numbers] for s in panel.series] for panel in panels],
     }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)

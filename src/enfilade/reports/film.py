@@ -1,196 +1,166 @@
-"""The frames of a page: which of them, how large, and encoded, so that the page stays small."""
+"""The frames of a report, encoded for its player, within a number of bytes."""
 
 from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from enfilade.errors import ImageError, RunFolderError
+import numpy as np
+
+from enfilade.comparison import ComparedFrame, Terms, compare
+from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import encode_webp, resized
 from enfilade.images.view import View
-from enfilade.monitor import Monitor
-from enfilade.records import U8
-from enfilade.reports.against import Against, Beside
-from enfilade.reports.layers import LAYERS, painted
-from enfilade.reports.seen import SeenFrame, SeenRun
+from enfilade.monitor import Monitor, Silence
+from enfilade.records import F32, U8
+from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
+from enfilade.reports.run import ReportedRun
+from enfilade.viewing import Viewing
 
-__all__ = ["Film", "encode_film"]
+__all__ = ["Film"]
 
-PROBES = 5  # frames that tell how large the others will be
-WIDEST_PX = 1280  # of a picture on the page
-LEAST_WIDTH_PX = 480  # frames are left out before pictures grow narrower than this
-CAUTION = 0.9  # part of the room that the probes may fill: other frames may be larger
+WIDEST_PX = 1280  # of a picture
+LEAST_WIDTH_PX = 480  # frames are left out before pictures become narrower
+CAUTION = 0.8  # of the bytes, since other frames may be larger than the one from which they are estimated
 
 
-@dataclass
 class Film:
-    """Frames as they lie in the page.
+    """The encoded frames of a run, compared with a reference where there is one.
+
+    Pictures that take too many bytes are scaled down to 480 pixels of width, then frames are left out evenly.
+
+    Parameters
+    ----------
+    run
+    view
+        View transform of the video.
+    reference
+        Whatever :func:`enfilade.images.open_sequence` reads, with the finished frames of the run; or None.
+    max_bytes
+        Of all pictures, as text, about.
+    monitor
 
     Attributes
     ----------
     size : tuple of int
-        Width and height of the pictures, pixels.
+        Width and height of the pictures.
     frames : list of dict
-        ``number``, ``index``, ``is_raw``, and ``layers``: base64 of a WebP by the layer's name.
-    beside : dict of int to dict
-        By the frame's number: ``psnr_db``, ``score_jnd``, ``percent_visible``.
+        ``number``, ``index`` on the path, and ``layers``: WebP in base64, by the layer's name.
+    difference : dict or None
+        ``SequenceDifference.to_dict()`` from the reference.
     notes : list of str
-        What is missing, and why.
+        What was scaled or left out.
+
+    Raises
+    ------
+    DamagedFileError, ImageError
+        A frame can't be read, or the run and the reference can't be compared.
     """
 
-    size: tuple[int, int]
-    frames: list[dict[str, Any]] = field(default_factory=list)
-    beside: dict[int, dict[str, float | None]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    def __init__(
+        self, run: ReportedRun, view: View, reference: Path | None, max_bytes: float, monitor: Monitor
+    ) -> None:
+        self._run, self._view = run, view
+        full = (run.viewing.width_px, run.viewing.height_px)
+        self.size = _scaled(full, min(1.0, WIDEST_PX / full[0]))
+        self.frames: list[dict[str, Any]] = []
+        self.difference: dict[str, Any] | None = None
+        self.notes: list[str] = []
+        if not run.there:
+            self.notes.append("no frame is finished yet")
+            return
+        step = self._fit(CAUTION * max_bytes, is_compared=reference is not None)
+        kept = sorted({*run.there[::step], run.there[-1]})
+        if reference is not None:
+            self.difference = self._compare(reference, set(kept), monitor)
+        else:
+            for count, index in enumerate(kept, 1):
+                self._add(index)
+                monitor.progress("report", count, len(kept))
+        if self.size != full:
+            before, after = (f"{width}x{height}" for width, height in (full, self.size))
+            self.notes.append(f"pictures are scaled from {before} to {after} pixels")
+        if step > 1:
+            self.notes.append(
+                f"the player has {len(kept)} of {len(run.there)} frames, to keep the page small; charts and "
+                "tables have all"
+            )
 
     @property
-    def layers(self) -> list[str]:
-        """Names of the layers that any frame has."""
-        return [layer.name for layer in LAYERS if any(layer.name in f["layers"] for f in self.frames)]
+    def layers(self) -> list[Layer]:
+        """Layers that at least one frame has."""
+        return [layer for layer in LAYERS if any(layer.name in frame["layers"] for frame in self.frames)]
 
-    def has_all(self, layer: str) -> bool:
-        """Whether every frame has a layer."""
-        return all(layer in frame["layers"] for frame in self.frames)
+    def _fit(self, most: float, *, is_compared: bool) -> int:
+        """Scale the pictures; returns every how many frames one is kept."""
+        found = self._encoded(self._painted(self._run.there[len(self._run.there) // 2]))
+        # Maps of differences take about as much as the result.
+        each = sum(map(len, found.values())) + (2 * len(found["result"]) if is_compared else 0)
+        total = each * len(self._run.there)
+        if total <= most:
+            return 1
+        factor = max(math.sqrt(most / total), min(1.0, LEAST_WIDTH_PX / self.size[0]))
+        self.size = _scaled(self.size, factor)
+        return max(1, math.ceil(total * factor**2 / most))
+
+    def _compare(self, reference: Path, kept: set[int], monitor: Monitor) -> dict[str, Any]:
+        """Compare all finished frames with the reference, and add those that are kept."""
+        run, indices = self._run, {number: index for index, number in enumerate(self._run.numbers)}
+        absolute = AbsoluteDifference()
+
+        def show(frames: Iterator[ComparedFrame], _viewing: Viewing) -> None:
+            for count, frame in enumerate(frames, 1):
+                monitor.progress("report", count, len(run.there))
+                index = indices[frame.difference.number]
+                if index in kept:
+                    self._add(index, painted_difference(frame, absolute.map_percent))
+
+        of = run.viewing_settings
+        terms = Terms(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
+        return compare(run.folder, reference, terms, Silence(), show=show).to_dict()
+
+    def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
+        layers = {**self._encoded(self._painted(index)), **self._encoded(differences or {})}
+        self.frames.append({"number": self._run.numbers[index], "index": index, "layers": layers})
+
+    def _painted(self, index: int) -> dict[str, U8]:
+        return painted(self._run.frame(index), self._view, self._run.viewing)
+
+    def _encoded(self, pictures: Mapping[str, U8]) -> dict[str, str]:
+        """As WebP in base64."""
+        found = {}
+        for layer in LAYERS:
+            if layer.name in pictures:
+                picture = resized(pictures[layer.name], self.size, is_mixed=not layer.is_overlay)
+                found[layer.name] = base64.b64encode(encode_webp(picture, quality=layer.quality)).decode()
+        return found
 
 
-def encode_film(
-    seen: SeenRun,
-    wanted: Sequence[int],
-    against: Against | None,
-    view: View,
-    monitor: Monitor,
-    *,
-    room_bytes: float,
-) -> Film:
-    """Encode frames within a number of bytes.
+class AbsoluteDifference:
+    """Mean absolute difference of sRGB-encoded values, percent of white.
 
-    Pictures are scaled first, to no less than 480 pixels of width; then frames are left out, evenly. A
-    frame that can't be read is left out, and named in the notes.
-
-    Parameters
+    Attributes
     ----------
-    seen
-    wanted
-        Indices of frames that are there, rising.
-    against
-        None: without a reference. Of frames that are left out, the metric judges all the same: what
-        flickers is seen in frames that follow each other.
-    view
-    monitor
-    room_bytes
-        As text in the page.
+    map_percent : (H, W) float32
+        Of the last frame, mean of the channels.
     """
-    shown_size = (seen.viewing.width_px, seen.viewing.height_px)
-    size = _scaled(shown_size, min(1.0, WIDEST_PX / shown_size[0]))
-    if not wanted:
-        return Film(size, notes=["there is no frame to show yet"])
-    each = _probe(seen, wanted, view, size, has_maps=against is not None)
-    size, step = _fitted(size, each * len(wanted), room_bytes * CAUTION)
-    film = Film(size)
-    kept = set(wanted[::step]) | {wanted[-1]}
-    monitor.stage("report", len(wanted))
-    for frame, beside in _read(seen, wanted, against, film.notes, kept, monitor.advance):
-        if beside is not None:
-            film.beside[frame.number] = {
-                "psnr_db": beside.psnr_db,
-                "score_jnd": beside.score_jnd,
-                "percent_visible": beside.percent_visible,
-            }
-        if frame.index in kept:
-            pictures = painted(frame, beside, view=view, viewing=seen.viewing)
-            film.frames.append(
-                {
-                    "number": frame.number,
-                    "index": frame.index,
-                    "is_raw": frame.is_raw,
-                    "layers": _encoded(pictures, size),
-                }
-            )
-    if raw := sum(frame["is_raw"] for frame in film.frames):
-        film.notes.append(
-            f"{raw} frames are shown before they are filtered over time, which the run has still to do"
-        )
-    is_thinned = step > 1
-    while len(film.frames) > 1 and _bytes(film.frames) > room_bytes:
-        film.frames, is_thinned = film.frames[::2], True
-    if film.size != shown_size:
-        before, after = (f"{width}x{height}" for width, height in (shown_size, film.size))
-        film.notes.append(f"pictures are scaled from {before} to {after} pixels")
-    if is_thinned:
-        film.notes.append(
-            f"{len(film.frames)} of {len(wanted)} frames are on the page, to keep it small; charts "
-            "and tables show all (--max-mb and --frames choose others)"
-        )
-    return film
 
+    name = "absolute"
+    map_percent: F32
 
-def _read(
-    seen: SeenRun,
-    wanted: Sequence[int],
-    against: Against | None,
-    notes: list[str],
-    kept: set[int],
-    advance: Callable[[], None],
-) -> Iterator[tuple[SeenFrame, Beside | None]]:
-    for index in wanted:
-        advance()
-        if against is None and index not in kept:
-            continue
-        try:
-            frame = seen.frame(index)
-        except (ImageError, RunFolderError) as error:
-            notes.append(f"frame {seen.numbers[index]} is left out: {error}")
-            continue
-        try:
-            beside = None if against is None else against.beside(frame)
-        except (ImageError, RunFolderError) as error:
-            notes.append(f"frame {frame.number} is shown without the reference: {error}")
-            beside = None
-        yield frame, beside
+    def measure(self, pair: DisplayedPair) -> float:
+        """Of the next frame."""
+        self.map_percent = np.float32(100.0) * np.abs(pair.test - pair.reference).mean(axis=2)
+        return float(self.map_percent.mean())
 
-
-def _probe(
-    seen: SeenRun, wanted: Sequence[int], view: View, size: tuple[int, int], *, has_maps: bool
-) -> float:
-    """Bytes that a frame will take, as text."""
-    count = min(PROBES, len(wanted))
-    chosen = sorted({wanted[round(i * (len(wanted) - 1) / max(count - 1, 1))] for i in range(count)})
-    found = []
-    for index in chosen:
-        try:
-            pictures = painted(seen.frame(index), None, view=view, viewing=seen.viewing)
-        except (ImageError, RunFolderError):  # said when the frame's turn comes
-            continue
-        sizes = {name: len(text) for name, text in _encoded(pictures, size).items()}
-        # Maps of differences are about as hard to encode as the image.
-        found.append(sum(sizes.values()) + (2 * sizes["result"] if has_maps else 0))
-    return max(found, default=0.0)
-
-
-def _fitted(size: tuple[int, int], total: float, room: float) -> tuple[tuple[int, int], int]:
-    if total <= room:
-        return size, 1
-    factor = max(math.sqrt(room / total), min(1.0, LEAST_WIDTH_PX / size[0]))
-    left = total * factor**2
-    return _scaled(size, factor), max(1, math.ceil(left / room))
+    def pool(self, values: Sequence[float | None]) -> float:
+        """Of the whole sequence."""
+        return float(np.mean([value for value in values if value is not None]))
 
 
 def _scaled(size: tuple[int, int], factor: float) -> tuple[int, int]:
     width, height = (max(1, round(side * factor)) for side in size)
     return width, height
-
-
-def _encoded(pictures: Mapping[str, U8], size: tuple[int, int]) -> dict[str, str]:
-    found = {}
-    for layer in LAYERS:
-        if layer.name in pictures:
-            picture = resized(pictures[layer.name], size, is_mixed=not layer.is_overlay)
-            found[layer.name] = base64.b64encode(encode_webp(picture, quality=layer.quality)).decode()
-    return found
-
-
-def _bytes(frames: Sequence[Mapping[str, Any]]) -> int:
-    return sum(len(text) for frame in frames for text in frame["layers"].values())

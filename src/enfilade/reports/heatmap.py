@@ -1,70 +1,40 @@
 """Heat maps: visible differences in colour over the grey image, with a legend, as a video or as PNGs.
 
-Where nothing is seen the image is grey. From there the colours go from blue over red to yellow, growing
-lighter: readers with any of the common colour deficiencies tell them apart, and so does a grey print.
+Where no difference is seen, the image is grey.
 """
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from enfilade.errors import RunFolderError, SettingsError
+from enfilade.errors import SettingsError
 from enfilade.images import encode_video
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import F32, U8
 from enfilade.reports.charts import Figure, pixels, save_picture
+from enfilade.reports.scales import VISIBLE
 from enfilade.settings import VideoSettings
 
 __all__ = ["VIDEO_CODECS", "HeatmapPainter", "overlay", "write_heatmap_images", "write_heatmap_video"]
 
-VIDEO_CODECS = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}  # by the suffix that is asked for
-FAINT_JND, SOLID_JND, TOP_JND = 0.25, 1.0, 16.0  # colour begins, hides most of the grey, ends
-COLORS = {  # sRGB of each JND; between them by straight lines over log(1 + JND)
-    0.0: (0.10, 0.20, 0.70),
-    0.5: (0.16, 0.32, 0.92),
-    1.0: (0.58, 0.16, 0.78),
-    2.0: (0.86, 0.25, 0.46),
-    4.0: (0.96, 0.47, 0.20),
-    8.0: (0.99, 0.73, 0.16),
-    16.0: (1.00, 0.98, 0.50),
-}
-STEPS = 1024  # of the colours between 0 and TOP_JND
-OPACITY = 0.9  # at most: a little of the image shows through
+VIDEO_CODECS = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}  # by suffix
+FAINT_JND, SOLID_JND = 0.25, 1.0  # where colour begins, and hides most of the grey
+OPACITY = 0.9  # largest
 DARKEST, LIGHTEST = 0.06, 0.62  # encoded black and white of the grey image, so that colours stand out
-LEAST_WIDTH_PX = 480  # narrower images are enlarged by a whole factor: the legend must be legible
+LEAST_WIDTH_PX = 480  # narrower images are enlarged by a whole factor, for a legible legend
 BACKGROUND, INK = "#111111", "#EEEEEE"
 
 
-def _place(jnd: npt.ArrayLike) -> F32:
-    """Place on the scale of colours, 0..1: the logarithm of 1 + JND, so that faint and strong both show."""
-    return np.asarray(np.log1p(np.asarray(jnd, np.float32)) / np.float32(np.log1p(TOP_JND)), np.float32)
-
-
-def _ramp() -> tuple[F32, F32]:
-    place = np.linspace(0.0, 1.0, STEPS)
-    jnd = np.expm1(place * np.log1p(TOP_JND))
-    opacity = OPACITY * np.clip((jnd - FAINT_JND) / (SOLID_JND - FAINT_JND), 0.0, 1.0)
-    stops = _place(list(COLORS))
-    color = np.stack([np.interp(place, stops, [c[i] for c in COLORS.values()]) for i in range(3)], axis=-1)
-    return (opacity[:, None] * color).astype(np.float32), (1.0 - opacity).astype(np.float32)
-
-
-RAMP, TRANSPARENCY = _ramp()
-
-
 def overlay(jnd: F32, grey: F32) -> F32:
-    """Colour a map over an image.
+    """Colour a map of visible differences over an image.
 
     Parameters
     ----------
     jnd : (H, W) float32
-        Visible difference, JND; from :data:`TOP_JND` on the colour stays.
+        Visible difference, JND, on the scale :data:`~enfilade.reports.scales.VISIBLE`.
     grey : (H, W) float32
         The image, encoded for a screen, 0..1.
 
@@ -73,10 +43,9 @@ def overlay(jnd: F32, grey: F32) -> F32:
     (H, W, 3) float32
         Encoded sRGB, 0..1.
     """
-    step = np.minimum(_place(jnd) * np.float32(STEPS), np.float32(STEPS - 1)).astype(np.intp)
-    shown = np.float32(DARKEST) + np.float32(LIGHTEST - DARKEST) * np.clip(grey, 0.0, 1.0)
-    mixed: F32 = RAMP[step]
-    mixed += (shown * TRANSPARENCY[step])[..., None]
+    opacity = OPACITY * np.clip((jnd - FAINT_JND) / (SOLID_JND - FAINT_JND), 0.0, 1.0)[..., None]
+    shown = DARKEST + (LIGHTEST - DARKEST) * np.clip(grey, 0.0, 1.0)[..., None]
+    mixed: F32 = (opacity * VISIBLE.ramp[VISIBLE.step(jnd)] + (1.0 - opacity) * shown).astype(np.float32)
     return mixed
 
 
@@ -91,7 +60,7 @@ class HeatmapPainter:
     Attributes
     ----------
     width, height : int
-        Of the pictures, even: narrow maps are enlarged by a whole factor, and the legend is below.
+        Of the pictures, even. Narrow maps are enlarged by a whole factor; the legend is below.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -136,7 +105,7 @@ class HeatmapPainter:
         return picture
 
     def _figure(self, height_px: int) -> Figure:
-        # At 72 dots per inch a point, the unit of text, is a pixel.
+        # At 72 dots per inch, a point of text is a pixel.
         return Figure(figsize=(self.width / 72, height_px / 72), dpi=72, facecolor=BACKGROUND)
 
     def _drawn_caption(self, text: str) -> U8:
@@ -149,16 +118,16 @@ class HeatmapPainter:
         figure = self._figure(height_px)
         side = self._side
         ax = figure.add_axes((side, 0.72, 1.0 - 2.0 * side, 0.24))
-        ramp = np.expm1(np.linspace(0.0, np.log1p(TOP_JND), self.width, dtype=np.float32))[None, :]
+        ramp = VISIBLE.values(self.width)[None, :]
         ax.imshow(overlay(ramp, np.full_like(ramp, 0.5)), aspect="auto", extent=(0.0, 1.0, 0.0, 1.0))
         ax.set_yticks([])
-        labels = [f"{jnd:g}" for jnd in COLORS]
-        ax.set_xticks(_place(list(COLORS)).tolist(), [*labels[:-1], f"{labels[-1]} and more"])
+        *labels, last = (f"{jnd:g}" for jnd in VISIBLE.colors)
+        ax.set_xticks(VISIBLE.place(list(VISIBLE.colors)).tolist(), [*labels, f"{last} and more"])
         ax.get_xticklabels()[-1].set_horizontalalignment("right")
         ax.tick_params(colors=INK, labelsize=0.9 * self._text_px, length=3, pad=1)
         ax.spines[:].set_visible(False)
         figure.text(
-            side, 0.06, "just noticeable differences (JND): at 1, three viewers of four see it",
+            side, 0.06, "just noticeable differences (JND): 1 is noticed in 3 of 4 cases",
             color=INK, fontsize=0.9 * self._text_px, va="bottom",
         )  # fmt: skip
         return pixels(figure)
@@ -170,7 +139,7 @@ def write_heatmap_video(file: Path, pictures: Iterable[U8], *, size: tuple[int, 
     Parameters
     ----------
     file
-        Its suffix chooses the codec: `.mp4` H.264, `.mkv` FFV1 (without loss), `.mov` ProRes.
+        The suffix chooses the codec: `.mp4` H.264, `.mkv` FFV1 (lossless), `.mov` ProRes.
     pictures : iterable of (height, width, 3) uint8
     size
         Width and height.
@@ -193,32 +162,19 @@ def write_heatmap_video(file: Path, pictures: Iterable[U8], *, size: tuple[int, 
 
 
 def write_heatmap_images(folder: Path, pictures: Iterable[tuple[str, U8]]) -> None:
-    """Write pictures as PNGs; none appears in the folder before all are there.
+    """Write pictures as PNGs.
 
     Parameters
     ----------
     folder
         Made where it is missing. Files of the same names in it are replaced.
     pictures : iterable of (str, (height, width, 3) uint8)
-        Name of the file without its suffix, and what is in it.
+        Name of the file without its suffix, and the picture.
 
     Raises
     ------
     RunFolderError
         The folder can't be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=".heatmap-", dir=folder))
-    except OSError as error:
-        raise RunFolderError(f"can't write into {folder}: {error.strerror}") from error
-    try:
-        for file in list(_saved(beside, pictures)):
-            file.replace(folder / file.name)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def _saved(folder: Path, pictures: Iterable[tuple[str, U8]]) -> Iterator[Path]:
     for name, picture in pictures:
-        yield save_picture(picture, folder / f"{name}.png")
+        save_picture(picture, folder / f"{name}.png")

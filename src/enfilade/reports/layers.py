@@ -1,105 +1,95 @@
-"""What the report shows of a frame: result, source, probability of detection, velocity, difference."""
+"""The layers of a frame in a report: result, provenance, visible difference, velocity, difference."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from enfilade.comparison import ComparedFrame
 from enfilade.images.view import View
-from enfilade.metric.pooling import detection_probability
 from enfilade.records import F32, U8, Provenance
 from enfilade.reports import heatmap
-from enfilade.reports.against import Beside
-from enfilade.reports.scales import DIFFERENCE, VELOCITY, Scale
-from enfilade.reports.seen import SeenFrame
+from enfilade.reports.charts import PROVENANCE_COLORS
+from enfilade.reports.run import DeliveredFrame
+from enfilade.reports.scales import DIFFERENCE, VELOCITY, VISIBLE, Scale
 from enfilade.viewing import Viewing
 
-__all__ = ["LAYERS", "SOURCE_COLORS", "Layer", "painted"]
+__all__ = ["LAYERS", "Layer", "painted", "painted_difference"]
 
-SOURCE_COLORS = {  # Okabe and Ito's, told apart with any of the common colour deficiencies
-    Provenance.SLOW: "#56B4E9",
-    Provenance.SPECULAR: "#E69F00",
-    Provenance.DISOCCLUDED: "#009E73",
-    Provenance.KEYFRAME: "#CC79A7",
-}
-SOURCE_NAMES = {
-    Provenance.SLOW: "slow",
-    Provenance.SPECULAR: "specular",
-    Provenance.DISOCCLUDED: "hole",
-    Provenance.KEYFRAME: "keyframe",
-}
 QUALITY = 92  # of WebP
+LEGEND_STEPS = 33  # colours
 
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of the report.
+    """A layer of the player.
 
     Attributes
     ----------
     name : str
-        Short, for programs.
-    key : int
-        On the keyboard.
+        Identifier.
     title, text : str
-        For people: a word or two, and a sentence.
+        A word or two, and a sentence.
     legend : dict
         ``swatches`` (name and colour of each), or ``gradient`` (CSS colours) with ``ticks`` (place 0..1
-        and label); empty where none is needed.
-    quality : int or None
-        Of WebP; None: without loss.
+        and label); empty for images.
     is_overlay : bool
-        Drawn, half transparent, over the grey result.
+        Drawn, half transparent, over the grey result, and stored losslessly.
     """
 
     name: str
-    key: int
     title: str
     text: str
-    legend: dict[str, Any]
-    quality: int | None = QUALITY
+    legend: dict[str, Any] = field(default_factory=dict)
     is_overlay: bool = False
 
+    @property
+    def quality(self) -> int | None:
+        """Of WebP; None: lossless."""
+        return None if self.is_overlay else QUALITY
 
-def painted(frame: SeenFrame, beside: Beside | None, *, view: View, viewing: Viewing) -> dict[str, U8]:
-    """Paint all layers that there are of a frame.
+
+def painted(frame: DeliveredFrame, view: View, viewing: Viewing) -> dict[str, U8]:
+    """Paint the layers of a frame: result, provenance and velocity, as far as its file has them.
 
     Parameters
     ----------
     frame
-    beside
-        The same with its reference; None where there is none.
     view
-        The view transform of the video.
+        View transform of the video.
     viewing
 
     Returns
     -------
     dict of str to (H, W, 3) uint8
-        Encoded sRGB, by the layer's name; the source map has opacity as fourth channel.
+        Encoded sRGB, by the layer's name; provenance has opacity as a fourth channel.
     """
     pictures = {"result": _bytes(view.encode(frame.color))}
-    if frame.source is not None:
-        pictures["source"] = _source(frame.source)
-    if beside is not None and beside.jnd is not None:
-        pictures["visible"] = _bytes(heatmap.overlay(beside.jnd, beside.grey))
+    if frame.provenance is not None:
+        pictures["provenance"] = _provenance_colors()[frame.provenance]
     if frame.flow is not None:
-        fastest = np.hypot(viewing.width_px, viewing.height_px)
-        speed = np.minimum(frame.flow.speed, np.float32(fastest))
-        pictures["velocity"] = VELOCITY.paint(viewing.velocity_deg_s(speed))
-    if beside is not None:
-        pictures["difference"] = DIFFERENCE.paint(beside.difference_percent)
+        fastest_px = np.float32(np.hypot(viewing.width_px, viewing.height_px))  # points near the eye
+        pictures["velocity"] = VELOCITY.paint(
+            viewing.velocity_deg_s(np.minimum(frame.flow.speed, fastest_px))
+        )
     return pictures
 
 
-def _source(source: U8) -> U8:
+def painted_difference(compared: ComparedFrame, difference_percent: F32) -> dict[str, U8]:
+    """Paint the difference of a frame from the reference, visible and absolute, (H, W) percent of white."""
+    visible = _bytes(heatmap.overlay(compared.jnd, compared.grey))
+    return {"visible": visible, "difference": DIFFERENCE.paint(difference_percent)}
+
+
+def _provenance_colors() -> U8:
+    """Colours of provenance, (256, 4); reused pixels are transparent."""
     table = np.zeros((256, 4), np.uint8)
-    for number, color in SOURCE_COLORS.items():
-        table[number] = (*bytes.fromhex(color[1:]), 255)
-    mapped: U8 = table[source]
-    return mapped
+    for name, color in PROVENANCE_COLORS.items():
+        table[Provenance[name.upper()]] = (*bytes.fromhex(color[1:]), 255)
+    return table
 
 
 def _bytes(encoded: F32) -> U8:
@@ -107,58 +97,43 @@ def _bytes(encoded: F32) -> U8:
     return values
 
 
-def _scale_legend(scale: Scale) -> dict[str, Any]:
-    places = scale.place(np.array(scale.ticks)).tolist()
-    labels = [f"{tick:g}" for tick in scale.ticks]
-    return {
-        "gradient": [f"#{color}" for color in scale.colors],
-        "ticks": [{"place": p, "label": t} for p, t in zip(places, labels, strict=True)],
-    }
-
-
-def _visible_legend() -> dict[str, Any]:
-    jnd = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0], np.float32)
-    ramp = np.expm1(np.linspace(0.0, np.log1p(16.0), 33)).astype(np.float32)[None, :]
-    colors = _bytes(heatmap.overlay(ramp, np.full_like(ramp, 0.5)))[0]
-    places = np.log1p(jnd) / np.log1p(16.0)
-    shares = 100.0 * detection_probability(jnd)
-    labels = [f"{s:.0f} %" if j < 4.0 else f"{j:g} JND" for j, s in zip(jnd, shares, strict=True)]
+def _legend(scale: Scale, paint: Callable[[F32], U8]) -> dict[str, Any]:
+    ticks, colors = list(scale.colors), paint(scale.values(LEGEND_STEPS)[None])[0]
     return {
         "gradient": ["#" + bytes(color.tolist()).hex() for color in colors],
-        "ticks": [{"place": float(p), "label": t} for p, t in zip(places, labels, strict=True)],
+        "ticks": list(zip(scale.place(ticks).tolist(), (f"{tick:g}" for tick in ticks), strict=True)),
     }
+
+
+def _visible_on_grey(jnd: F32) -> U8:
+    return _bytes(heatmap.overlay(jnd, np.full_like(jnd, 0.5)))
 
 
 LAYERS = (
-    Layer("result", 1, "Result", "The finished frame, as in the video.", {}),
+    Layer("result", "Result", "The finished frame, as in the video."),
     Layer(
-        "source",
-        2,
-        "Source",
-        "Why each pixel was traced, over the result in grey; pixels without colour are reused.",
-        {"swatches": [{"name": SOURCE_NAMES[s], "color": c} for s, c in SOURCE_COLORS.items()]},
-        None,
+        "provenance",
+        "Provenance",
+        "Why pixels were computed anew, over the grey result. Grey pixels are reused from keyframes.",
+        {"swatches": list(PROVENANCE_COLORS.items())},
         is_overlay=True,
     ),
     Layer(
         "visible",
-        3,
-        "Probability",
-        "Probability that a viewer sees the difference to the reference (75 % is 1 JND).",
-        _visible_legend(),
+        "Visible difference",
+        "Difference from the reference in just noticeable differences (JND); 1 is noticed in 3 of 4 cases.",
+        _legend(VISIBLE, _visible_on_grey),
     ),
     Layer(
         "velocity",
-        4,
         "Velocity",
         "Image velocity on the screen, degrees per second.",
-        _scale_legend(VELOCITY),
+        _legend(VELOCITY, VELOCITY.paint),
     ),
     Layer(
         "difference",
-        5,
         "Difference",
-        "Absolute difference to the reference, percent of white: encoded values, mean of the channels.",
-        _scale_legend(DIFFERENCE),
+        "Absolute difference from the reference, percent of white: sRGB values, mean of the channels.",
+        _legend(DIFFERENCE, DIFFERENCE.paint),
     ),
 )

@@ -1,223 +1,175 @@
-"""Charts of the report, over the frames: Figs. 12 and 13 of a run, and its difference to a reference.
-
-A panel is a table fit for JSON: traces as Plotly takes them, and what stands around them. Colours that
-depend on the page's theme are named (``ink``) and filled in by the page.
-"""
+"""Charts of a run over its frames: velocity, rays or traced pixels, quality, time (Figs. 12, 13)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from enfilade.records import Provenance
-from enfilade.reports.layers import SOURCE_COLORS
+from enfilade.reports.charts import BLUE, GREEN, PALETTE, PROVENANCE_COLORS, VERMILION, Panel, Series
+from enfilade.reports.tables import spoken
+from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 
-__all__ = ["PURPOSES", "counts_rays", "panels"]
+__all__ = ["plan_panels", "quality_panel", "run_panels", "time_panel"]
 
-Panel = dict[str, Any]
-BLUE, VERMILION, GREEN = "#3D8FC6", "#D55E00", "#009E73"
-REASONS = {  # of a row of the summary: name, colour
-    "slow": ("slow", SOURCE_COLORS[Provenance.SLOW]),
-    "specular": ("specular", SOURCE_COLORS[Provenance.SPECULAR]),
-    "hole": ("holes", SOURCE_COLORS[Provenance.DISOCCLUDED]),
-    "keyframe": ("keyframes", SOURCE_COLORS[Provenance.KEYFRAME]),
-}
+DELIVERY = frozenset({ANALYSIS.name, CLIPS.name, VIDEO.name})  # passes whose tasks cover many frames
 
 
-PURPOSES = {  # sent for: name, colour
-    "camera": ("what is seen", SOURCE_COLORS[Provenance.SLOW]),
-    "lobes": ("mirrors, glass and gloss", SOURCE_COLORS[Provenance.SPECULAR]),
-    "light": ("light of keyframes", SOURCE_COLORS[Provenance.KEYFRAME]),
-    "drafts": ("drafts of it", SOURCE_COLORS[Provenance.DISOCCLUDED]),
-}
-
-
-def counts_rays(figures: Mapping[str, Any]) -> bool:
-    """Whether the method of a run counts rays, not traced pixels; it may have counted none yet."""
-    return bool(figures["method"] == "decoupled")
-
-
-def panels(
-    figures: Mapping[str, Any],
-    numbers: Sequence[int],
-    speed_deg_s: Sequence[float] | None,
-    beside: Mapping[int, Mapping[str, float | None]],
-) -> list[Panel]:
-    """Charts of a run; those without anything to show are left out.
+def run_panels(summary: Mapping[str, Any], split_percent: float | None = None) -> list[Panel]:
+    """Velocity, rays by kind or else traced pixels by reason, and predictions of the metric, if there are.
 
     Parameters
     ----------
-    figures
-        See :func:`~enfilade.store.tally`.
-    numbers
-        Of all frames of the path.
-    speed_deg_s
-        Mean velocity of each; None where it is not known.
-    beside
-        By frame number: ``psnr_db``, ``score_jnd`` (each may be None).
+    summary
+        See :func:`~enfilade.runs.statistics.statistics`.
+    split_percent
+        Visible pixels, percent, above which segments are split; None: unknown.
     """
-    rows = figures["per_frame"]
-    made = [
-        _velocity(numbers, speed_deg_s, rows) if speed_deg_s else None,
-        _sent(figures) if counts_rays(figures) else _traced(rows, figures["table1"]) if rows else None,
-        _predictions(figures["segments"], figures["split_percent"]),
-        _score(beside) or _psnr(beside),
+    rows = summary["per_frame"]
+    speeds = {row["frame"]: row["velocity_deg_s"] for row in rows if row["velocity_deg_s"] is not None}
+    keyframes = [row["frame"] for row in rows if row["keyframe"] and row["frame"] in speeds]
+    if len(keyframes) == len(speeds):  # every frame is traced whole: there is nothing to mark
+        keyframes = []
+    effort = _rays_panel(summary) if summary["rays"] else _traced_panel(summary)
+    found = [
+        _velocity_panel(speeds, keyframes),
+        effort,
+        _predictions_panel(summary["segments"], split_percent),
     ]
-    return [panel for panel in made if panel is not None]
+    return [panel for panel in found if any(series.values for series in panel.series)]
 
 
-def _velocity(numbers: Sequence[int], speeds: Sequence[float], rows: Sequence[Mapping[str, Any]]) -> Panel:
-    at = dict(zip(numbers, speeds, strict=True))
-    traces = [_line("mean over the image", numbers, speeds, BLUE)]
-    keyframes = [row["frame"] for row in rows if row["keyframe"] > 0.0]
-    if 0 < len(keyframes) < len(rows):
-        traces.append(
-            _points("keyframe", keyframes, [at[k] for k in keyframes], VERMILION, "triangle-down", None)
-        )
-    text = f"Mean image velocity per frame, {min(speeds):.2f} to {max(speeds):.2f} degrees per second."
-    return _panel("velocity", "Image velocity", "deg/s", traces, text, top=1.08 * max(*speeds, 0.1))
-
-
-def _traced(rows: Sequence[Mapping[str, Any]], table1: Mapping[str, float]) -> Panel:
-    traces = [
-        _bars(name, rows, key, color, "%{y:.1f} %")
-        for key, (name, color) in REASONS.items()
-        if any(row[key] > 0.0 for row in rows)
-    ]
-    total = table1["total"]
-    text = f"Pixels traced per frame by reason; {total:.1f} percent on average."
-    panel = _panel("traced", "Pixels traced, by reason", "%", traces, text, top=100.0)
-    return {**panel, "ticks": [0, 50, 100], "level": {"value": total, "name": f"mean {total:.1f} %"}}
-
-
-def _sent(figures: Mapping[str, Any]) -> Panel | None:
-    rows, rays = figures["rays_per_frame"], figures["rays"]
-    if not rows:
-        return None
-    traces = [
-        _bars(name, rows, kind, color, "%{y:.1f}")
-        for kind, (name, color) in PURPOSES.items()
-        if rays[kind] > 0.0
-    ]
-    total = sum(rays.values())
-    text = f"Rays sent for a pixel of each frame, by purpose; {total:.1f} on average."
-    most = max(sum(row[kind] for kind in PURPOSES) for row in rows)
-    panel = _panel("rays", "Rays per pixel, by purpose", "", traces, text, top=1.05 * most)
-    return {**panel, "level": {"value": total, "name": f"mean {total:.1f}"}}
-
-
-def _bars(name: str, rows: Sequence[Mapping[str, Any]], key: str, color: str, value: str) -> dict[str, Any]:
-    return {
-        "type": "bar",
-        "name": name,
-        "x": [row["frame"] for row in rows],
-        "y": [round(row[key], 3) for row in rows],
-        "marker": {"color": color, "line": {"width": 0}},
-        "hovertemplate": f"{value} {name}<extra></extra>",
-    }
-
-
-def _predictions(segments: Sequence[Mapping[str, Any]], threshold: float) -> Panel | None:
-    judged = [s for s in segments if s["middle"] is not None]
-    if not judged:
-        return None
-    when = {
-        "before splitting": [s for s in judged if s["depth"] == 0],
-        "after": [s for s in judged if not s["is_split"]],
-    }
-    traces = []
-    for key, eye, color, dash in (
-        ("percent_visible", "pursuit", VERMILION, "solid"),
-        ("percent_visible_no_pursuit", "no pursuit", BLUE, "dot"),
-    ):
-        for title, chosen in when.items():
-            points = sorted((s["middle"], round(s[key], 3)) for s in chosen)
-            symbol = "square-open" if title != "after" else "circle"
-            x, y = ([p[i] for p in points] for i in (0, 1))
-            traces.append(_points(f"{eye}, {title}", x, y, color, symbol, dash))
-    most = max(s["percent_visible"] for s in judged)
-    split = sum(bool(s["is_split"]) for s in judged)
-    text = (
-        f"What the metric predicted for the middle of each segment: at most {most:.1f} percent of pixels "
-        f"visible; {split} of {len(judged)} segments were split."
+def plan_panels(plan: Mapping[str, Any]) -> list[Panel]:
+    """Velocity with the initial keyframes, and slow and specular pixels; of ``Plan.to_dict()``."""
+    frames = plan["frames"]
+    speeds = dict(zip(frames, plan["mean_speed_deg_s"], strict=True))
+    shares = tuple(
+        Series(name, PROVENANCE_COLORS[name], dict(zip(frames, plan[f"{name}_percent"], strict=True)), mark)
+        for name, mark in (("slow", "line"), ("specular", "dashed"))
     )
-    panel = _panel(
-        "predictions", "Predictions for segment middles", "% visible", traces, text,
-        top=1.2 * max(most, threshold),
-    )  # fmt: skip
-    legend = [
-        {"name": "pursuit", "color": VERMILION, "symbol": "line"},
-        {"name": "no pursuit", "color": BLUE, "symbol": "dots"},
-        {"name": "before", "color": "var(--ink-soft)", "symbol": "square-open"},
-        {"name": "after splitting", "color": "var(--ink-soft)", "symbol": "circle"},
-    ]
-    return {**panel, "legend": legend, "level": {"value": threshold, "name": f"split above {threshold:g} %"}}
+    pixels = Panel("pixels", "Slow and specular pixels", "%", "", shares, top=100.0)
+    return [_velocity_panel(speeds, plan["keyframes"]), pixels]
 
 
-def _score(beside: Mapping[int, Mapping[str, float | None]]) -> Panel | None:
-    points = [
-        (n, found["score_jnd"]) for n, found in sorted(beside.items()) if found["score_jnd"] is not None
-    ]
-    if not points:
-        return None
-    x, y = [p[0] for p in points], [float(p[1] or 0.0) for p in points]
-    text = f"Visible difference to the reference per frame, {min(y):.2f} to {max(y):.2f} JND."
-    panel = _panel(
-        "score", "Visible difference to the reference", "JND", [_line("score", x, y, GREEN)], text,
-        top=1.1 * max(*y, 1.0),
-    )  # fmt: skip
-    return {**panel, "level": {"value": 1.0, "name": "1 JND"}}
+def quality_panel(difference: Mapping[str, Any]) -> Panel:
+    """Visible difference of each frame from a reference; of ``SequenceDifference.to_dict()``."""
+    scores = {row["number"]: row["score_jnd"] for row in difference["per_frame"]}
+    least, most = min(scores.values()), max(scores.values())
+    return Panel(
+        "quality",
+        "Visible difference from the reference",
+        "JND",
+        f"Visible difference from the reference: {least:.2f} to {most:.2f} just noticeable differences.",
+        (Series("score", GREEN, scores),),
+        top=1.1 * max(most, 1.0),
+        level=(1.0, "1 JND: noticed in 3 of 4 cases"),
+    )
 
 
-def _psnr(beside: Mapping[int, Mapping[str, float | None]]) -> Panel | None:
-    points = [(n, found["psnr_db"]) for n, found in sorted(beside.items()) if found["psnr_db"] is not None]
-    if not points:
-        return None
-    x, y = [p[0] for p in points], [float(p[1] or 0.0) for p in points]
-    text = f"PSNR to the reference per frame, {min(y):.1f} to {max(y):.1f} dB."
-    panel = _panel("psnr", "PSNR to the reference", "dB", [_line("PSNR", x, y, BLUE)], text, top=max(y) + 2.0)
-    return {**panel, "bottom": max(min(y) - 4.0, 0.0)}
+def time_panel(lines: Iterable[Mapping[str, Any]], rays: Mapping[str, float]) -> Panel:
+    """Wall time of the tasks of each frame by pass, without analysis and video.
+
+    Parameters
+    ----------
+    lines
+        Of the ledger.
+    rays
+        Of the summary: a pass has the colour of the rays of its name.
+    """
+    spent: dict[str, dict[int, float]] = {}
+    for line in lines:
+        if line["pass"] not in DELIVERY:
+            seconds = sum(stage["wall_s"] for stage in line["cost"].values())
+            spent.setdefault(line["pass"], {})[line["frame"]] = seconds
+    series, totals = _stacked(spent, [*(kind for kind, mean in rays.items() if mean), *spent])
+    text = f"Time of the tasks of each frame, by pass: at most {max(totals, default=0.0):.1f} seconds."
+    return Panel("time", "Time, by pass", "s", text, series, top=1.05 * max(totals, default=1.0) or 1.0)
 
 
-def _panel(name: str, title: str, unit: str, traces: list[dict[str, Any]], text: str, *, top: float) -> Panel:
-    legend = [
-        {
-            "name": trace["name"],
-            "color": trace["marker"]["color"] if trace["type"] == "bar" else trace["line"]["color"],
-            "symbol": "bar" if trace["type"] == "bar" else trace["marker"].get("symbol", "line"),
-        }
-        for trace in traces
-    ]
-    return {
-        "name": name, "title": title, "unit": unit, "traces": traces, "legend": legend, "text": text,
-        "bottom": 0.0, "top": top, "ticks": None, "level": None,
-    }  # fmt: skip
+def _velocity_panel(speeds: Mapping[int, float], keyframes: Iterable[int]) -> Panel:
+    marks = {frame: speeds[frame] for frame in keyframes}
+    series = [Series("mean over the image", BLUE, speeds), Series("keyframes", VERMILION, marks, "triangle")]
+    least, most = min(speeds.values(), default=0.0), max(speeds.values(), default=0.0)
+    text = f"Mean image velocity of each frame: {least:.2f} to {most:.2f} degrees per second."
+    kept = tuple(s for s in series if s.values)
+    return Panel("velocity", "Image velocity", "deg/s", text, kept, top=1.08 * max(most, 0.1))
 
 
-def _line(name: str, x: Sequence[int], y: Sequence[float], color: str) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines" if len(x) > 1 else "markers",
-        "name": name,
-        "x": list(x),
-        "y": [round(value, 4) for value in y],
-        "line": {"color": color, "width": 1.75},
-        "marker": {"color": color},
-        "hovertemplate": "%{y:.2f}<extra></extra>",
+def _rays_panel(summary: Mapping[str, Any]) -> Panel:
+    rows = summary["rays_per_frame"]
+    counts = {
+        kind: {row["frame"]: row.get(kind, 0.0) for row in rows}
+        for kind, mean in summary["rays"].items()
+        if mean
     }
+    series, totals = _stacked(counts, counts)
+    mean = sum(summary["rays"].values())
+    return Panel(
+        "rays",
+        "Rays per pixel, by kind",
+        "",
+        f"Rays per pixel of each frame, by kind: {mean:.1f} on average over the path.",
+        series,
+        top=1.05 * max(totals, default=1.0) or 1.0,
+        level=(mean, f"mean {mean:.1f}"),
+    )
 
 
-def _points(
-    name: str, x: Sequence[int], y: Sequence[float], color: str, symbol: str, dash: str | None
-) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers" if dash is None else "lines+markers",
-        "name": name,
-        "x": list(x),
-        "y": [round(value, 4) for value in y],
-        "line": {"color": color, "width": 1, "dash": dash or "solid"},
-        "marker": {"color": color, "symbol": symbol, "size": 7},
-        "cliponaxis": False,
-        "hovertemplate": f"%{{y:.2f}} {name}<extra></extra>",
+def _traced_panel(summary: Mapping[str, Any]) -> Panel:
+    rows, mean = summary["per_frame"], summary["table1"]["total"]
+    series = [
+        Series(name, color, {row["frame"]: row[name] for row in rows}, "bar")
+        for name, color in PROVENANCE_COLORS.items()
+    ]
+    return Panel(
+        "traced",
+        "Pixels traced, by reason",
+        "%",
+        f"Pixels traced in each frame, by reason: {mean:.1f} percent on average.",
+        tuple(s for s in series if any(s.values.values())),
+        top=100.0,
+        level=(mean, f"mean {mean:.1f} %"),
+    )
+
+
+def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: float | None) -> Panel:
+    """Predictions of the metric for the middles of segments, before and after segments are split (§4.3)."""
+    judged = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
+    chosen = {
+        ("before split", "square"): [s for s in judged if s["depth"] == 0],
+        ("after split", "circle"): [s for s in judged if not s["is_split"]],
     }
+    eyes = (
+        ("pursuit", "percent_visible", VERMILION),
+        ("at rest", "percent_visible_no_pursuit", BLUE),
+    )
+    series = [
+        Series(f"{eye}, {when}", color, {s["middle"]: s[key] for s in of if s.get(key) is not None}, mark)
+        for eye, key, color in eyes
+        for (when, mark), of in chosen.items()
+    ]
+    most = max((s["percent_visible"] for s in judged), default=0.0)
+    split = sum(s["is_split"] for s in judged)
+    return Panel(
+        "predictions",
+        "Predicted visible pixels",
+        "%",
+        f"Visible pixels that the metric predicts for segment middles: at most {most:.1f} percent; "
+        f"{split} of {len(judged)} segments were split.",
+        tuple(s for s in series if s.values),
+        top=1.2 * max(most, split_percent or 0.1),
+        level=None if split_percent is None else (split_percent, f"split above {split_percent:g} %"),
+    )
+
+
+def _stacked(
+    values: Mapping[str, Mapping[int, float]], names: Iterable[str]
+) -> tuple[tuple[Series, ...], list[float]]:
+    """Bars of equal frames, in colours by the order of names, and their sum at each frame."""
+    colors = dict(zip(dict.fromkeys(names), itertools.cycle(PALETTE), strict=False))
+    frames = sorted({frame for of in values.values() for frame in of})
+    series = tuple(
+        Series(spoken(name), colors[name], {f: of.get(f, 0.0) for f in frames}, "bar")
+        for name, of in values.items()
+    )
+    return series, [sum(s.values[f] for s in series) for f in frames]

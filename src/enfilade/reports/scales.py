@@ -1,7 +1,11 @@
-"""Scales of colours for maps: from a number to a colour, and to a place in the legend."""
+"""Colour scales of maps: from a number to a colour, and to a place in the legend.
+
+Lightness rises along each scale, for grey prints and readers with colour vision deficiencies.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,55 +14,66 @@ import numpy.typing as npt
 
 from enfilade.records import F32, U8
 
-__all__ = ["DIFFERENCE", "VELOCITY", "Scale"]
+__all__ = ["DIFFERENCE", "VELOCITY", "VISIBLE", "Scale"]
 
-STEPS = 1024  # of the colours of a scale
-
-# Matplotlib's viridis and inferno at nine even places: they grow lighter evenly, in grey print too, and
-# are told apart with any of the common colour deficiencies. Here as numbers: a page needs no more of it.
-VIRIDIS = ("440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725")
-INFERNO = ("000004", "210c4a", "57106e", "8a226a", "bc3754", "e45a31", "f98e09", "f9cb35", "fcffa4")
+STEPS = 1024
 
 
 @dataclass(frozen=True)
 class Scale:
-    """A scale of colours, linear near 0 and logarithmic beyond: faint and strong both show.
+    """A colour scale, linear near 0 and logarithmic beyond.
 
     Attributes
     ----------
     knee : float
-        Where it bends.
-    top : float
-        From here on the colour stays.
-    ticks : tuple of float
-        For the legend, rising, the first 0 and the last `top`.
-    colors : tuple of str
-        At even places, each six hexadecimal digits of sRGB.
+        Where it turns from linear to logarithmic.
+    colors : mapping of float to str
+        Six hexadecimal digits of sRGB by value, rising from 0; interpolated between them.
     """
 
     knee: float
-    top: float
-    ticks: tuple[float, ...]
-    colors: tuple[str, ...]
+    colors: Mapping[float, str]
+
+    @property
+    def top(self) -> float:
+        """Largest value; beyond, the colour stays."""
+        return max(self.colors)
 
     def place(self, values: npt.ArrayLike) -> F32:
-        """Place of numbers, 0 or more, on the scale, 0..1; the shape stays."""
+        """Place of values, 0 or more, on the scale, 0..1."""
         bent = np.log1p(np.asarray(values, np.float32) / np.float32(self.knee))
         return np.asarray(np.minimum(bent / np.float32(np.log1p(self.top / self.knee)), 1.0), np.float32)
 
-    def paint(self, values: F32) -> U8:
-        """Colour a map: (H, W) float32, 0 or more, to (H, W, 3) uint8 sRGB."""
-        painted: U8 = self._ramp[(self.place(values) * np.float32(STEPS - 1)).astype(np.intp)]
-        return painted
+    def values(self, count: int) -> F32:
+        """Values at even places of the scale."""
+        bent = np.linspace(0.0, np.log1p(self.top / self.knee), count)
+        return (self.knee * np.expm1(bent)).astype(np.float32)
+
+    def step(self, values: F32) -> npt.NDArray[np.intp]:
+        """Index of values in :attr:`ramp`."""
+        return (self.place(values) * np.float32(STEPS - 1)).astype(np.intp)
 
     @cached_property
-    def _ramp(self) -> U8:
-        stops = np.array([[int(c[i : i + 2], 16) for i in (0, 2, 4)] for c in self.colors], np.float64)
-        place, at = np.linspace(0.0, 1.0, STEPS), np.linspace(0.0, 1.0, len(stops))
-        ramp = np.stack([np.interp(place, at, stops[:, c]) for c in range(3)], axis=-1)
-        return np.rint(ramp).astype(np.uint8)
+    def ramp(self) -> F32:
+        """Colours at even places, (STEPS, 3), 0..1."""
+        stops = np.array([list(bytes.fromhex(color)) for color in self.colors.values()]) / 255.0
+        even, places = np.linspace(0.0, 1.0, STEPS), self.place(list(self.colors))
+        return np.stack([np.interp(even, places, stops[:, i]) for i in range(3)], axis=-1).astype(np.float32)
+
+    def paint(self, values: F32) -> U8:
+        """Colour a map: (H, W) float32, 0 or more, to (H, W, 3) uint8 sRGB."""
+        painted: U8 = np.rint(self.ramp * np.float32(255.0)).astype(np.uint8)[self.step(values)]
+        return painted
 
 
-# Degrees per second, and percent of white.
-VELOCITY = Scale(knee=0.5, top=64.0, ticks=(0, 0.5, 2, 8, 16, 32, 64), colors=VIRIDIS)
-DIFFERENCE = Scale(knee=1.0, top=50.0, ticks=(0, 1, 2, 5, 10, 20, 50), colors=INFERNO)
+VELOCITY = Scale(  # degrees per second; Matplotlib's viridis
+    0.5,
+    {0: "440154", 0.5: "46327e", 2: "31678e", 8: "20a486", 16: "4ec36b", 32: "a0da39", 64: "fde725"},
+)
+DIFFERENCE = Scale(  # percent of white; Matplotlib's inferno
+    1.0, {0: "000004", 1: "380962", 2: "62146e", 5: "a92e5e", 10: "e05536", 20: "fb9906", 50: "fcffa4"}
+)
+VISIBLE = Scale(  # JND
+    1.0,
+    {0: "1a33b3", 0.5: "2952eb", 1: "9429c7", 2: "db4075", 4: "f57833", 8: "fcba29", 16: "fffa80"},
+)

@@ -149,7 +149,7 @@ class Job:
         if why_inseparable and self.opened_method().needs_lobes:
             raise SettingsError(
                 f"--method {self.method} can't render {self.scene.file}: {why_inseparable}; take --method "
-                "paper or reference"
+                "paper or --method reference"
             )
 
     def to_json(self) -> dict[str, Any]:

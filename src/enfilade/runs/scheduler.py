@@ -15,7 +15,7 @@ from enfilade.files import whole_file
 from enfilade.methods.base import Pass, Task, TaskId
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO, analysis_tasks, video_tasks
-from enfilade.runs.executor import Ended, Executor, InProcess, Order, Workers
+from enfilade.runs.executor import Executor, InProcess, Order, Workers
 from enfilade.runs.failure import Failure, FailureKind
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.graph import TaskGraph, block_of
@@ -81,34 +81,31 @@ def work(
         An error of the input or of a method; a file that is damaged again and again.
     """
     damages: Counter[str] = Counter()
-    # New workers after each repair: the old ones have the damaged file in memory, and would not write it.
-    while (name := _work_once(job, run, workers, monitor, chosen)) is not None:
-        damages[name] += 1
-        if damages[name] >= ATTEMPTS:
-            raise EnfiladeError(
-                f"{run.folder / name} was damaged {ATTEMPTS} times during the run; check its disk"
-            )
-        run.forget(name)
-        monitor.say(f"{name} is missing or damaged: its task is done again")
-
-
-def _work_once(
-    job: Job, run: RunFolder, workers: Workers, monitor: Monitor, chosen: Chosen | None
-) -> str | None:
-    """Do all tasks; returns the name of a damaged file if one is found."""
-    run.refresh()
     executor: Executor | None = None
+    run.refresh()
     try:
         while True:
-            everything = tasks_of(job, run)
-            mine = everything if chosen is None else chosen(everything)
+            # The analysis alone, at first: the tasks of the method depend on it.
+            mine = tasks_of(job, run) if chosen is None else chosen(tasks_of(job, run))
             left = [task for task in mine if not is_done(job, run, task)]
-            if left:
-                executor = executor or open_executor(job, run, workers)
-                if (name := _Loop(job, run, left, executor, monitor, mine).run()) is not None:
-                    return name
-            elif chosen is not None or len(everything) > len(analysis_tasks(len(job.path))):
-                return None
+            if not left:
+                return
+            executor = executor or open_executor(job, run, workers)
+            damaged = _Loop(job, run, left, executor, monitor, mine).run()
+            if damaged is None:
+                continue
+
+            # New workers: the old ones have the damaged file in memory, and would not write it again.
+            executor.close()
+            executor = None
+            damages[damaged] += 1
+            if damages[damaged] >= ATTEMPTS:
+                raise EnfiladeError(
+                    f"{run.folder / damaged} was damaged {ATTEMPTS} times during the run; check its disk"
+                )
+            run.forget(damaged)
+            monitor.say(f"{damaged} is missing or damaged: its task is done again")
+            run.refresh()
     finally:
         if executor is not None:
             executor.close()
@@ -174,7 +171,11 @@ class _Loop:
     def run(self) -> str | None:
         """Do the tasks; returns the name of a damaged file if one is found."""
         while self._hand_out():
-            for ended in self._wait():
+            delay_s = max(self._delayed[0][0] - time.monotonic(), 0.0) if self._delayed else None
+            if not self._in_hand:  # until the next attempt at a failed task
+                time.sleep(delay_s or 0.0)
+                continue
+            for ended in self._executor.wait(delay_s):
                 order = self._in_hand.pop(ended.slot)
                 if not isinstance(ended.result, Failure):
                     self._finish(order.task, ended.result)
@@ -204,13 +205,6 @@ class _Loop:
             self._in_hand[slot], self._blocks[slot] = Order(task, self._reduction), block_of(task)
             self._executor.begin(slot, self._in_hand[slot])
         return bool(self._in_hand or self._delayed)
-
-    def _wait(self) -> list[Ended]:
-        wait_s = max(self._delayed[0][0] - time.monotonic(), 0.0) if self._delayed else None
-        if self._in_hand:
-            return self._executor.wait(wait_s)
-        time.sleep(wait_s or 0.0)
-        return []
 
     def _finish(self, task: Task, line: dict[str, Any]) -> None:
         self._run.finish(line)

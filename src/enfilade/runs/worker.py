@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from enfilade.cache import LruCache
@@ -65,46 +66,38 @@ class Worker:
         ------
         EnfiladeError
         """
-        number = self._job.path.numbers[task.frame]
+        facts: Mapping[str, Any] = {"video": self._job.video_identity}
+        files: list[Path] = []
         with self._stopwatch.timed(task.pass_name):
-            output, files = self._done(task)
-        if taken := RESERVED.intersection(output.facts):
+            match task.pass_name:
+                case ANALYSIS.name:
+                    frames = range(task.frame, min(task.frame + ANALYZED_FRAMES, len(self._job.path)))
+                    facts = {"frames": [to_table(analyze(self._walk, frame)) for frame in frames]}
+                case CLIPS.name:
+                    files = [write_clip(self._run, self._job, task.frame)]
+                case VIDEO.name:
+                    files = [write_video(self._run, self._job)]
+                case _:
+                    facts, files = self._write(task, self._method.run(task, self._inputs, self._walk))
+        if taken := RESERVED.intersection(facts):
             raise ValueError(f"these facts have names of the ledger's own: {', '.join(sorted(taken))}")
-        line = {"pass": task.pass_name, "frame": number, **output.facts, "files": self._run.record_of(files)}
+        number = self._job.path.numbers[task.frame]
+        line = {"pass": task.pass_name, "frame": number, **facts, "files": self._run.record_of(files)}
         return plain({**line, "cost": self._stopwatch.take()})
 
-    def _done(self, task: Task) -> tuple[Output, list[Any]]:
-        match task.pass_name:
-            case ANALYSIS.name:
-                return self._analyzed(task.frame), []
-            case CLIPS.name:
-                return self._video_facts, [write_clip(self._run, self._job, task.frame)]
-            case VIDEO.name:
-                return self._video_facts, [write_video(self._run, self._job)]
-            case _:
-                output = self._method.run(task, self._inputs, self._walk)
-                return self._written(task, output)
-
-    @property
-    def _video_facts(self) -> Output:
-        return Output(facts={"video": self._job.video_identity})
-
-    def _analyzed(self, first: int) -> Output:
-        frames = range(first, min(first + ANALYZED_FRAMES, len(self._job.path)))
-        return Output(facts={"frames": [to_table(analyze(self._walk, frame)) for frame in frames]})
-
-    def _written(self, task: Task, output: Output) -> tuple[Output, list[Any]]:
-        files = []
+    def _write(self, task: Task, output: Output) -> tuple[Mapping[str, Any], list[Path]]:
+        """Write the records of a task; returns its facts and the files."""
+        facts, files = output.facts, []
         with self._stopwatch.timed("files"):
             for frame, record in output.records.items():
                 stem = self._run.stem(task.pass_name, self._job.path.numbers[frame])
                 if task.pass_name == FRAMES:
                     files.append(write_frame(stem, record, self._walk.view(frame), self._job))
-                    output = Output(facts={**output.facts, "provenance": record.counts})
+                    facts = {**facts, "provenance": record.counts}
                 else:
                     files.append(write_record(stem, record))
                     self._inputs.keep(task.pass_name, frame, record)
-        return output, files
+        return facts, files
 
     @cached_property
     def _walk(self) -> Walkthrough:

@@ -1,7 +1,7 @@
 """A scene, and the renderer that reads it.
 
-Mitsuba reads ``.xml`` scenes. A renderer of your own is named by an import path, ``module:function``. The function is
-called with the scene's file, ``max_depth`` and ``chunk`` (paths in flight), and returns a
+Mitsuba reads ``.xml`` scenes. A renderer of your own is named by an import path, ``module:function``. The
+function is called with the scene's file, ``max_depth`` and ``chunk`` (paths in flight), and returns a
 :class:`enfilade.renderer.Renderer`. Worker processes must be able to import the module, too.
 """
 

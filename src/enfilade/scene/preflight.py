@@ -61,8 +61,7 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
     answer = json.loads(done.stdout)
     if answer["error"]:
         raise SceneError(answer["error"])
-    why_inseparable: str = answer["why_inseparable"]
-    return why_inseparable
+    return str(answer["why_inseparable"])
 
 
 def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
@@ -81,7 +80,8 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     answer = {"error": "", "why_inseparable": ""}
     try:
         check_scene(scene, settings[LimitSettings])
-        answer["why_inseparable"] = MitsubaRenderer(scene, max_depth=settings[TraceSettings].max_depth).why_inseparable
+        renderer = MitsubaRenderer(scene, max_depth=settings[TraceSettings].max_depth)
+        answer["why_inseparable"] = renderer.why_inseparable
     except SceneError as error:
         answer["error"] = str(error)
     sys.stdout.write(json.dumps(answer))

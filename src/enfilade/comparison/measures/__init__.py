@@ -81,7 +81,7 @@ def open_measure(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH
 def why_missing(name: str) -> str:
     """Why a measure is not available, and how to get it; empty where it is."""
     if name == "flip" and find_spec("flip_evaluator") is None:
-        return "FLIP is left out; install it with: pip install 'enfilade[judges]'"
+        return "FLIP is left out; install it with: pip install 'enfilade[measures]'"
     if name == "cvvdp" and find_spec("pycvvdp") is None:
         return "ColorVideoVDP is left out; install it with: pip install cvvdp"
     return ""

@@ -33,12 +33,7 @@ QUOTED_SPECTRUM = re.compile(r'(failed to load spectrum from file ".*?"): .*', r
 def check_scene(scene: Path, limits: LimitSettings) -> None:
     """Refuse a scene with plugins other than Mitsuba's own, or with files outside the allowed folders.
 
-    Parameters
-    ----------
-    scene
-        An XML file.
-    limits
-        ``limits.allow`` names folders beside the scene's own.
+    These are the scene's own folder and those of ``limits.allow``.
 
     Raises
     ------

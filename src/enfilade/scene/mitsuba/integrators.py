@@ -85,11 +85,5 @@ def _depths(integrator: Any) -> tuple[int, int]:
 
 
 def _limited(integrator: Any, max_depth: int, rr_depth: int) -> Any:
-    return mi.load_dict(
-        {
-            "type": PATH_TRACERS[integrator.class_name()],
-            "max_depth": max_depth,
-            "rr_depth": rr_depth,
-            "hide_emitters": integrator.hide_emitters,
-        }
-    )
+    same = {"type": PATH_TRACERS[integrator.class_name()], "hide_emitters": integrator.hide_emitters}
+    return mi.load_dict({**same, "max_depth": max_depth, "rr_depth": rr_depth})

@@ -28,8 +28,6 @@ def load_scene(file: Path) -> Any:
         The file is missing, malformed, or refused by Mitsuba; or a file that it names can't be read.
     MemoryError
     """
-    if not file.is_file():
-        raise SceneError(f"there is no scene file {file}")
     mi.set_log_level(mi.LogLevel.Error)
     threads = dr.thread_count()
     if threads == 1:  # Mitsuba waits for the tasks that read an OpenEXR file without running any of them
@@ -39,7 +37,7 @@ def load_scene(file: Path) -> Any:
     except (RuntimeError, UnicodeDecodeError) as error:
         if any(words in str(error).lower() for words in OUT_OF_MEMORY):
             raise MemoryError(f"too little memory to load {file}") from error
-        fingerprint(file)  # raises with the operating system's error if a file can't be read
+        fingerprint(file)  # raises with the cause if a file is missing or can't be read
         raise SceneError(f"Mitsuba can't load {file}: {reason(error)}") from error
     finally:
         if threads == 1:

@@ -36,6 +36,7 @@ from enfilade.renderer import (
 from enfilade.scene.mitsuba.emitters import find_emitters
 from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_inseparable
 from enfilade.scene.mitsuba.load import load_scene
+from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.shapes import Shapes, surface_class
 from enfilade.scene.mitsuba.transport import LightTransport
 
@@ -72,7 +73,8 @@ class MitsubaRenderer:
         # The medium around the camera is that of the scene's sensor; poses are those of the camera path.
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
-        self._transport = LightTransport(scene, self._continued_radiance)
+        self._lobes = Lobes(scene)
+        self._transport = LightTransport(scene, self._lobes, self._continued_radiance)
         self._shapes = Shapes(scene)
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
@@ -98,14 +100,9 @@ class MitsubaRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
+        radiance, chunk = self._radiance, self._chunk
         return estimate(
-            camera,
-            pixels,
-            self._radiance,
-            spp=spp,
-            chunk=self._chunk,
-            pixel_filter=pixel_filter,
-            random=random,
+            camera, pixels, radiance, spp=spp, chunk=chunk, pixel_filter=pixel_filter, random=random
         )
 
     @property
@@ -117,7 +114,7 @@ class MitsubaRenderer:
     def state(self) -> Any:
         """See :attr:`enfilade.renderer.LobeRenderer.state`."""
         integrators = self._integrator, self._continued
-        return self._scene, integrators, self._shapes.state, self._transport.state
+        return self._scene, integrators, self._shapes.state, self._lobes.state
 
     @cached_property
     def emitters(self) -> Emitters:
@@ -137,7 +134,7 @@ class MitsubaRenderer:
             surfaces=surfaces,
             position=Array3f(si.p),
             emission=self._transport.emission(si, bounce),
-            has_specular=self._transport.has_specular(si),
+            has_specular=self._lobes.has_specular(si, si.bsdf()),
             native=si,
         )
 
@@ -179,7 +176,7 @@ class MitsubaRenderer:
             is_hit=is_hit,
             distance=distance / length,
             normal=Array3f(normal),
-            albedo=self._transport.albedo(si, bsdf, is_hit),
+            albedo=Array3f(self._lobes.albedo(si, bsdf, is_hit)),
             shape_index=self._shapes.index(si),
             surface=surface_class(bsdf.flags(), si.shape.is_emitter(), is_hit),
         )

@@ -22,28 +22,17 @@ class LightTransport:
     Parameters
     ----------
     scene : mitsuba.Scene
+    lobes
+        Of its BSDFs.
     radiance
         The path tracer: radiance along rays, from the rays, their random number generators, the path depth at
         which they begin, and which of them are traced.
     """
 
-    def __init__(self, scene: Any, radiance: Radiance) -> None:
+    def __init__(self, scene: Any, lobes: Lobes, radiance: Radiance) -> None:
         self._scene = scene
+        self._lobes = lobes
         self._radiance = radiance
-        self._lobes = Lobes(scene)
-
-    @property
-    def state(self) -> Any:
-        """Arrays that the methods read."""
-        return self._lobes.state
-
-    def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
-        """Albedo of the diffuse lobe, 0..1; 0 where there is none."""
-        return Array3f(self._lobes.albedo(si, bsdf, active))
-
-    def has_specular(self, si: Any) -> Any:
-        """Whether the BSDF of a hit has specular lobes."""
-        return self._lobes.has_specular(si, si.bsdf())
 
     def emission(self, si: Any, bounce: Bounce | None) -> Any:
         """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""

@@ -1,10 +1,10 @@
-"""Frames for judges: a picture, its copies with errors, and flow."""
+"""Frames for measures: a picture, its copies with errors, and flow."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from enfilade.comparison.measures import Shown, shown
+from enfilade.comparison.measures import DisplayedPair, display_pair
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import Flow
 from enfilade.viewing import Viewing
@@ -25,13 +25,19 @@ def noise(seed: int, size: float) -> np.ndarray:
     return (size * np.random.default_rng(seed).standard_normal((HEIGHT, WIDTH, 3))).astype(np.float32)
 
 
-def pair(test: np.ndarray, reference: np.ndarray, *, shift: float = 0.0, is_first: bool = False) -> Shown:
-    """Encoded images as a judge sees them; the surfaces move by `shift` pixels a frame."""
+def pair(
+    test: np.ndarray, reference: np.ndarray, *, shift: float = 0.0, is_first: bool = False
+) -> DisplayedPair:
+    """Encoded images as a measure sees them; the surfaces move by `shift` pixels a frame."""
     backward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     backward[..., 0] = -shift
     x = np.broadcast_to(np.arange(WIDTH) - shift, (HEIGHT, WIDTH))
     seen = (x >= 0.0) & (x <= WIDTH - 1)
     flow = Flow(np.zeros_like(backward) if is_first else backward, -backward, not is_first, True)
-    return shown(
-        srgb_decode(test), srgb_decode(reference), VIEWING, flow=flow, seen_before=None if is_first else seen
+    return display_pair(
+        srgb_decode(test),
+        srgb_decode(reference),
+        VIEWING,
+        flow=flow,
+        visible_before=None if is_first else seen,
     )

@@ -8,14 +8,14 @@ import numpy as np
 
 
 def temporal_error(
-    error: np.ndarray, before: np.ndarray, backward: np.ndarray, seen_before: np.ndarray
+    error: np.ndarray, before: np.ndarray, backward: np.ndarray, visible_before: np.ndarray
 ) -> float:
     """RMS of error(x) - before(x + backward(x)) over seen pixels and channels, by explicit taps."""
     height, width, channels = error.shape
     total, count = 0.0, 0
     for row in range(height):
         for column in range(width):
-            if not seen_before[row, column]:
+            if not visible_before[row, column]:
                 continue
             x = min(max(column + float(backward[row, column, 0]), 0.0), width - 1.0)
             y = min(max(row + float(backward[row, column, 1]), 0.0), height - 1.0)

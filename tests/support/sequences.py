@@ -12,8 +12,8 @@ import numpy as np
 from enfilade.comparison import FlowChoice, SequenceDifference, Terms, compare
 from enfilade.images import write_exr
 from enfilade.monitor import Silence
+from enfilade.runs.identity import FORMAT
 from enfilade.settings import MetricSettings
-from enfilade.store.identity import FORMAT
 
 SIZE = (48, 64)
 
@@ -85,5 +85,5 @@ def terms(
     return Terms(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
 
 
-def judged(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:
+def compared(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:
     return compare(test, reference, terms(**options), monitor or Notes())
