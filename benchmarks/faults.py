@@ -1,24 +1,23 @@
-"""Try to break runs: kill them, fill their disk, flip their bits; compare with a run left alone.
+"""Faults: runs that are killed, stopped, damaged or short of disk end with the bytes of an undisturbed run.
 
-    python benchmarks/faults.py [--quick] [--only kills disk ...] [--count 20] [--seed 1]
+    python benchmarks/faults.py [--only kills bits ...] [--count 20] [--seed 1] [--jobs 2]
 
-kills      SIGKILL for a whole command, one of its workers, or the next two that do the same unit, at random
-           moments, or for itself in the middle of write, fsync and rename; then resumed to the end
-stops      SIGSTOP for a worker at random moments: it hangs, is ended, and another does its unit
-executors  1, 2 and 7 workers, in process, worker processes and Ray; the last two of a Mitsuba scene
-cluster    Ray, with workers killed while it works
-disk       a disk that fills up at random points, then gets room; needs root, for a small tmpfs
-bits       a flipped bit in a stored file, found by use or by --verify, and what made it done again
-mitsuba    kills and flipped bits of a tiny Mitsuba scene by --method decoupled
+kills      SIGKILL for a command, for one of its workers, or by the process itself in the middle of a write
+shards     several `enfilade work` commands at once, some of which are killed
+executors  one, two and seven workers, in process, worker processes and Ray
+cluster    Ray, with workers that are killed
+stops      SIGSTOP for a worker, which is killed after the time limit of its task
+disk       a small tmpfs that fills up and gets more room; needs root
+bits       flipped bits and lost files, found by --verify or when they are used
 
-All others are of a scene in closed form by --method paper. Fails when one byte of frames, video or ledger
-(times left out) differs. --quick tries 5 kills, disks, bits and executors, and fewer of what takes longer.
-Trials of all kinds go side by side, one for each core (--jobs), the longest first; each has a folder and
-random numbers of its own.
+Each trial interrupts a run of a small Mitsuba scene somewhere, continues it with the same command, and
+compares the digest of its ledger, which has the checksums of all files. Trials run side by side (--jobs) with
+a folder and random numbers of their own. The exit code is 1 if one byte differs, or a command fails for
+another reason.
 """
 
 import argparse
-import hashlib
+import contextlib
 import json
 import os
 import random
@@ -28,416 +27,339 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
-from typing import IO
 
-FRAMES, SIZE = 48, "32x24"
-EXECUTORS = [("ray", 2), ("processes", 7), ("processes", 2), ("processes", 1), ("in-process", 1)]
-MORE_EXECUTORS = [*EXECUTORS, ("ray", 1), ("ray", 7)]
-OF_MITSUBA = [("ray", 2), ("processes", 7)]
-COUNTS = {
-    "cluster": 1,
-    "executors": len(MORE_EXECUTORS) + len(OF_MITSUBA),
-    "stops": 10,
-    "mitsuba": 10,
-    "kills": 200,
-    "disk": 50,
-    "bits": 50,
-}
-QUICK = {
-    "cluster": 1,
-    "executors": len(EXECUTORS),
-    "stops": 2,
-    "mitsuba": 1,
-    "kills": 5,
-    "disk": 5,
-    "bits": 5,
-}
-KINDS = tuple(COUNTS)  # those first whose trials take longest
-CLUSTER, QUICK_CLUSTER = (10, 20000), (5, 6000)  # kills, and paths a pixel of 50 frames
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import read_job
+from enfilade.runs.scheduler import passes_of
+
+COUNTS = {"kills": 40, "shards": 6, "executors": 5, "cluster": 3, "stops": 4, "disk": 10, "bits": 20}
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
-STORED = ("keyframes", "cells", "drafts", "raw", "frames", "clips")
-TIMEOUT_S = 1800  # a busy machine is no failure
-NEED = "what is left will need about"
-STOPPED_MIN = 0.05  # after which a worker that does nothing is ended
-BESIDE = 1.5  # times longer a run takes beside others
+EXECUTORS = (("in-process", 1), ("processes", 1), ("processes", 2), ("processes", 7), ("ray", 2))
+LIMITS = ("--set", "limits.task_timeout_s=60", "--set", "limits.preflight_s=300")
+ALONE = ("unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")  # Ray listens on all interfaces
+TIMEOUT_S = 3600
+SCENE = """<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="5"/></integrator>
+  <shape type="rectangle">
+    <transform name="to_world"><scale value="3"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.5, 0.4"/></bsdf>
+  </shape>
+  <shape type="sphere">
+    <point name="center" x="0.5" y="0" z="0.6"/><float name="radius" value="0.5"/>
+    <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf>
+  </shape>
+  <emitter type="constant"><rgb name="radiance" value="0.7"/></emitter>
+  <emitter type="point"><point name="position" x="1" y="2" z="3"/><rgb name="intensity" value="6"/></emitter>
+</scene>
+"""
 
-Trial = Callable[[int, Path, random.Random], str | None]  # number, empty folder, chance: what went wrong
 
-
-@dataclass
-class Tally:
-    """What was tried, and what went wrong."""
-
-    tried: dict[str, int] = field(default_factory=dict)
-    wrong: dict[str, list[str]] = field(default_factory=dict)
-    skipped: dict[str, str] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    def note(self, kind: str, problem: str | None, seconds: float) -> None:
-        """Count a try; a problem is printed at once."""
-        self.seconds[kind] = self.seconds.get(kind, 0.0) + seconds
-        self.tried[kind] = self.tried.get(kind, 0) + 1
-        if problem:
-            self.wrong.setdefault(kind, []).append(problem)
-            print(f"  {kind}: {problem}", flush=True)
+class WrongError(Exception):
+    """A fault that changed the run, or a command that failed for another reason."""
 
 
 @dataclass(frozen=True)
-class Work:
-    """A run that can be made in any folder, and what it must come out as."""
+class Case:
+    """A run to be disturbed.
+
+    Attributes
+    ----------
+    inputs
+        Scene, path and settings, as arguments of the command.
+    digest
+        Of the undisturbed run.
+    seconds
+        That it took.
+    size
+        Bytes of its files.
+    """
 
     inputs: tuple[str, ...]
-    whole: Path
+    digest: str
     seconds: float
-
-    @property
-    def digest(self) -> str:
-        """Of the run left alone."""
-        return digest(self.whole)
+    size: int
 
 
-class Made:
-    """Work whose run that is left alone is made by the first trial that asks for it."""
-
-    def __init__(self, make: Callable[[], Work]) -> None:
-        self._make, self._first, self._made = make, Lock(), []
-
-    def __call__(self) -> Work:
-        """The work."""
-        with self._first:
-            if not self._made:
-                self._made.append(self._make())
-        return self._made[0]
+Trial = Callable[[Case, Path, random.Random, int], str]  # disturbs and continues a run; returns what it did
 
 
 def main() -> int:
     """Try all; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--only", nargs="+", choices=TRIALS, default=list(TRIALS))
+    parser.add_argument("--count", type=int, help="number of trials of each kind")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, help="so many kills, disks and bits, in place of 200, 50 and 50")
-    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="trials at once")
-    parser.add_argument("--json", type=Path, help="write the tally into this file")
-    parser.add_argument("--die", help=argparse.SUPPRESS)
-    arguments, rest = parser.parse_known_args()
-    if arguments.die:
-        return die_at(arguments.die, rest)
-    tally = Tally()
-    with tempfile.TemporaryDirectory(prefix="faults-") as name:
-        try_all(Path(name), arguments, tally)
-    for kind in (kind for kind in KINDS if kind in arguments.only):
-        wrong = len(tally.wrong.get(kind, []))
-        tried = tally.tried.get(kind, 0)
-        text = tally.skipped.get(kind) or f"{tried - wrong} of {tried} as if nothing had happened"
-        print(f"{kind:10} {text}, {tally.seconds.get(kind, 0.0):.0f} s of trials")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(vars(tally), indent=2))
-    return 1 if tally.wrong else 0
-
-
-def try_all(folder: Path, arguments: argparse.Namespace, tally: Tally) -> None:
-    """Try every kind that was asked for, side by side."""
-    counts = dict(QUICK if arguments.quick else COUNTS)
-    if arguments.count:
-        counts |= {kind: arguments.count for kind in counts if kind not in ("cluster", "executors")}
-    work = analytic_work(folder)
-    print(f"a run of {FRAMES} frames takes {work.seconds:.1f} s, digest {work.digest[:16]}", flush=True)
-    if arguments.jobs > 1:
-        work = replace(work, seconds=work.seconds * BESIDE)
-    shiny = Made(partial(mitsuba_work, folder))
-    trials: dict[str, Callable[[], Trial]] = {
-        "cluster": lambda: cluster_trial(folder, *(QUICK_CLUSTER if arguments.quick else CLUSTER)),
-        "executors": lambda: executor_trial(work, shiny),
-        "stops": lambda: stop_trial(work),
-        "mitsuba": lambda: mitsuba_trial(shiny),
-        "kills": lambda: kill_trial(work),
-        "disk": lambda: disk_trial(work, tally),
-        "bits": lambda: bit_trial(work),
-    }
-    asked = {kind: trials[kind]() for kind in KINDS if kind in arguments.only}
-    with ThreadPoolExecutor(arguments.jobs) as pool:
-        begun = [
-            pool.submit(one_of, kind, trial, number, folder, arguments.seed)
-            for kind, trial in asked.items()
-            for number in range(counts[kind])
-        ]
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
+    arguments = parser.parse_args()
+    tried, wrong = Counter[str](), Counter[str]()
+    with tempfile.TemporaryDirectory(prefix="faults-") as name, ThreadPoolExecutor(arguments.jobs) as pool:
+        case = undisturbed(Path(name))
+        print(f"an undisturbed run takes {case.seconds:.1f} s and {case.size} bytes", flush=True)
+        begun = {
+            pool.submit(one, kind, number, case, Path(name), arguments.seed): kind
+            for kind in arguments.only
+            for number in range(arguments.count or COUNTS[kind])
+        }
         for ended in as_completed(begun):
-            tally.note(*ended.result())
+            what, is_right = ended.result()
+            tried[begun[ended]] += 1
+            wrong[begun[ended]] += not is_right
+            print(f"  {begun[ended]}: {what}: {'as undisturbed' if is_right else 'WRONG'}", flush=True)
+    for kind in arguments.only:
+        print(f"{kind:10} {tried[kind] - wrong[kind]} of {tried[kind]} as undisturbed")
+    return 1 if wrong.total() else 0
 
 
-def one_of(kind: str, trial: Trial, number: int, folder: Path, seed: int) -> tuple[str, str | None, float]:
-    """A trial of a kind, what went wrong in it, and the seconds it took."""
-    place, begin = folder / f"{kind}-{number}", time.monotonic()
+def one(kind: str, number: int, case: Case, folder: Path, seed: int) -> tuple[str, bool]:
+    """Do a trial; returns its description, and whether the run is as undisturbed."""
+    place, chance = folder / f"{kind}-{number}", random.Random(f"{seed} {kind} {number}")  # noqa: S311
     place.mkdir()
     try:
-        chance = random.Random(f"{seed} {kind} {number}")  # noqa: S311  (which moment, not a secret)
-        problem = trial(number, place, chance)
+        return TRIALS[kind](case, place, chance, number), True
+    except (WrongError, OSError, subprocess.SubprocessError, ValueError) as error:
+        return f"{type(error).__name__}: {error}", False
     finally:
         shutil.rmtree(place, ignore_errors=True)
-    return kind, problem, time.monotonic() - begin
 
 
-# What is rendered.
-
-
-def analytic_work(folder: Path) -> Work:
-    """A noisy walk through a room with a mirror, in closed form, by the paper's method."""
-    from analytic import BALL, RENDERER, WALL, AnalyticScene, Material, Sphere, write_scene
-    from enfilade.records import SurfaceClass
-
-    mirror = Sphere((-0.7, 0.3, 0.8), 0.4, Material((0.9, 0.9, 0.9), SurfaceClass.MIRROR), "mirror")
-    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL, mirror), noise=0.1))
-    path = walk(folder / "path.json")
-    flags = ("--method", "paper", "--spp", "4", "--keyframes-spacing", "12", "--viewing-diagonal-m", "0.0125")
-    return made(folder, "analytic", (str(scene), *RENDERER, "--path", str(path), *flags))
-
-
-def mitsuba_work(folder: Path) -> Work:
-    """A few small frames of ROOM, by keyframes of light."""
-    from studies.scenes import write_scene
-
-    files = write_scene("room", folder / "room", preset="small")
-    flags = ("--size", "64x48", "--frames", "22-30", "--method", "decoupled", "--light-spacing", "4")
-    more = ("--light-paths", "8", "--light-samples", "8")
-    return made(folder, "mitsuba", (str(files.scene), "--path", str(files.path), *flags, *more))
-
-
-def walk(file: Path, frames: int = FRAMES) -> Path:
-    """A camera that slides to the right."""
-    width, height = SIZE.split("x")
-    eyes = {at / 30: [0.02 * at - 0.4, 0.0, 4.0] for at in (0, frames - 1)}
-    keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
-    table = {"format": "enfilade-path", "fps": 30, "size": [int(width), int(height)], "keys": keys}
-    file.write_text(json.dumps(table))
-    return file
-
-
-def made(folder: Path, name: str, inputs: tuple[str, ...]) -> Work:
-    """Make the run that is left alone."""
+def undisturbed(folder: Path) -> Case:
+    """Render the run that others are compared with."""
+    eyes = {0.0: -0.2, 0.5: 0.2}
+    keys = [{"time": t, "eye": [x, 0, 4], "target": [x, 0, 0], "fov": 50} for t, x in eyes.items()]
+    path = {"format": "enfilade-path", "fps": 24, "size": [32, 24], "keys": keys}
+    (folder / "scene.xml").write_text(SCENE)
+    (folder / "path.json").write_text(json.dumps(path))
+    settings = ("--set", "decoupled.spacing=4", *LIMITS)
+    inputs = (str(folder / "scene.xml"), "--path", str(folder / "path.json"), *settings)
+    out = folder / "whole"
+    finish(render(inputs, out))  # compiles kernels, which others find in a cache
+    shutil.rmtree(out)
     begin = time.monotonic()
-    finish(inputs, folder / name)
-    return Work(inputs, folder / name, time.monotonic() - begin)
+    finish(render(inputs, out))
+    size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
+    return Case(inputs, RunFolder.read(out).digest(), time.monotonic() - begin, size)
 
 
-def command(inputs: tuple[str, ...], out: Path, *more: str) -> list[str]:
-    """The command line of a run."""
-    flags = ["--out", str(out), "--device", "cpu", "--quiet", *more]
-    return [sys.executable, "-m", "enfilade", "render", *inputs, *flags]
+# Commands.
 
 
-def finish(inputs: tuple[str, ...], out: Path, *more: str, prefix: tuple[str, ...] = ()) -> None:
-    """Run to the end; anything but success is an error."""
-    line = [*prefix, *command(inputs, out, *more)]
+def render(inputs: tuple[str, ...], out: Path, *more: str) -> list[str]:
+    """A command that begins or continues a run."""
+    return [*ENFILADE, "render", *inputs, "--out", str(out), "--device", "cpu", "--quiet", *more]
+
+
+def work(out: Path, *more: str) -> list[str]:
+    """A command that works on a run that was begun."""
+    return [*ENFILADE, "work", str(out), "--device", "cpu", "--quiet", *more]
+
+
+ENFILADE = (sys.executable, "-m", "enfilade")
+
+
+def start(line: list[str], errors: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+    """Start a command in a process group of its own."""
+    return subprocess.Popen(line, start_new_session=True, stdout=subprocess.DEVNULL, stderr=errors, text=True)
+
+
+def finish(line: list[str], expected: str | None = None) -> None:
+    """Let a command end: without an error, or with one whose message contains some words."""
     done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
-    if done.returncode:
-        raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()[-2000:]}")
+    if done.returncode and (expected is None or expected not in done.stderr):
+        raise WrongError(f"exit code {done.returncode}: {done.stderr.strip()[-2000:]}")
 
 
-# What must be the same.
+def compare(case: Case, out: Path, what: str) -> str:
+    """Compare a run with the undisturbed one."""
+    run = RunFolder.read(out)
+    if run.digest() != case.digest:
+        raise WrongError(f"{what}: the ledger differs")
+    if damaged := run.damaged():
+        raise WrongError(f"{what}: {damaged[0]} differs")
+    if left := list(out.rglob(".*writing-*")):
+        raise WrongError(f"{what}: {left[0]} is left")
+    return what
 
 
-def digest(folder: Path) -> str:
-    """Checksum of a run: its ledger without times, which has the checksums of its files."""
-    from enfilade.store import Run
-
-    return Run.existing(folder).digest()
-
-
-def difference(work: Work, out: Path) -> str | None:
-    """What is not as in the run left alone; None if nothing."""
-    if digest(out) != work.digest:
-        return f"another ledger in {out.name}"
-    for file in stored(work.whole):
-        other = out / file.relative_to(work.whole)
-        if not other.exists() or sha(other) != sha(file):
-            return f"another {other.relative_to(out)}"
-    left = [f.name for f in out.rglob(".*.writing-*")]
-    return f"left over: {left[0]}" if left else None
-
-
-def stored(folder: Path) -> list[Path]:
-    """Files of a run that its ledger knows."""
-    files = [f for kind in STORED for f in (folder / kind).glob("[!.]*") if f.is_file()]
-    return sorted([*files, *folder.glob("video.*")])
-
-
-def sha(file: Path) -> str:
-    """Checksum of a file."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
-# Kills.
-
-
-def kill_trial(work: Work) -> Trial:
-    """Kill a run somewhere, then let it go on to its end. What a kill misses does not count."""
-    kills = (kill_at_point, kill_all, kill_worker, kill_two)
-
-    def trial(number: int, folder: Path, chance: random.Random) -> str | None:
-        out, what = folder / "run", None
-        while what is None:  # it came too late
-            shutil.rmtree(out, ignore_errors=True)
-            what = kills[number % len(kills)](work, out, chance)
-        problem = attempt(lambda: finish(work.inputs, out), work, out, what)
-        has_failed = "exit code" in what and not what.endswith("exit code 0")
-        return what if problem is None and has_failed else problem
-
-    return trial
-
-
-def attempt(act: Callable[[], None], work: Work, out: Path, what: str) -> str | None:
-    """Do something, then compare; returns what went wrong."""
+def continued(case: Case, out: Path, what: str, *more: str) -> str:
+    """Continue a run to its end, and compare it."""
     try:
-        act()
-        problem = difference(work, out)
-    except (RuntimeError, subprocess.TimeoutExpired, OSError, ValueError) as error:
-        problem = str(error)
-    return f"{what}: {problem}" if problem else None
+        finish(render(case.inputs, out, *more))
+    except WrongError as error:
+        raise WrongError(f"{what}: {error}") from error
+    return compare(case, out, what)
 
 
-def mitsuba_trial(shiny: Made) -> Trial:
-    """Kills and flipped bits of a Mitsuba scene: the first four kill, then come two bits."""
-
-    def trial(number: int, place: Path, chance: random.Random) -> str | None:
-        kinds = [kill_trial(shiny())] * 4 + [bit_trial(shiny())] * 2
-        return kinds[number % len(kinds)](number, place, chance)
-
-    return trial
-
-
-def kill_at_point(work: Work, out: Path, chance: random.Random) -> str | None:
-    """The process kills itself in the middle of writing a file or a line."""
-    point, number = chance.choice(POINTS), chance.randrange(1, 150)
-    line = command(work.inputs, out)[3:]
-    own = [sys.executable, __file__, "--die", f"{point}:{number}", *line]
-    done = subprocess.run(own, capture_output=True, check=False, timeout=TIMEOUT_S)
-    return struck(f"killed {point} number {number}", done.returncode)
+def descendants(pid: int) -> list[int]:
+    """Processes below a process; without those of Python's own bookkeeping."""
+    found: list[int] = []
+    with contextlib.suppress(OSError):
+        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes():
+                found += [int(child), *descendants(int(child))]
+    return found
 
 
-def kill_all(work: Work, out: Path, chance: random.Random) -> str | None:
-    """The whole process group is killed at a random moment, with or without workers."""
-    who = chance.choice((("--executor", "in-process"), ("--executor", "processes", "--workers", "2")))
-    moment = chance.uniform(0.1, 1.2) * work.seconds
-    process = start(command(work.inputs, out, *who))
+# Trials.
+
+
+def kill(case: Case, place: Path, chance: random.Random, number: int) -> str:
+    """Kill a command, or one of its workers, and continue the run."""
+    out = place / "run"
+    match number % 3:
+        case 0:
+            what = f"killed {chance.choice(POINTS)} number {chance.randrange(1, 100)}"
+            where = what.removeprefix("killed ").replace(" number ", ":")
+            line = [sys.executable, __file__, "--die", where, *render(case.inputs, out)[len(ENFILADE) :]]
+            done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+            if done.returncode not in (0, -signal.SIGKILL):
+                raise WrongError(f"{what}: exit code {done.returncode}: {done.stderr.strip()[-2000:]}")
+        case 1:
+            workers = chance.choice(
+                (("--executor", "in-process"), ("--executor", "processes", "--workers", "2"))
+            )
+            moment_s = chance.uniform(0.1, 1.1) * case.seconds
+            what = f"{workers[1]}, all killed after {moment_s:.2f} s"
+            with start(render(case.inputs, out, *workers)) as process:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(moment_s)
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+        case _:
+            what = struck(case, out, chance, signal.SIGKILL, "--executor", "processes", "--workers", "2")
+            compare(case, out, what)  # the command must have continued by itself
+    return continued(case, out, what)
+
+
+def stop(case: Case, place: Path, chance: random.Random, _number: int) -> str:
+    """Stop a worker: the command must replace it and end by itself."""
+    out = place / "run"
+    what = struck(case, out, chance, signal.SIGSTOP, "--executor", "processes", "--workers", "2")
+    return compare(case, out, what)
+
+
+def cluster(case: Case, place: Path, chance: random.Random, _number: int) -> str:
+    """Kill a worker of Ray: the command must end by itself."""
+    out = place / "run"
+    what = struck(case, out, chance, signal.SIGKILL, "--executor", "ray", "--workers", "2", title=b"ray::")
+    return compare(case, out, what)
+
+
+def struck(
+    case: Case, out: Path, chance: random.Random, blow: signal.Signals, *more: str, title: bytes = b""
+) -> str:
+    """Run a command, with a signal for one of its workers once so many tasks are done; it must succeed."""
+    tasks, what = chance.randrange(2, 60), "no worker was hit"
+    prefix = ALONE if "ray" in more else ()
+    with start([*prefix, *render(case.inputs, out, *more)], subprocess.PIPE) as process:
+        while process.poll() is None and what.startswith("no"):
+            time.sleep(0.01)
+            ledger = out / "ledger.jsonl"
+            if ledger.exists() and ledger.read_bytes().count(b"\n") >= tasks:
+                found = [
+                    p for p in descendants(process.pid) if title in Path(f"/proc/{p}/cmdline").read_bytes()
+                ]
+                if found:
+                    os.kill(victim := chance.choice(found), blow)
+                    what = f"{blow.name} for worker {victim} after {tasks} tasks"
+        _, errors = process.communicate(timeout=TIMEOUT_S)
+    if process.returncode:
+        raise WrongError(f"{what}: exit code {process.returncode}: {errors.strip()[-2000:]}")
+    return what
+
+
+def executor(case: Case, place: Path, _chance: random.Random, number: int) -> str:
+    """Render by some workers."""
+    name, workers = EXECUTORS[number % len(EXECUTORS)]
+    prefix = ALONE if name == "ray" else ()
+    finish([*prefix, *render(case.inputs, place / "run", "--executor", name, "--workers", str(workers))])
+    return compare(case, place / "run", f"{name}, {workers} workers")
+
+
+def shards(case: Case, place: Path, chance: random.Random, _number: int) -> str:
+    """Share a run out: each pass by three commands at once, one of which may be killed; all are repeated."""
+    out = place / "run"
+    finish(render(case.inputs, out, "--prepare"))
+    for of in passes_of(read_job(out))[:-1]:
+        lines = [work(out, "--pass", of.name, "--shard", f"{number}/3") for number in (1, 2, 3)]
+        processes = [start(line) for line in lines]
+        if chance.random() < 0.5:
+            time.sleep(chance.uniform(0.0, 0.3) * case.seconds)
+            processes[chance.randrange(3)].kill()
+        for process in processes:
+            process.wait(TIMEOUT_S)
+        for line in chance.sample(lines, 3):
+            finish(line)
+    finish(work(out))
+    return compare(case, out, "shards")
+
+
+def disk(case: Case, place: Path, chance: random.Random, _number: int) -> str:
+    """Fill a small disk, make room, and continue the run."""
+    if os.geteuid() != 0:
+        return "skipped: only root can mount a tmpfs"
+    size = chance.randrange(4096, case.size)
+    with mounted(place / "disk", size):
+        out = place / "disk" / "run"
+        finish(render(case.inputs, out), "no room on the disk")
+        remount = ["mount", "-o", f"remount,size={4 * case.size}", str(place / "disk")]
+        subprocess.run(remount, check=True)
+        return continued(case, out, f"a disk of {size} bytes")
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, size: int) -> Iterator[None]:
+    """A tmpfs of so many bytes."""
+    folder.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)], check=True)
     try:
-        process.wait(moment)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-    return struck(f"{who[1]}, all killed after {moment:.2f} s", process.wait())
+        yield
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
-def struck(what: str, code: int) -> str | None:
-    """Say what was killed, and how it ended where that is not why; None where it had ended well before."""
-    if code == 0:
-        return None
-    return what if code == -signal.SIGKILL else f"{what}, exit code {code}"
+def bits(case: Case, place: Path, chance: random.Random, number: int) -> str:
+    """Damage files of a finished run, or of one that is killed, and continue it."""
+    out = place / "run"
+    finish(render(case.inputs, out))
+    names = [name for line in RunFolder.read(out).lines() for name in line["files"]]
+    name = chance.choice((*names, "ledger.jsonl", "run.json", "job.json"))
+    file = out / name
+    data = bytearray(file.read_bytes())
+    if number % 3 == 0 and name in names:
+        file.unlink()
+        return continued(case, out, f"{name} is lost")
+    place_of_bit = chance.randrange(8 * len(data))
+    data[place_of_bit // 8] ^= 1 << place_of_bit % 8
+    file.write_bytes(data)
+    for later in names:  # tasks that read the file are done again
+        if number % 3 == 1 and later.startswith(("frames/", "clips/", "video")) and later != name:
+            (out / later).unlink()
+    return continued(case, out, f"bit {place_of_bit} of {name}", "--verify")
 
 
-def kill_worker(work: Work, out: Path, chance: random.Random) -> str | None:
-    """One worker is killed at a random moment; the command must go on by itself."""
-    return strike_worker(work, out, chance, signal.SIGKILL)
-
-
-def kill_two(work: Work, out: Path, chance: random.Random) -> str | None:
-    """One worker is killed, and the next that is begun: most often in its place, with the same unit."""
-    return strike_worker(work, out, chance, signal.SIGKILL, times=2)
-
-
-def strike_worker(
-    work: Work,
-    out: Path,
-    chance: random.Random,
-    blow: signal.Signals,
-    who: str = "processes",
-    *,
-    times: int = 1,
-) -> str | None:
-    """Workers get a signal, the first at a random moment; None where not all had a unit, and all is well."""
-    moment, said = chance.uniform(0.3, 1.0) * work.seconds, out.with_name("said.txt")
-    line = command(work.inputs, out, "--executor", who, "--workers", "2")
-    with said.open("wb") as stream:
-        process = start([word for word in line if word != "--quiet"], stream)
-        time.sleep(moment)
-        known: set[int] = set()
-        for _ in range(times):
-            if (worker := new_worker(process, known, chance)) is not None:
-                kill(worker, blow)
-        code = process.wait(TIMEOUT_S)
-    had_units = said.read_bytes().count(b"it is tried again") >= times
-    what = f"{blow.name} for {times} workers after {moment:.2f} s, exit code {code}"
-    return what if had_units or code else None
-
-
-def new_worker(process: subprocess.Popen[bytes], known: set[int], chance: random.Random) -> int | None:
-    """Wait for workers that are not known yet, and choose one; None where the command ends first."""
-    while process.poll() is None:
-        found = {pid for pid in children(process.pid) if b"enfilade.executors.child" in cmdline(pid)}
-        if fresh := sorted(found - known):
-            known |= found
-            return chance.choice(fresh)
-        time.sleep(0.02)
-    return None
-
-
-def stop_trial(work: Work) -> Trial:
-    """Stop a worker, so that it hangs; the command must end it and go on by itself."""
-
-    def trial(_number: int, folder: Path, chance: random.Random) -> str | None:
-        out, what = folder / "run", None
-        while what is None:  # it came too early or too late
-            shutil.rmtree(out, ignore_errors=True)
-            what = strike_worker(work, out, chance, signal.SIGSTOP, f"processes,idle={STOPPED_MIN}")
-        return attempt(lambda: None, work, out, what) if what.endswith("exit code 0") else what
-
-    return trial
-
-
-def start(line: list[str], said: IO[bytes] | int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
-    """A command in a process group of its own."""
-    return subprocess.Popen(line, start_new_session=True, stdout=said, stderr=said)
-
-
-def children(pid: int) -> list[int]:
-    """Child processes of a process."""
-    try:
-        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except OSError:
-        return []
-
-
-def kill(pid: int, blow: signal.Signals = signal.SIGKILL) -> None:
-    """Kill a process that may have ended, or send it another signal."""
-    try:
-        os.kill(pid, blow)
-    except ProcessLookupError:
-        return
-
-
-def die_at(where: str, arguments: list[str]) -> int:
+def die_at(where: str, arguments: list[str]) -> None:
     """Be the command, and kill this process at the n-th passage of a point."""
     point, _, number = where.partition(":")
-    left = [int(number)]
+    left, write = [int(number)], os.write
 
-    def passed() -> bool:
+    def is_time() -> bool:
         left[0] -= 1
         return left[0] == 0
 
     def die() -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
-    def around(really: Callable, name: str) -> Callable:
+    def around(function: Callable, name: str) -> Callable:
         def instead(*values: object, **named: object) -> object:
-            is_last = name in point and passed()
+            is_last = name in point and is_time()
             if is_last and point.startswith("before"):
                 die()
-            result = really(*values, **named)
+            result = function(*values, **named)
             if is_last:
                 die()
             return result
@@ -445,182 +367,25 @@ def die_at(where: str, arguments: list[str]) -> int:
         return instead
 
     def torn(handle: int, data: bytes) -> int:
-        if point == "torn line" and data.startswith(b'{"unit"') and passed():
-            really_write(handle, data[: len(data) // 2])
+        if point == "torn line" and data.startswith(b'{"pass"') and is_time():
+            write(handle, data[: len(data) // 2])
             die()
-        return really_write(handle, data)
+        return write(handle, data)
 
-    really_write = os.write
-    os.write = torn
-    os.fsync = around(os.fsync, "fsync")
-    Path.replace = around(Path.replace, "rename")
+    os.write, os.fsync, Path.replace = torn, around(os.fsync, "fsync"), around(Path.replace, "rename")
     from enfilade.cli import main as enfilade
 
     enfilade(arguments, prog_name="enfilade")
-    return 0
 
 
-# Executors.
-
-
-def executor_trial(work: Work, shiny: Made) -> Trial:
-    """The same run by one, two and seven workers of each executor, and another by two of them."""
-
-    def trial(number: int, folder: Path, _chance: random.Random) -> str | None:
-        name, workers = [*MORE_EXECUTORS, *OF_MITSUBA][number]
-        of = work if number < len(MORE_EXECUTORS) else shiny()
-        flags = ("--executor", name, "--workers", str(workers))
-        prefix, out = alone() if name == "ray" else (), folder / "run"
-        act = partial(finish, of.inputs, out, *flags, prefix=prefix)
-        return attempt(act, of, out, f"{of.whole.name}, {name}, {workers} workers")
-
-    return trial
-
-
-def alone() -> tuple[str, ...]:
-    """Prefix that runs a command in a network of its own: Ray listens on every interface it finds."""
-    line = ("unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")
-    works = subprocess.run([*line, "true"], capture_output=True, check=False).returncode == 0
-    return line if works else ()
-
-
-def cluster_trial(folder: Path, kills: int, spp: int) -> Trial:
-    """Ray, whose workers are killed one after the other while 50 units are done."""
-    from analytic import RENDERER
-
-    scene = folder / "wall.analytic"
-
-    def trial(_number: int, place: Path, _chance: random.Random) -> str | None:
-        path = walk(place / "fifty.json", 50)
-        inputs = (str(scene), *RENDERER, "--path", str(path), "--method", "reference", "--spp", str(spp))
-        work, out = made(place, "whole", inputs), place / "run"
-        process = start([*alone(), *command(inputs, out, "--executor", "ray", "--workers", "2")])
-        ledger, killed, done = out / "ledger.jsonl", 0, 0
-        while process.poll() is None and killed < kills:
-            workers = [pid for pid in descendants(process.pid) if b"do_unit" in cmdline(pid)]
-            lines = ledger.read_bytes().count(b"\n") if ledger.exists() else 0
-            # Not faster than units are done: a machine on which nothing succeeds is given ever longer pauses.
-            if workers and lines > done:
-                kill(workers[0])
-                killed, done = killed + 1, lines
-            time.sleep(0.1)
-        code = process.wait(TIMEOUT_S)
-        problem = f"exit code {code}" if code else difference(work, out)
-        if killed < kills:
-            problem = f"only {killed} workers could be killed ({problem})"
-        return f"{killed} workers killed: {problem}" if problem else None
-
-    return trial
-
-
-def descendants(pid: int) -> list[int]:
-    """Processes that come of a process."""
-    own = children(pid)
-    return own + [p for child in own for p in descendants(child)]
-
-
-def cmdline(pid: int) -> bytes:
-    """Command line of a process, or nothing."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
-
-
-# Disks.
-
-
-def disk_trial(work: Work, tally: Tally) -> Trial:
-    """A disk that fills up, then gets room."""
-    need = sum(f.stat().st_size + 4096 for f in work.whole.rglob("*") if f.is_file()) // 1024
-
-    def trial(_number: int, place: Path, chance: random.Random) -> str | None:
-        size = chance.randrange(24, need)
-        workers = chance.choice(((), ("--executor", "processes", "--workers", "2")))
-        line = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)]
-        mounted = subprocess.run(line, capture_output=True, text=True, check=False)
-        if mounted.returncode:
-            why = mounted.stderr.strip()
-            tally.skipped["disk"] = f"skipped: only who can mount a small disk can fill it ({why})"
-            return None
-        try:
-            return fill(work, place, size, workers)
-        finally:
-            subprocess.run(["umount", "-l", str(place)], check=True)
-
-    return trial
-
-
-def fill(work: Work, place: Path, size: int, workers: tuple[str, ...]) -> str | None:
-    """Run into a full disk, look at what is there, make room, go on."""
-    out, what = place / "run", f"disk of {size} KiB, {workers[1:2] or 'in-process'}"
-    line = command(work.inputs, out, *workers)
-    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
-    told = done.stderr.strip()[-300:]
-    if done.returncode != 0 and ("no room" not in told or done.returncode != 1):
-        return f"{what}: exit code {done.returncode}, {told}"
-    is_rendered = (out / "plots").exists()
-    if done.returncode and (out / "frames").exists() and not is_rendered and NEED not in told:
-        return f"{what}: not said how much is needed: {told}"
-    whole = {f.relative_to(work.whole): sha(f) for f in stored(work.whole)}
-    for file in stored(out):
-        if sha(file) != whole[file.relative_to(out)]:
-            return f"{what}: a partial {file.relative_to(out)}"
-    if done.returncode == 0:
-        return None if difference(work, out) is None else f"{what}: finished, with a difference"
-    subprocess.run(["mount", "-o", "remount,size=64m", str(place)], check=True)
-    return attempt(lambda: finish(work.inputs, out, *workers), work, out, what)
-
-
-# Bits.
-
-
-def bit_trial(work: Work) -> Trial:
-    """A flipped bit, found when its file is used, or by --verify."""
-
-    def trial(number: int, folder: Path, chance: random.Random) -> str | None:
-        out, is_used = folder / "run", number % 2 == 0
-        shutil.copytree(work.whole, out)
-        there = tuple(kind for kind in STORED if (out / kind).is_dir())
-        kinds = ("raw", "frames", "clips", "") if is_used else (*there, "video", "")
-        file = chance.choice(candidates(out, chance.choice(kinds)))
-        if is_used:
-            forget_users(out, file)
-        flip(file, chance)
-        how = () if is_used else ("--verify",)
-        what = f"a bit of {file.relative_to(out)} flipped, {'used' if is_used else 'verified'}"
-        return attempt(lambda: finish(work.inputs, out, *how), work, out, what)
-
-    return trial
-
-
-def candidates(out: Path, kind: str) -> list[Path]:
-    """Files of a kind; of none, the run's own."""
-    match kind:
-        case "":
-            return [out / "run.json", out / "ledger.jsonl", out / "job.json"]
-        case "video":
-            return list(out.glob("video.*"))
-        case _:
-            return sorted((out / kind).iterdir())
-
-
-def forget_users(out: Path, file: Path) -> None:
-    """Remove what is made of a file, so that it is used again."""
-    if file.parent.name == "raw":
-        (out / "frames" / file.name).unlink()
-    elif file.parent.name in ("frames", "clips"):
-        clips = (out / "clips").iterdir() if file.parent.name == "frames" else ()
-        for made in [*out.glob("video.*"), *clips]:
-            made.unlink()
-
-
-def flip(file: Path, chance: random.Random) -> None:
-    """Flip a bit."""
-    data = bytearray(file.read_bytes())
-    data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
-    file.write_bytes(data)
+TRIALS: dict[str, Trial] = {
+    "kills": kill, "shards": shards, "executors": executor, "cluster": cluster, "stops": stop, "disk": disk,
+    "bits": bits,
+}  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1:2] == ["--die"]:
+        die_at(sys.argv[2], sys.argv[3:])
+    else:
+        sys.exit(main())

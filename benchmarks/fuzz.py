@@ -1,13 +1,14 @@
-"""Mutated files, read as a careless user would: nothing but an error of ours may come of it.
+"""Mutated files: reading them ends well, or with an error of this package.
 
     python benchmarks/fuzz.py [--count 10000] [--seed 1]
 
-OpenEXR images, camera paths and scenes (JSON), Mitsuba scenes (XML) and run folders are damaged at random
-and read by a process of its own, which may take 2 GiB and 10 s for each. A crash, an unforeseen exception,
-and running out of either are failures; the seed of each is printed.
+OpenEXR images, camera paths (JSON), Mitsuba scenes (XML) and run folders are damaged at random and read by a
+process of its own, with 2 GiB of memory and 10 s for each. A crash, another exception, a lack of memory or
+time are failures; the seed of each is printed.
 """
 
 import argparse
+import contextlib
 import json
 import random
 import resource
@@ -19,14 +20,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from enfilade.store import Run
+from enfilade.errors import EnfiladeError
 
 MEMORY_BYTES, SECONDS = 2 << 30, 10
 BATCH = 500  # files read by one process
-LATE = "late.jsonl"  # the ledger of a command beside another
 IDENTITY = "identity.json"  # of the run that a folder holds
 SPLICES = (
     b"\0" * 8,
@@ -80,8 +78,6 @@ def run_batch(first: int, last: int) -> tuple[int, str | None]:
 
 def read_batch(first: int, last: int) -> None:
     """Read a batch, with bounded memory and time."""
-    from enfilade.errors import EnfiladeError
-
     readers = all_readers()
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         folder = Path(name)
@@ -134,7 +130,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     from enfilade.camera import load_path
     from enfilade.images import read_exr
     from enfilade.images.stills import image_pixels
-    from enfilade.pipeline.job import read_job
+    from enfilade.runs.job import read_job
     from enfilade.scene.mitsuba.files import check_scene
     from enfilade.settings import LimitSettings
 
@@ -146,7 +142,6 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
         "scene": (make_scene, lambda file: check_scene(file, LimitSettings())),
         "run": (lambda folder: make_run(folder) / "run.json", read_run),
         "ledger": (lambda folder: make_run(folder) / "ledger.jsonl", read_run),
-        "ledger of a part": (lambda folder: make_run(folder) / "parts" / LATE, read_run),
         "job": (lambda folder: make_run(folder) / "job.json", lambda file: read_job(file.parent)),
     }
 
@@ -186,49 +181,43 @@ def make_scene(folder: Path) -> Path:
 
 
 def make_run(folder: Path) -> Path:
-    """A run folder with a few units, some of which a command beside wrote into a ledger of its own."""
+    """A run folder with a few finished tasks."""
     from enfilade.camera import load_path
-    from enfilade.pipeline.job import Job
-    from enfilade.settings import Settings
-    from enfilade.store import Run
+    from enfilade.runs.folder import RunFolder
+    from enfilade.runs.job import Job
+    from enfilade.runs.render import prepare
+    from enfilade.scene.opener import Scene
 
     out = folder / "run"
     if not out.exists():
-        job = Job(make_scene(folder), load_path(make_path(folder)), Settings(), "paper")
+        job = Job(Scene(make_scene(folder)), load_path(make_path(folder)), method="reference")
+        prepare(job, out)
         (folder / IDENTITY).write_text(json.dumps(job.identity()))
-        with Run.open(out, job.identity()) as run:
-            run.write_json("job.json", job.to_json())
-            finish_units(run, range(5))
-        with Run.sharing(out, Path(LATE).stem) as run:
-            finish_units(run, range(5, 10))
+        with RunFolder.share(out) as run:
+            for number in range(10):
+                file = run.stem("frames", number).with_suffix(".exr")
+                file.parent.mkdir(exist_ok=True)
+                file.write_bytes(b"x" * number)
+                line = {"pass": "frames", "frame": number, "provenance": {}, "cost": {}}
+                run.finish({**line, "files": run.record_of([file])})
     return out
 
 
-def finish_units(run: "Run", numbers: range) -> None:
-    """Record frames of a few bytes."""
-    for number in numbers:
-        file = run.file("frames", number)
-        file.parent.mkdir(exist_ok=True)
-        file.write_bytes(b"x" * number)
-        run.finish(f"frame {number}", files=[file], facts={"frame": number, "cost": {}})
-
-
 def read_run(file: Path) -> None:
-    """Read a run as the report does, and a copy of it as the command does that goes on with it."""
+    """Read a run as the report does, and continue a copy of it."""
     from enfilade.reports.run import ReportedRun
-    from enfilade.store import Run
+    from enfilade.runs.folder import RunFolder
 
-    folder = file.parent if file.name != LATE else file.parents[1]
+    folder = file.parent
     copy = folder.with_name("copy")
     shutil.copytree(folder, copy)
     identity = json.loads((folder.parent / IDENTITY).read_text())
     try:
-        for opening in (lambda: ReportedRun(folder), lambda: Run.open(copy, identity).close()):
-            try:
-                opening()
-            except ValueError as error:  # ours are among them
-                if type(error).__module__ != "enfilade.errors":
-                    raise
+        with contextlib.suppress(EnfiladeError):
+            ReportedRun(folder)
+        with contextlib.suppress(EnfiladeError), RunFolder.create(copy, identity) as run:
+            run.damaged()
+            run.digest()
     finally:
         shutil.rmtree(copy)
 

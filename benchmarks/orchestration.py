@@ -1,95 +1,128 @@
-"""What it costs to keep a run restartable, and what workers gain.
+"""The cost of restartable runs, and the gain of workers.
 
     python benchmarks/orchestration.py [length overhead workers ray] [--frames 2000]
 
-length     a long run: memory and open files on the way, then how fast it is resumed, and another run refused
-overhead   what a unit costs beside its work, in process and in worker processes
-workers    two workers of one thread against one, wall time of the tracing of a Mitsuba scene
-ray        a local Ray cluster against worker processes, units of more than 5 s
+length     a long run: memory and open files on the way; the time to continue it, and to refuse another run
+overhead   the cost of a task besides its work, in process and in worker processes
+workers    two workers of one thread against one, on a Mitsuba scene
+ray        a local Ray cluster against worker processes, on tasks of more than 5 s
 
-Says which limits are missed, and fails then; on a busy machine that tells more of the machine.
+The exit code is 1 if a limit is missed. On a busy machine the times say more about the machine.
 """
 
 import argparse
-import json
+import dataclasses
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-KINDS = ("length", "overhead", "workers", "ray")
-UNITS = 1000
-MOST_OVERHEAD_S = 0.01  # beside a unit's work: 1 % of a unit of 1 s
-OF_LIMITS = 1000  # frames of a run, for which the next two hold
-MOST_RESUME_S, MOST_REFUSAL_S = 2.0, 1.0
-MOST_GROWTH = 1.1  # of memory from the second tenth of a run to the last but one: then the video is written
+import analytic  # noqa: F401  (the tests' modules become importable)
+from enfilade.methods.analysis import Analysis
+from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.monitor import Silence
+
+TASKS = 1000
+MOST_OVERHEAD_S = 0.01  # 1 % of a task of 1 s
+LIMITED_FRAMES = 1000  # up to which the next two limits hold
+MOST_CONTINUE_S, MOST_REFUSE_S = 2.0, 1.0
+MOST_GROWTH = 1.1  # of memory from the second tenth of a run to the last but one
 LEAST_GAIN = 1.7  # of two workers over one
 MOST_RAY = 1.1  # times as long as worker processes take
 SAMPLE_S = 0.25
+RENDER = """
+import sys
+from pathlib import Path
+from enfilade.device import activate
+activate("cpu")
+from enfilade.monitor import Silence
+from enfilade.runs.render import render
+from support.toys import slide, toy_job
+folder, frames, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+job = toy_job(folder, path=slide(frames, size=(32, 24)), trace={"seed": seed})
+render(job, folder / "run", Silence())
+"""
+
+
+class Idle(Method):
+    """A method whose tasks do nothing."""
+
+    name = "idle"
+    passes = (Pass("idle"), Pass(FRAMES))
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """One task a frame."""
+        return [Task("idle", frame) for frame in range(len(analysis.path))]
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Do nothing."""
+        del task, inputs, walk
+        return Output()
+
+
+class Clock(Silence):
+    """A monitor that keeps the moments at which tasks end."""
+
+    def __init__(self) -> None:
+        self.moments: list[float] = []
+
+    def progress(self, name: str, done: int, total: int) -> None:
+        """Keep the moment."""
+        del name, done, total
+        self.moments.append(time.perf_counter())
 
 
 def main() -> int:
     """Measure and print; returns the exit code."""
+    kinds = {"length": length, "overhead": overhead, "workers": gain, "ray": ray}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("kinds", nargs="*", choices=[*KINDS, []], default=list(KINDS))
+    parser.add_argument("kinds", nargs="*", choices=[*kinds, []], default=list(kinds))
     parser.add_argument("--frames", type=int, default=2000)
     arguments = parser.parse_args()
     print(f"{len(os.sched_getaffinity(0))} CPU cores, load {os.getloadavg()[0]:.1f}")
-    measure = {
-        "length": lambda folder: measure_length(folder, arguments.frames),
-        "overhead": measure_overhead,
-        "workers": measure_workers,
-        "ray": measure_ray,
-    }
-    with tempfile.TemporaryDirectory(prefix="orchestration-") as name:
-        missed = [text for kind in arguments.kinds for text in measure[kind](Path(name))]
+    missed = []
+    for kind in arguments.kinds:
+        with tempfile.TemporaryDirectory(prefix="orchestration-") as name:
+            missed += list(kinds[kind](Path(name), arguments.frames))
     for text in missed:
         print(f"missed: {text}")
     return 1 if missed else 0
 
 
-def measure_length(folder: Path, frames: int) -> Iterator[str]:
-    """Memory and open files over a long run, then resuming and refusing it."""
-    line = analytic(folder, frames)
-    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    samples = []
-    while process.poll() is None:
-        samples.append(look(process.pid, folder / "run" / "ledger.jsonl"))
-        time.sleep(SAMPLE_S)
+def length(folder: Path, frames: int) -> Iterator[str]:
+    """Memory and open files of a long run; the time to continue it, and to refuse another run."""
+    line = [sys.executable, "-c", RENDER, str(folder), str(frames)]
+    with subprocess.Popen([*line, "0"]) as process:
+        samples = []
+        while process.poll() is None:
+            samples.append(sample(process.pid, folder / "run" / "ledger.jsonl"))
+            time.sleep(SAMPLE_S)
     if process.returncode:
         raise RuntimeError(f"exit code {process.returncode}")
-    print(f"length: {frames} frames; by tenths of the ledger, MiB of memory and open files at most")
-    done = [s for s in samples if s is not None]
-    most = max(size for size, _, _ in done)
-    memory = []
+    print(f"length: {frames} frames; largest memory in MiB and number of open files, by tenths of the ledger")
+    found = [s for s in samples if s is not None]
+    most, memory = max(size for size, _, _ in found), []
     for tenth in range(10):
-        here = [s for s in done if tenth * most / 10 <= s[0] <= (tenth + 1) * most / 10]
-        if here:
+        if here := [s for s in found if tenth * most / 10 <= s[0] <= (tenth + 1) * most / 10]:
             memory.append(max(m for _, m, _ in here))
             print(f"  {tenth + 1:2}  {memory[-1]:7.1f}  {max(f for _, _, f in here):3}")
     if (growth := memory[-2] / memory[1]) > MOST_GROWTH:
-        yield f"memory grows {growth:.2f} times, {MOST_GROWTH} at most are asked"
-    begin = time.perf_counter()
-    subprocess.run(line, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    seconds = time.perf_counter() - begin
-    print(f"resumed, with nothing left to do, in {seconds:.2f} s")
-    if frames <= OF_LIMITS and seconds > MOST_RESUME_S:
-        yield f"resuming takes {seconds:.2f} s, {MOST_RESUME_S} at most are asked"
-    begin = time.perf_counter()
-    other = subprocess.run([*line, "--spp", "3"], check=False, capture_output=True, text=True)
-    seconds = time.perf_counter() - begin
-    print(f"another run refused in {seconds:.2f} s: {other.stderr.splitlines()[1].strip()}")
-    if frames <= OF_LIMITS and seconds > MOST_REFUSAL_S:
-        yield f"refusing takes {seconds:.2f} s, {MOST_REFUSAL_S} at most is asked"
+        yield f"memory grows {growth:.2f} times, limit {MOST_GROWTH}"
+    start_s = seconds_of([sys.executable, "-c", "import enfilade.runs.render"])
+    for what, seed, limit_s in (("continued", "0", MOST_CONTINUE_S), ("refused", "1", MOST_REFUSE_S)):
+        seconds = seconds_of([*line, seed]) - start_s
+        print(f"{what} in {seconds:.2f} s, without the start of Python")
+        if frames <= LIMITED_FRAMES and seconds > limit_s:
+            yield f"{what} in {seconds:.2f} s, limit {limit_s}"
 
 
-def look(pid: int, ledger: Path) -> tuple[int, float, int] | None:
-    """Size of the ledger, memory in MiB and open files of a process; None where it has just ended."""
+def sample(pid: int, ledger: Path) -> tuple[int, float, int] | None:
+    """Size of the ledger, memory in MiB and open files of a process; None if it has just ended."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
         files = len(list(Path(f"/proc/{pid}/fd").iterdir()))
@@ -98,130 +131,78 @@ def look(pid: int, ledger: Path) -> tuple[int, float, int] | None:
         return None
 
 
-def analytic(folder: Path, frames: int) -> list[str]:
-    """Command of a run of small frames in closed form."""
-    from analytic import BALL, RENDERER, WALL, AnalyticScene, write_scene
-
-    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL), noise=0.1))
-    path = folder / "path.json"
-    eyes = {at / 30: [0.02 * at, 0.0, 4.0] for at in (0, frames - 1)}
-    keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
-    path.write_text(json.dumps({"format": "enfilade-path", "fps": 30, "size": [32, 24], "keys": keys}))
-    flags = [
-        *RENDERER,
-        "--method",
-        "paper",
-        "--spp",
-        "2",
-        "--viewing-diagonal-m",
-        "0.0125",
-        "--device",
-        "cpu",
-        "--quiet",
-    ]
-    out = ["--out", str(folder / "run")]
-    return [sys.executable, "-m", "enfilade", "render", str(scene), "--path", str(path), *out, *flags]
+def seconds_of(line: list[str]) -> float:
+    """Wall time of a command, which may fail."""
+    begin = time.perf_counter()
+    subprocess.run(line, capture_output=True, check=False)
+    return time.perf_counter() - begin
 
 
-def idle(_spec: object, tell: object) -> object:
-    """A worker that does nothing, at once."""
-    del tell
+def overhead(folder: Path, _frames: int) -> Iterator[str]:
+    """Tasks that do nothing, with a line in the ledger for each."""
+    from enfilade.device import activate
 
-    def do(kind: str, facts: object) -> None:
-        del kind, facts
+    activate("cpu")
+    from enfilade.runs.executor import Workers
+    from enfilade.runs.render import Shard, prepare, render_shard
+    from support.toys import slide, toy_job
 
-    return do
+    job = dataclasses.replace(toy_job(folder, path=slide(TASKS)), method="orchestration:Idle")
+    for name, workers in (("in-process", None), ("processes", 2)):
+        run = folder / name
+        prepare(job, run)
+        render_shard(run, Shard("analysis"), Silence())
+        clock = Clock()
+        render_shard(run, Shard("idle"), clock, Workers(name, workers))
+        seconds = (clock.moments[-1] - clock.moments[0]) / (TASKS - 1)
+        print(f"overhead, {name}: {1000 * seconds:.2f} ms a task")
+        if seconds > MOST_OVERHEAD_S:
+            yield f"{name}: a task costs {seconds:.4f} s, limit {MOST_OVERHEAD_S}"
 
 
-def hear_nothing(unit: object, what: str, value: object) -> None:
-    """Reports of workers are of no interest here."""
-    del unit, what, value
+def gain(folder: Path, _frames: int) -> Iterator[str]:
+    """The same frames by one worker and by two, each of one thread."""
+    line = mitsuba(folder, 256, "20-35")
+    one, two = (frame_seconds(folder, line, "processes", count) for count in (1, 2))
+    print(f"workers: one {one:.1f} s, two {two:.1f} s, gain {one / two:.2f}")
+    if one / two < LEAST_GAIN:
+        yield f"two workers gain {one / two:.2f}, limit {LEAST_GAIN}"
 
 
-def measure_overhead(folder: Path) -> Iterator[str]:
-    """Units that do nothing, but for a line in the ledger each."""
-    from enfilade.executors import Graph, Recipe, Unit, open_executor, supervise
-    from enfilade.store import Run
-
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-    for name in ("in-process", "processes"):
-        with Run.open(folder / f"overhead-{name}", {"x": 1}) as run:
-            executor = open_executor(
-                name, Recipe("orchestration:idle"), hear_nothing, workers=2, logs=folder / "logs"
-            )
-            graph = Graph()
-            for number in range(UNITS):
-                needs = (f"u{number - 2}",) if number > 1 else ()
-                graph.add(Unit(f"u{number}", "idle", needs=needs, order=(0, number)))
-
-            def is_done(unit: Unit, to: Run = run) -> bool:
-                to.record({"unit": unit.name, "files": {}, "cost": {}})
-                return True
-
-            begin = time.perf_counter()
-            supervise(graph, executor, follow=lambda _: (), is_done=is_done, failed=lambda *_: None)
-            seconds = (time.perf_counter() - begin) / UNITS
-            executor.close()
-            print(f"overhead, {name}: {1000 * seconds:.2f} ms a unit, its line on the disk included")
-            if seconds > MOST_OVERHEAD_S:
-                yield f"{name}, a unit costs {seconds:.4f} s, {MOST_OVERHEAD_S} at most are asked"
+def ray(folder: Path, _frames: int) -> Iterator[str]:
+    """The same long tasks by worker processes and by Ray."""
+    line = mitsuba(folder, 512, "20-27")
+    processes, cluster = (frame_seconds(folder, line, name, 2) for name in ("processes", "ray"))
+    ratio = cluster / processes
+    print(f"ray: {cluster:.1f} s, worker processes {processes:.1f} s, overhead {100 * (ratio - 1):.1f} %")
+    if ratio > MOST_RAY:
+        yield f"Ray takes {ratio:.2f} times as long as processes, limit {MOST_RAY}"
 
 
 def mitsuba(folder: Path, spp: int, frames: str) -> list[str]:
-    """Inputs of a run that traces every frame of ROOM."""
+    """Command of a run that traces every frame of ROOM."""
     from studies.scenes import write_scene
 
     files = write_scene("room", folder / "room", preset="small")
-    flags = ["--size", "160x120", "--frames", frames, "--method", "reference", "--spp", str(spp)]
     line = [sys.executable, "-m", "enfilade", "render", str(files.scene), "--path", str(files.path)]
+    flags = ["--size", "160x120", "--frames", frames, "--method", "reference", "--spp", str(spp)]
     return [*line, *flags, "--device", "cpu", "--quiet", "--threads", "1"]
 
 
-def measure_workers(folder: Path) -> Iterator[str]:
-    """The same frames by one worker and by two, each of one thread; and by two commands at once."""
-    line = mitsuba(folder, 256, "20-35")
-    seconds = {count: run_seconds(folder, line, "processes", count) for count in (1, 2)}
-    halves = [mitsuba(folder, 256, frames) for frames in ("20-27", "28-35")]
-    with ThreadPoolExecutor() as pool:
-        waits = [
-            pool.submit(run_seconds, folder / str(number), half, "in-process", 1)
-            for number, half in enumerate(halves)
-        ]
-        apart = max(wait.result() for wait in waits)
-    times = ", ".join(f"{count} workers {s:.1f} s" for count, s in seconds.items())
-    print(f"workers: {times}, gain {seconds[1] / seconds[2]:.2f}")
-    print(f"two commands at once, half of the frames each: {apart:.1f} s, gain {seconds[1] / apart:.2f}")
-    if (gain := seconds[1] / seconds[2]) < LEAST_GAIN:
-        yield f"two workers gain {gain:.2f}, {LEAST_GAIN} are asked"
-
-
-def measure_ray(folder: Path) -> Iterator[str]:
-    """The same long units by worker processes and by Ray."""
-    line = mitsuba(folder, 512, "20-27")
-    seconds = {name: run_seconds(folder, line, name, 2) for name in ("processes", "ray")}
-    times = ", ".join(f"{name} {s:.1f} s" for name, s in seconds.items())
-    ratio = seconds["ray"] / seconds["processes"]
-    print(f"ray: {times}, overhead {100 * (ratio - 1):.1f} %")
-    if ratio > MOST_RAY:
-        yield f"Ray takes {ratio:.2f} times as long as processes, {MOST_RAY} at most are asked"
-
-
-def run_seconds(folder: Path, line: list[str], executor: str, workers: int) -> float:
-    """Wall time from the first frame of a run to its last, without starting and the video."""
+def frame_seconds(folder: Path, line: list[str], executor: str, workers: int) -> float:
+    """Wall time from the first frame of a run to its last, without the start and the video."""
     out = folder / "run"
     shutil.rmtree(out, ignore_errors=True)
     flags = ["--out", str(out), "--executor", executor, "--workers", str(workers)]
-    process = subprocess.Popen([*line, *flags], stdout=subprocess.DEVNULL)
     moments: dict[int, float] = {}
-    while process.poll() is None:
-        count = sum(1 for _ in (out / "frames").glob("*.exr"))
-        moments.setdefault(count, time.perf_counter())
-        time.sleep(0.02)
+    with subprocess.Popen([*line, *flags], stdout=subprocess.DEVNULL) as process:
+        while process.poll() is None:
+            moments.setdefault(sum(1 for _ in (out / "frames").glob("*.exr")), time.perf_counter())
+            time.sleep(0.02)
     if process.returncode:
         raise RuntimeError(f"exit code {process.returncode}")
-    first, last = min(c for c in moments if c >= workers), max(moments)
-    units = last - first
-    return (moments[last] - moments[first]) / units * last
+    first, last = min(count for count in moments if count >= workers), max(moments)
+    return (moments[last] - moments[first]) / (last - first) * last
 
 
 if __name__ == "__main__":

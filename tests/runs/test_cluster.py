@@ -1,4 +1,4 @@
-"""Tasks on a Ray cluster: a real local one in a network of its own, and what is asked of Ray."""
+"""Tasks on a Ray cluster: a real one in a network of its own, and the requests to Ray."""
 
 from __future__ import annotations
 
@@ -23,27 +23,20 @@ from enfilade.runs.render import prepare
 from enfilade.settings import LimitSettings
 from support.toys import attempts, command, digest, environment, order, toy_job
 
-ALONE = ["unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+ALONE = ["unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]  # Ray listens on all interfaces
 NODE, BIG = {"CPU": 8.0, "GPU": 2.0}, {"CPU": 16.0}
-
-
-@pytest.fixture(scope="module")
-def alone():
-    """Prefix of commands in a network of their own: Ray listens on every interface there is."""
-    if importlib.util.find_spec("ray") is None:
-        pytest.skip("Ray is not installed: pip install 'enfilade[cluster]'")
-    if subprocess.run([*ALONE, "true"], check=False, capture_output=True).returncode:  # noqa: S603
-        pytest.skip("no network namespace can be made here, and Ray would listen to the network")
-    return ALONE
 
 
 @pytest.mark.slow
 @pytest.mark.ray
-def test_a_cluster_whose_workers_crash_makes_the_same_run(alone, tmp_path, whole):
+def test_a_cluster_whose_workers_crash_makes_the_same_run(tmp_path, whole):
+    if importlib.util.find_spec("ray") is None:
+        pytest.skip("Ray is not installed: pip install 'enfilade[cluster]'")
+    if subprocess.run([*ALONE, "true"], check=False, capture_output=True).returncode:  # noqa: S603
+        pytest.skip("no network namespace can be made here, and Ray would listen to the network")
     order(tmp_path, light_1="kill", mean_1="raise")
-    done = subprocess.run(  # noqa: S603
-        [*alone, *command(tmp_path, "ray", 2)], env=environment(), capture_output=True, text=True, check=False
-    )
+    line = [*ALONE, *command(tmp_path, "ray", 2)]
+    done = subprocess.run(line, env=environment(), capture_output=True, text=True, check=False)  # noqa: S603
     assert done.returncode == 0, done.stderr
     assert "light 1: Ray: " in done.stdout
     assert "mean 1: ZeroDivisionError: by nought; it is tried again" in done.stdout
@@ -52,21 +45,19 @@ def test_a_cluster_whose_workers_crash_makes_the_same_run(alone, tmp_path, whole
 
 
 @pytest.mark.parametrize(
-    ("workers", "has_gpu", "slots", "cpus", "gpus"),
+    ("workers", "has_gpu", "share"),
     [
-        (Workers("ray", threads=1), False, 24, 1, 0.0),
-        (Workers("ray", threads=4), False, 6, 4, 0.0),
-        (Workers("ray", threads=5), False, 4, 5, 0.0),  # one fits on the one node, three on the other
-        (Workers("ray", 3, threads=64), False, 3, 16, 0.0),  # Ray would wait for ever for a node of 64
-        (Workers("ray", 4), False, 4, 6, 0.0),
-        (Workers("ray", threads=2), True, 2, 2, 1.0),
-        (Workers("ray", 4, threads=1), True, 4, 1, 0.5),
-        (Workers("ray", 3, threads=1), True, 3, 1, 0.5),
-        (Workers("ray", 1, threads=1), True, 1, 1, 1.0),
+        (Workers("ray", threads=1), False, Share(24, 1)),
+        (Workers("ray", threads=5), False, Share(4, 5)),  # one fits on the one node, three on the other
+        (Workers("ray", 3, threads=64), False, Share(3, 16)),  # Ray would wait for ever for a node of 64
+        (Workers("ray", 4), False, Share(4, 6)),
+        (Workers("ray", threads=2), True, Share(2, 2, 1.0)),
+        (Workers("ray", 3, threads=1), True, Share(3, 1, 0.5)),
+        (Workers("ray", 1, threads=1), True, Share(1, 1, 1.0)),
     ],
 )
-def test_shares_of_the_nodes(workers, has_gpu, slots, cpus, gpus):
-    assert Share.of([NODE, BIG], workers, has_gpu=has_gpu) == Share(slots, cpus, gpus)
+def test_shares_of_the_nodes(workers, has_gpu, share):
+    assert Share.of([NODE, BIG], workers, has_gpu=has_gpu) == share
 
 
 class RayError(Exception):
@@ -114,36 +105,37 @@ class Ray:
 
 @pytest.fixture
 def joined(tmp_path, monkeypatch):
-    """Join a cluster of some nodes with a run whose path is analyzed."""
+    """Join a cluster of some nodes with a run."""
     prepare(toy_job(tmp_path), tmp_path / "run")
     monkeypatch.setattr(child, "_SERVERS", {})
 
-    def join(*nodes, workers=Workers("ray"), address="head:6379", device="cpu"):
-        monkeypatch.setitem(sys.modules, "ray", ray := Ray(*nodes))
-        run = RunFolder.read(tmp_path / "run")
+    def join(*nodes, count=None, threads=0, address="head:6379", device="cpu"):
+        monkeypatch.setitem(sys.modules, "ray", ray := Ray(*nodes) if nodes else None)
+        run, workers = RunFolder.read(tmp_path / "run"), Workers("ray", count, threads)
         return ray, Cluster(run, LimitSettings(), workers, address=address, device=device)
 
     return join
 
 
 def test_a_task_takes_its_share_of_ray(joined):
-    ray, cluster = joined(NODE, BIG, workers=Workers("ray", 4, 1))
+    ray, cluster = joined(NODE, BIG, count=4, threads=1)
     assert (cluster.slots, ray.begun["address"]) == (4, "head:6379")
     assert ray.options == {"num_cpus": 1, "num_gpus": 0.0, "max_retries": 0, "max_calls": 0}
-    ray, _ = joined(BIG, workers=Workers("ray", 3, 2), address="")
+    ray, _ = joined(BIG, count=3, threads=2, address="")
     assert (ray.begun["address"], ray.begun["num_cpus"]) == ("local", 6)
 
 
-def test_a_cluster_without_a_gpu_is_refused_if_one_is_needed(joined):
+def test_clusters_that_can_not_be_used(joined, monkeypatch):
+    def unreachable(_ray, **_how):
+        raise ConnectionError("timed out")
+
+    with pytest.raises(EnfiladeError, match=r"pip install 'enfilade\[cluster\]'"):
+        joined()
     with pytest.raises(EnfiladeError, match=r"no GPU, .* add --device cpu"):
         joined(BIG, device="gpu")
-
-
-def test_without_ray_the_way_to_get_it_is_said(joined, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    run = RunFolder.read(tmp_path / "run")
-    with pytest.raises(EnfiladeError, match=r"pip install 'enfilade\[cluster\]'"):
-        Cluster(run, LimitSettings(), Workers("ray"), address="", device="cpu")
+    monkeypatch.setattr(Ray, "init", unreachable)
+    with pytest.raises(EnfiladeError, match="no Ray cluster at head:6379: timed out"):
+        joined(BIG)
 
 
 def test_results_and_losses(joined, tmp_path):
@@ -166,32 +158,20 @@ def test_results_and_losses(joined, tmp_path):
 
 
 @pytest.mark.parametrize("kind", [RayError, ConnectionError])
-def test_a_cluster_that_is_lost_is_said(joined, kind):
+def test_a_cluster_that_is_lost_ends_the_run(joined, kind):
     def lost(*_given, **_how):
         raise kind("the head node is gone")
 
     ray, cluster = joined(BIG)
     cluster.begin(0, Order(Task("light", 0)))
-    ray.wait = lost
-    with pytest.raises(EnfiladeError, match="does not answer: the head node is gone; start one"):
-        cluster.wait(None)
-    cluster._do = SimpleNamespace(remote=lost)
-    with pytest.raises(EnfiladeError, match="does not answer"):
-        cluster.begin(1, Order(Task("light", 1)))
-
-
-def test_a_cluster_that_can_not_be_reached(joined, monkeypatch):
-    def unreachable(_ray, **_how):
-        raise ConnectionError("timed out")
-
-    monkeypatch.setattr(Ray, "init", unreachable)
-    with pytest.raises(EnfiladeError, match="no Ray cluster at head:6379: timed out"):
-        joined(BIG)
+    ray.wait, cluster._do = lost, SimpleNamespace(remote=lost)
+    for act in (lambda: cluster.wait(None), lambda: cluster.begin(1, Order(Task("light", 1)))):
+        with pytest.raises(EnfiladeError, match="does not answer: the head node is gone; start one"):
+            act()
 
 
 def test_a_ray_worker_keeps_its_scene(joined, tmp_path):
-    terms = WorkerTerms(str(tmp_path / "run"), "cpu", 1)
-    workers = []
+    terms, workers = WorkerTerms(str(tmp_path / "run"), "cpu", 1), []
     for frame, reduction in ((0, 1), (1, 1), (2, 4)):
         do_remotely(terms, pickle.dumps(Order(Task("light", frame), reduction)), 0.0, 0.0)
         workers.append(child._SERVERS[terms]._worker)
@@ -199,10 +179,11 @@ def test_a_ray_worker_keeps_its_scene(joined, tmp_path):
 
 
 HANG = """
-import pickle, sys
-from enfilade.runs.child import WorkerTerms, do_remotely
-order = bytes.fromhex(sys.argv[2])
-do_remotely(WorkerTerms(sys.argv[1], "cpu", 1), order, 0.2, 3600.0)
+import sys
+import enfilade.runs.child as child
+assert "drjit" not in sys.modules  # the device is chosen by the first task
+terms, order = child.WorkerTerms(sys.argv[1], "cpu", 1), bytes.fromhex(sys.argv[2])
+child.do_remotely(terms, order, 0.2, 3600.0)
 """
 
 
@@ -215,8 +196,3 @@ def test_a_ray_worker_that_hangs_ends_itself(tmp_path):
     assert done.returncode == 1
     assert "Timeout (0:00:00.2" in done.stderr
     assert "in misbehave" in done.stderr
-
-
-def test_the_module_of_workers_imports_nothing_that_binds_to_a_device():
-    code = "import sys, enfilade.runs.child; sys.exit('drjit' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], env=environment(), check=False).returncode == 0  # noqa: S603

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import pytest
@@ -33,32 +34,25 @@ def test_workers_that_there_are_not(given, words):
         Workers(*given)
 
 
-@pytest.mark.parametrize(
-    ("device", "workers", "slots", "threads"),
-    [
-        ("llvm", {}, 6, 1),
-        ("cuda", {}, 2, 3),
-        ("llvm", {"count": 2}, 2, 3),
-        ("llvm", {"count": 2, "threads": 5}, 2, 5),
-        ("llvm", {"count": 9}, 9, 1),
-    ],
-)
-def test_workers_share_cores_and_gpus(tmp_path, monkeypatch, device, workers, slots, threads):
-    monkeypatch.setattr(scheduler, "cores", lambda: 6)
-    monkeypatch.setattr(scheduler, "gpus", lambda: ["0", "1"])
-    monkeypatch.setattr(scheduler, "active", lambda: SimpleNamespace(backend=device))
-    with RunFolder.create(tmp_path / "run", {}) as run:
-        executor = open_executor(toy_job(tmp_path), run, Workers("processes", **workers))
-    assert (executor.slots, executor._terms.threads) == (slots, threads)
-    assert executor._gpus == (["0", "1"] if device == "cuda" else ())
-
-
 @pytest.fixture
 def begun(tmp_path):
     job = toy_job(tmp_path)
     prepare(job, tmp_path / "run")
     with RunFolder.share(tmp_path / "run") as run:
         yield job, run
+
+
+@pytest.mark.parametrize(
+    ("device", "workers", "slots", "threads"),
+    [("llvm", {}, 6, 1), ("cuda", {}, 2, 3), ("llvm", {"count": 2, "threads": 5}, 2, 5)],
+)
+def test_workers_share_cores_and_gpus(begun, monkeypatch, device, workers, slots, threads):
+    monkeypatch.setattr(scheduler, "cores", lambda: 6)
+    monkeypatch.setattr(scheduler, "gpus", lambda: ["0", "1"])
+    monkeypatch.setattr(scheduler, "active", lambda: SimpleNamespace(backend=device))
+    executor = open_executor(*begun, Workers("processes", **workers))
+    assert (executor.slots, executor._terms.threads) == (slots, threads)
+    assert executor._gpus == (["0", "1"] if device == "cuda" else ())
 
 
 def test_a_host_with_another_scene_is_refused(begun):
@@ -76,16 +70,13 @@ def test_a_host_with_another_scene_is_refused(begun):
 )
 def test_a_lack_of_memory_reduces_the_paths_in_flight(begun, paths, reduction, left):
     job, run = begun
-    settings = job.settings.replace(LimitSettings, paths_in_flight=paths)
-    worker = open_worker(type(job)(job.scene, job.path, settings, job.method), run, reduction)
-    assert worker._job.settings[LimitSettings].paths_in_flight == left
+    job = dataclasses.replace(job, settings=job.settings.replace(LimitSettings, paths_in_flight=paths))
+    assert open_worker(job, run, reduction)._job.settings[LimitSettings].paths_in_flight == left
 
 
 def test_in_process_a_worker_is_kept_until_it_is_discarded(begun, tmp_path):
-    job, run = begun
-    executor = InProcess(job, run)
+    executor, workers = InProcess(*begun), []
     assert executor.wait(None) == []
-    workers = []
     for reduction in (1, 1, 4):
         executor.begin(0, Order(Task("light", 0), reduction))
         executor.wait(None)

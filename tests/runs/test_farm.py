@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import stat
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -22,29 +21,29 @@ from support.toys import slide, toy_job, wait_for
 
 OPENJD = Path(sys.executable).with_name("openjd")
 STEPS = ["analysis", "light", "mean", "frames", "clips", "video"]
-WORKER = ["--executor", "processes", "--workers", "1"]
 
 
 @pytest.fixture
 def begun(tmp_path):
-    prepare(toy_job(tmp_path, path=slide(6)), tmp_path / "run")
+    prepare(toy_job(tmp_path, path=slide(20)), tmp_path / "run")
     return tmp_path / "run"
 
 
 def test_the_template_is_one_of_open_job_description(begun):
-    write_template(begun, begun / "farm.json", shards=2)
+    write_template(begun, begun / "farm.json", shards=3)
     made = json.loads((begun / "farm.json").read_text())
-    assert made == template(begun, 2)
+    assert made == template(begun, 3)
     assert [step["name"] for step in made["steps"]] == STEPS
-    line = [str(OPENJD), "check", str(begun / "farm.json")]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
-    assert done.returncode == 0, done.stdout
-
-
-def test_each_task_has_a_worker_process_of_its_own(begun):
-    for step in template(begun, 2)["steps"]:
-        line = step["script"]["actions"]["onRun"]["args"]
-        assert line[line.index("--executor") :][:4] == WORKER
+    lines = farm._lines(made["steps"][1], begun)
+    options = "--openjd --executor processes --workers 1 --pass light --shard 3/3"
+    assert lines[2][1:] == ["work", str(begun), *options.split()]
+    assert [len(farm._lines(step, begun)) for step in made["steps"]] == [2, 3, 3, 3, 1, 1]
+    assert "--pass" not in farm._lines(made["steps"][-1], begun)[0]
+    assert [len(farm._lines(step, begun)) for step in template(begun)["steps"]] == [2, 2, 2, 2, 1, 1]
+    if OPENJD.exists():
+        line = [str(OPENJD), "check", str(begun / "farm.json")]
+        done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
+        assert done.returncode == 0, done.stdout
 
 
 class Cluster:
@@ -73,7 +72,7 @@ def test_tasks_on_this_machine_come_one_after_the_other(begun, monkeypatch):
     cluster, told = Cluster(), []
     monkeypatch.setitem(sys.modules, "submitit", cluster)
     jobs = submit(begun, "local", 3, {}, told.append)
-    assert jobs == [str(n) for n in range(1 + 3 * 3 + 1 + 1)]
+    assert jobs == [str(n) for n in range(2 + 3 * 3 + 1 + 1)]
     assert cluster.events == [(what, job) for job in jobs for what in ("given", "ended")]
     assert all("cpus_per_task" not in given for given in cluster.parameters)
     assert told[0] == "analysis   job 0, 1 task"
@@ -96,13 +95,14 @@ if [ "$1" = requeue ]; then echo "$2" >> "$SLURM_REQUEUED"; else echo "MaxArrayS
 @pytest.fixture
 def slurm(tmp_path, monkeypatch):
     """Slurm's commands; returns the lines of each job's batch file, by its number."""
+    pytest.importorskip("submitit")
     seen = tmp_path / "seen"
     for folder in (seen, tmp_path / "bin"):
         folder.mkdir()
     for name, text in (("sbatch", SBATCH), ("scontrol", SCONTROL), ("srun", "exit 1")):
         script(tmp_path / "bin" / name, text)
-    facts = {"SEEN": seen, "REQUEUED": tmp_path / "requeued", "REFUSES": 99, "MOST": 1001}
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
+    facts = {"SEEN": seen, "REQUEUED": tmp_path / "requeued", "REFUSES": 99, "MOST": 1001}
     for name, value in facts.items():
         monkeypatch.setenv(f"SLURM_{name}", str(value))
     return lambda: {int(file.name): file.read_text().splitlines() for file in sorted(seen.iterdir())}
@@ -110,7 +110,7 @@ def slurm(tmp_path, monkeypatch):
 
 def script(file, text):
     file.write_text(f"#!/bin/sh\n{text}")
-    file.chmod(file.stat().st_mode | stat.S_IXUSR)
+    file.chmod(0o755)
 
 
 def asked(lines, option):
@@ -123,61 +123,44 @@ def test_slurm_gets_each_step_as_an_array_that_waits_for_the_one_before(begun, s
     told = []
     jobs = submit(begun, "slurm", 2, {"timeout_min": 5, "slurm_partition": "cpu"}, told.append)
     assert jobs == ["100", "101", "102", "103", "104", "105"]
-    assert told[:2] == ["analysis   job 100, 1 task", "light      job 101, 2 tasks"]
+    assert told[3:5] == ["frames     job 103, 2 tasks", "clips      job 104, 1 task"]
     for number, lines in slurm().items():
         before = f"afterok:{number - 1}" if number > 100 else None
         assert asked(lines, "dependency") == before
         assert asked(lines, "kill-on-invalid-dep") == (before and "yes")
-        assert asked(lines, "array") == ("0-1%2" if number in (101, 102, 103) else None)
-        assert asked(lines, "cpus-per-task") == "8"
-        assert asked(lines, "time") == "5"
+        assert asked(lines, "array") == ("0-1%2" if number < 104 else None)
+        assert (asked(lines, "cpus-per-task"), asked(lines, "time")) == ("8", "5")
         assert "#SBATCH --requeue" in lines
         assert any("srun" in line and "--cpus-per-task=8" in line for line in lines)
-
-
-def test_cores_are_those_that_are_asked_for(begun, slurm):
     submit(begun, "slurm", 1, {"cpus_per_task": 3}, print)
     submit(begun, "slurm", 1, {"slurm_exclusive": "user"}, print)
-    found = slurm()
-    assert {asked(found[number], "cpus-per-task") for number in range(100, 106)} == {"3"}
-    assert any("srun" in line and "--cpus-per-task=3" in line for line in found[100])
-    assert {asked(found[number], "cpus-per-task") for number in range(106, 112)} == {None}
+    cpus = {number: asked(lines, "cpus-per-task") for number, lines in slurm().items()}
+    assert (cpus[106], cpus[112]) == ("3", None)
 
 
-def test_more_shards_than_an_array_takes_come_as_several(begun, slurm, monkeypatch):
+def test_limits_of_slurm(begun, slurm, monkeypatch):
     monkeypatch.setenv("SLURM_MOST", "2")
+    monkeypatch.setenv("SLURM_REFUSES", "6")
     told = []
-    submit(begun, "slurm", 5, {}, told.append)
+    with pytest.raises(
+        EnfiladeError, match=r"step 'mean' .*QOSMax.*; jobs 100 .* 105 .* `scancel 100 .*` removes"
+    ):
+        submit(begun, "slurm", 5, {}, told.append)
     assert told[1:5] == [
         "light      job 101, 2 tasks",
         "light      job 102, 2 tasks",
         "light      job 103, 1 task",
         "mean       job 104, 2 tasks",
     ]
-    assert asked(slurm()[103], "dependency") == "afterok:100"
-    assert asked(slurm()[104], "dependency") == "afterok:101:102:103"
-
-
-def test_jobs_in_the_queue_are_named_if_slurm_refuses_the_next(begun, slurm, monkeypatch):
-    monkeypatch.setenv("SLURM_REFUSES", "2")
-    told = []
-    with pytest.raises(
-        EnfiladeError, match=r"step 'mean' .*QOSMax.*; jobs 100 101 .* `scancel 100 101` removes"
-    ):
-        submit(begun, "slurm", 2, {}, told.append)
-    assert [line.split()[2] for line in told] == ["100,", "101,"]
-
-
-def test_unknown_parameters_of_submitit_are_refused(begun, slurm):
+    assert [asked(slurm()[job], "dependency") for job in (103, 104)] == ["afterok:100", "afterok:101:102:103"]
     with pytest.raises(SettingsError, match="Unknown argument 'queue'"):
         submit(begun, "slurm", 2, {"slurm_queue": "cpu"}, print)
     with pytest.raises(SettingsError, match="timeout_min"):
         submit(begun, "slurm", 2, {"timeout_min": "1h"}, print)
-    assert slurm() == {}
 
 
 def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, monkeypatch):
-    script(tmp_path / "enfilade", f"echo $$ > {tmp_path / 'pid'}; exec sleep 60\n")
+    script(tmp_path / "enfilade", f"echo $$ > {tmp_path / 'pid'}; exec sleep 3600\n")
     monkeypatch.setattr(farm, "_executable", lambda: str(tmp_path / "enfilade"))
     submit(begun, "slurm", 1, {"timeout_min": 5}, print)
     facts = {"SUBMITIT_EXECUTOR": "slurm", "SLURM_JOB_ID": "100", "SLURM_JOB_NODELIST": "here"}
@@ -185,8 +168,8 @@ def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, m
     with subprocess.Popen(line, env={**os.environ, **facts}, stderr=subprocess.PIPE, text=True) as job:  # noqa: S603
         wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text().strip())
         job.send_signal(signal.SIGUSR2)
-        _, said = job.communicate(timeout=120)
-    assert (tmp_path / "requeued").read_text() == "100\n", said
+        _, errors = job.communicate(timeout=120)
+    assert (tmp_path / "requeued").read_text() == "100\n", errors
     assert not Path(f"/proc/{(tmp_path / 'pid').read_text().strip()}").exists()
     assert (begun / "slurm" / "100_submitted.pkl").exists()
     assert not (begun / "slurm" / "100_0_result.pkl").exists()

@@ -50,22 +50,15 @@ def test_lines_are_read_back(file):
     assert ledger.writer("light/0004.exr") is None
 
 
-def test_the_newest_line_of_a_task_counts(file):
-    ledger = Ledger(file)
-    ledger.append(line(1, attempt=2))
-    assert frames(ledger) == [2, 3, 1]
-    assert Ledger(file).get(("light", 1))["attempt"] == 2
-
-
-def test_other_processes_see_new_lines(file):
+def test_the_newest_line_of_a_task_counts_also_of_another_process(file):
     one, two = Ledger(file), Ledger(file)
-    one.append(line(4))
-    assert two.get(("light", 4)) is None
+    one.append(line(1, attempt=2))
+    assert "attempt" not in two.get(("light", 1))
     two.refresh()
-    assert two.get(("light", 4)) == line(4)
-    two.append(line(5))
-    one.append(line(6))  # reads what was appended before
-    assert frames(one) == [1, 2, 3, 4, 5, 6]
+    assert two.get(("light", 1)) == line(1, attempt=2)
+    two.append(line(4))
+    one.append(line(5))  # reads the lines that were appended before
+    assert frames(one) == [2, 3, 1, 4, 5]
 
 
 def test_several_writers_at_once(file):
@@ -148,29 +141,22 @@ def test_a_disk_that_can_not_flush_leaves_the_ledger_as_it_was(file, monkeypatch
     assert frames(ledger) == [1, 2, 3]
 
 
-def test_links_are_not_followed(tmp_path):
+def test_links_and_folders_are_no_ledger(tmp_path):
     (tmp_path / "precious").write_text("keep me")
     (tmp_path / "ledger.jsonl").symlink_to(tmp_path / "precious")
     with pytest.raises(RunFolderError, match="symbolic links"):
         Ledger(tmp_path / "ledger.jsonl").append(line(1))
     assert (tmp_path / "precious").read_text() == "keep me"
-
-
-def test_an_unreadable_ledger(tmp_path):
-    (tmp_path / "ledger.jsonl").mkdir()
     with pytest.raises(RunFolderError, match="can't read"):
-        Ledger(tmp_path / "ledger.jsonl")
+        Ledger(tmp_path)
 
 
-def test_numbers_of_numpy_become_plain_ones():
+def test_lines_are_fit_for_json():
     made = plain({"spp": np.int64(64), "mean": np.float32(0.5), "counts": (np.uint8(1), 2)})
     assert json.dumps(made) == '{"spp": 64, "mean": 0.5, "counts": [1, 2]}'
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), {1}, np.zeros(3)])
-def test_values_that_are_not_fit_for_json(value):
-    with pytest.raises((ValueError, TypeError)):
-        plain({"x": value})
+    for value in (float("nan"), float("inf"), {1}, np.zeros(3)):
+        with pytest.raises((ValueError, TypeError)):
+            plain({"x": value})
 
 
 def test_the_digest_leaves_out_times():

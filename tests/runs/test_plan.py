@@ -63,8 +63,8 @@ def test_a_dry_run_is_multiplied(tmp_path, monkeypatch):
 
 
 def test_the_median_task_of_a_pass_counts():
-    lines = [{"pass": "frames", "cost": {"a": {"wall_s": s, "cpu_s": 0.0}, "b": {"wall_s": 1.0, "cpu_s": 2.0}}} for s in (90.0, 3.0, 4.0)]  # fmt: skip
-    assert forecast(lines, {"frames": 10}) == (50.0, 20.0)
+    costs = [{"a": {"wall_s": s, "cpu_s": 0.0}, "b": {"wall_s": 1.0, "cpu_s": 2.0}} for s in (90.0, 3.0, 4.0)]
+    assert forecast([{"pass": "frames", "cost": cost} for cost in costs], {"frames": 10}) == (50.0, 20.0)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_wrong_input_is_refused_before_the_scene_is_loaded(tmp_path, monkeypatch
 
 
 def test_a_scene_that_the_method_can_not_render_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match="can't render .*wall does not separate lobes"):
+    with pytest.raises(SettingsError, match=r"can't render .*wall does not separate lobes"):
         plan(toy_job(tmp_path, method="decoupled"), monitor := Stages())
     assert monitor.done == []
 

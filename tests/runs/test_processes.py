@@ -68,7 +68,6 @@ def test_crashes_change_nothing(tmp_path, whole):
     ]
     assert set(attempts(tmp_path).values()) == {1, 2}
     assert not list((tmp_path / "run").rglob(".*writing*"))
-    assert not list((tmp_path / "run" / "logs").glob("*"))  # they were empty
 
 
 def test_workers_that_hang_or_are_stopped_are_killed(tmp_path, opened):
@@ -79,7 +78,7 @@ def test_workers_that_hang_or_are_stopped_are_killed(tmp_path, opened):
         pids, ended = executor.pids, []
         while len(ended) < 2:
             ended += executor.wait(None)
-        assert not any(is_alive(pid) for pid in pids)
+        wait_for(lambda: not any(is_alive(pid) for pid in pids))
     for end in ended:
         assert end.result.kind is FailureKind.ERROR
         assert "killed: it took more than 0.2 s ([limits] task_timeout_s)" in end.result.text
@@ -97,7 +96,7 @@ def test_the_time_limit_does_not_include_loading(opened):
 def test_a_worker_is_kept_until_it_fails_or_dies(tmp_path, opened, monkeypatch):
     order(tmp_path, light_3="kill", light_4="full")
     with opened() as executor:
-        assert result_of(executor, 0, LIGHT[0])["pass"] == "light"
+        assert result_of(executor, 0, LIGHT[0])["frame"] == 1
         first = executor.pids
         os.kill(first[0], signal.SIGKILL)  # while it is free
         executor._children[0].process.join()
@@ -113,7 +112,7 @@ def test_a_worker_is_kept_until_it_fails_or_dies(tmp_path, opened, monkeypatch):
         assert "NoSpaceError: no room" in failure.log
         third = executor.pids
         executor.discard(0)
-        assert not is_alive(third[0])
+        wait_for(lambda: not is_alive(third[0]))
         executor.discard(0)
         assert executor.pids == []
 

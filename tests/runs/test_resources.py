@@ -60,8 +60,8 @@ def test_quotas_of_the_first_version(machine):
 
 @pytest.mark.parametrize(
     ("named", "found"),
-    [(None, ["0", "1"]), ("3,1", ["3", "1"]), ("GPU-a, GPU-b", ["GPU-a", "GPU-b"]), ("", []), ("1,-1,2", ["1"])],
-)  # fmt: skip
+    [(None, ["0", "1"]), ("3,1", ["3", "1"]), ("a, b", ["a", "b"]), ("", []), ("1,-1,2", ["1"])],
+)
 def test_gpus(machine, monkeypatch, named, found):
     if named is not None:
         monkeypatch.setenv("CUDA_VISIBLE_DEVICES", named)

@@ -61,10 +61,10 @@ class Talkative(Method):
     passes = (Pass("frames"),)
     facts: dict
 
-    def tasks(self, analysis):
+    def tasks(self, _analysis):
         return ()
 
-    def run(self, task, inputs, walk):
+    def run(self, _task, _inputs, _walk):
         return Output(facts=self.facts)
 
 
