@@ -193,12 +193,13 @@ def make_run(folder: Path) -> Path:
         job = Job(Scene(make_scene(folder)), load_path(make_path(folder)), method="reference")
         prepare(job, out)
         (folder / IDENTITY).write_text(json.dumps(job.identity()))
+        counts = {"keyframe": 1, "reused": 0, "slow": 0, "specular": 0, "disoccluded": 0}
         with RunFolder.share(out) as run:
             for number in range(10):
                 file = run.stem("frames", number).with_suffix(".exr")
                 file.parent.mkdir(exist_ok=True)
                 file.write_bytes(b"x" * number)
-                line = {"pass": "frames", "frame": number, "provenance": {}, "cost": {}}
+                line = {"pass": "frames", "frame": number, "provenance": counts, "cost": {}}
                 run.finish({**line, "files": run.record_of([file])})
     return out
 

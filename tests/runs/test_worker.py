@@ -81,12 +81,13 @@ def test_facts_that_the_ledger_can_not_keep(opened, monkeypatch, facts, words):
         Worker(job, run).do(Task("frames", 0))
 
 
-def test_facts_of_another_process_are_found(opened):
+def test_facts_of_another_process_are_found_even_if_its_files_are_lost(opened):
     job, run = opened
     worker = Worker(job, RunFolder.read(run.folder))
     with pytest.raises(KeyError, match="mean 1 is not finished"):
         worker._inputs.facts("mean", 0)
-    run.finish({"pass": "mean", "frame": 1, "mean": 0.5, "files": {}, "cost": {}})
+    lost = {"mean/0001.exr": {"bytes": 1, "sha256": ""}}
+    run.finish({"pass": "mean", "frame": 1, "mean": 0.5, "files": lost, "cost": {}})
     assert worker._inputs.facts("mean", 0)["mean"] == 0.5
     with pytest.raises(KeyError, match="no finished task has written"):
         worker._inputs.record("light", 0)

@@ -96,7 +96,7 @@ class ReportedRun:
         changed = ledger if ledger.exists() else folder / RUN_FILE
         self.last_result = datetime.fromtimestamp(changed.stat().st_mtime, UTC)
         there = {self.numbers[i] for i in self.there}
-        lost = [str(n) for n in self.numbers if self._run.was_finished(FRAMES, n) and n not in there]
+        lost = [str(n) for n in self.numbers if self._run.recorded(FRAMES, n) and n not in there]
         self.notes = list(self._run.notes)
         if lost:
             self.notes.append(f"the files of these frames are missing or damaged: {', '.join(lost)}")

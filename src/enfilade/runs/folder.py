@@ -149,15 +149,15 @@ class RunFolder:
 
     def line(self, pass_name: str, number: int) -> dict[str, Any] | None:
         """Ledger line of a finished task whose files have the size on record; otherwise None."""
-        line = self._ledger.get((pass_name, number))
+        line = self.recorded(pass_name, number)
         if line is None:
             return None
         is_there = all(_size(self._file(name)) == record["bytes"] for name, record in line["files"].items())
         return line if is_there else None
 
-    def was_finished(self, pass_name: str, number: int) -> bool:
-        """Whether a task was finished once, even if its files are gone."""
-        return self._ledger.get((pass_name, number)) is not None
+    def recorded(self, pass_name: str, number: int) -> dict[str, Any] | None:
+        """Ledger line of a task that was finished once, even if its files are gone; otherwise None."""
+        return self._ledger.get((pass_name, number))
 
     def lines(self) -> Iterator[dict[str, Any]]:
         """Newest ledger line of each finished task, in order."""

@@ -164,7 +164,7 @@ def _of_shard(job: Job, run: RunFolder, tasks: Sequence[Task], shard: Shard) -> 
     order = {of.name: index for index, of in enumerate(passes_of(job))}
     earlier = [task for task in tasks if order[task.pass_name] < order[shard.pass_name]]
     numbers = job.path.numbers
-    missing = [task for task in earlier if not run.was_finished(task.pass_name, numbers[task.frame])]
+    missing = [task for task in earlier if run.recorded(task.pass_name, numbers[task.frame]) is None]
     if missing:
         names = shortened([f"{task.pass_name} {numbers[task.frame]}" for task in missing])
         raise _too_early(run, missing[0].pass_name, f" ({names})")

@@ -130,10 +130,10 @@ class _Inputs:
     def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
         """See :class:`enfilade.methods.base.Inputs`."""
         number = self._job.path.numbers[frame]
-        line = self._run.line(pass_name, number)
+        line = self._run.recorded(pass_name, number)
         if line is None:  # finished by another process, perhaps
             self._run.refresh()
-            line = self._run.line(pass_name, number)
+            line = self._run.recorded(pass_name, number)
         if line is None:
             raise KeyError(f"{pass_name} {number} is not finished")
         return line
