@@ -9,7 +9,6 @@ from enfilade.methods.decoupled import LightCache, Shader
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from enfilade.settings import TraceSettings
 
 PIXEL_ANGLE = 0.02  # radians
 CONSTANT = '<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>'
@@ -64,7 +63,7 @@ def _scene(balls: dict[str, str], sky: str = CONSTANT) -> str:
 def opened_scene(folder, balls: dict[str, str], sky: str = CONSTANT) -> MitsubaRenderer:
     file = folder / "scene.xml"
     file.write_text(_scene(balls, sky))
-    return MitsubaRenderer(file, TraceSettings())
+    return MitsubaRenderer(file)
 
 
 def pane(name: str, z: float, reflectance: float = 1.0, transmittance: float = 1.0) -> str:

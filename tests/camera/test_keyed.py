@@ -12,7 +12,7 @@ from enfilade.camera.fields import JsonObject
 from enfilade.camera.keyed import interpolate_rotations, read_keyed
 from enfilade.errors import CameraPathError
 
-DOCS = Path(__file__).parents[2] / "docs" / "camera-paths.md"
+DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
 
 
 def key(time, eye=(0, 1, 5), **more):

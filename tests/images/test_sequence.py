@@ -91,8 +91,8 @@ def test_a_run_states_its_rate_and_where_shots_begin(tmp_path, selected, cuts, s
     for number in (1, 2, 5, 11):
         exr(tmp_path / "frames" / f"{number:04}.exr", number)
     path = {"fps": 23.976, "frames": None if selected is None else list(selected), "cuts": cuts}
-    identity = {"path": path, "settings": {"viewing": {"exposure_ev": 1.5}}}
-    (tmp_path / "run.json").write_text(json.dumps({"identity": identity}))
+    (tmp_path / "run.json").write_text(json.dumps({"identity": {"path": path}}))
+    (tmp_path / "job.json").write_text(json.dumps({"settings": {"viewing": {"exposure_ev": 1.5}}}))
     run = open_sequence(tmp_path)
     assert means(run) == [1, 2, 5, 11]
     assert (run.fps, run.exposure_ev, run.numbers, run.starts) == (23.976, 1.5, (1, 2, 5, 11), starts)

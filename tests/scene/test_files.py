@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from enfilade.errors import SceneError
-from enfilade.executors.executor import Failure, FailureKind
+from enfilade.runs.failure import Failure, FailureKind
 from enfilade.scene.mitsuba.files import check_scene, fingerprint
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from enfilade.settings import LimitSettings, TraceSettings
+from enfilade.settings import LimitSettings
 from studies.scenes import write_scene
 
 BALL = '<shape type="sphere"/><emitter type="constant"/>'
@@ -158,6 +158,6 @@ def test_the_error_of_the_operating_system_is_kept(scene, monkeypatch, number):
     with pytest.raises(SceneError, match=rf"can't read .*ball\.ply, which .* uses: {os.strerror(number)}"):
         fingerprint(file)
     with pytest.raises(SceneError, match="can't read") as said:
-        MitsubaRenderer(file, TraceSettings())
-    kind = FailureKind.IO if number == errno.EIO else FailureKind.REFUSED
+        MitsubaRenderer(file)
+    kind = FailureKind.ERROR if number == errno.EIO else FailureKind.FATAL
     assert Failure.of(said.value).kind is kind

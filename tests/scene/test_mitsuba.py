@@ -19,7 +19,6 @@ from enfilade.gbuffer import find_geometry
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from enfilade.settings import TraceSettings
 from keyframes_analytic import projected
 
 HEAD = """<scene version="3.0.0">
@@ -84,7 +83,7 @@ def write(folder, *shapes, head=HEAD, sky=SKY, name="scene.xml"):
 
 
 def opened(file, **settings):
-    return MitsubaRenderer(file, TraceSettings(**settings))
+    return MitsubaRenderer(file, **settings)
 
 
 def write_holes(folder):
@@ -391,7 +390,7 @@ def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
     assert (integrator.class_name(), integrator.hide_emitters) == ("VolumetricPathIntegrator", True)
     assert "max_depth = 7" in str(integrator)
     direct = of_integrator(tmp_path, '<integrator type="direct"/>')
-    with pytest.raises(SceneError, match="DirectIntegrator, has no limit of the path depth: leave --trace"):
+    with pytest.raises(SceneError, match="DirectIntegrator, has no limit of the path depth: leave --max"):
         opened(direct, max_depth=7)
     for name in ("ptracer", "prb", "prbvolpath"):
         with pytest.raises(SceneError, match="can't render single pixels"):
@@ -422,8 +421,7 @@ def test_one_thread_opens_a_scene_with_openexr_files(tmp_path):
     script = (
         "import sys; from pathlib import Path; import drjit as dr\n"
         "from enfilade.scene.mitsuba.renderer import MitsubaRenderer\n"
-        "from enfilade.settings import TraceSettings\n"
-        "dr.set_thread_count(1); MitsubaRenderer(Path(sys.argv[1]), TraceSettings())\n"
+        "dr.set_thread_count(1); MitsubaRenderer(Path(sys.argv[1]))\n"
         "print(dr.thread_count())"
     )
     line = [sys.executable, "-c", script, file]

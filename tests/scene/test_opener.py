@@ -1,70 +1,63 @@
-"""Renderers by the name of the scene, or by an import path."""
+"""A scene, and the renderer that reads it."""
 
 import pytest
 
 from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import why_inseparable
-from enfilade.scene.opener import check_scene, identify_scene, open_renderer
-from enfilade.settings import LimitSettings, TraceSettings
+from enfilade.scene.opener import Scene
+from enfilade.settings import LimitSettings, Settings
 from scenes_analytic import ball, wall
-from small_runs import RENDERER
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import write_scene
 
 BALL = '<shape type="sphere" id="ball"/><emitter type="constant"/>'
+RENDERER = "support.analytic:load"
 
 
 def test_mitsuba_reads_xml(scene):
-    file = scene(BALL)
-    check_scene(file, LimitSettings())
-    renderer, identity = open_renderer(file, TraceSettings()), identify_scene(file)
-    assert renderer.describe().shapes == ("ball",)
+    of = Scene(scene(BALL))
+    of.check(LimitSettings())
+    renderer, identity = of.open(Settings()), of.identity()
+    facts = renderer.describe()
+    assert facts.shapes == ("ball",)
     assert why_inseparable(renderer) == ""
-    assert (identity.renderer, identity.variant) == (
-        renderer.describe().renderer,
-        renderer.describe().variant,
-    )
-    assert len(identity.fingerprint) == 64
+    assert (identity["renderer"], identity["variant"]) == (facts.renderer, facts.variant)
+    assert len(identity["fingerprint"]) == 64
+    assert Scene.from_json(of.to_json()) == of
 
 
 def test_a_renderer_of_your_own(tmp_path):
-    file = write_scene(tmp_path / "ball", ball())
-    check_scene(file, LimitSettings(), RENDERER)
-    renderer = open_renderer(file, TraceSettings(), RENDERER)
+    of = Scene(write_scene(tmp_path / "ball", ball()), RENDERER)
+    of.check(LimitSettings())
+    renderer = of.open(Settings())
     assert isinstance(renderer, AnalyticRenderer)
     assert "'analytic' does not estimate lobes apart" in why_inseparable(renderer)
-    identity = identify_scene(file, RENDERER)
-    assert identity.renderer == RENDERER
-    write_scene(file, wall())
-    assert identify_scene(file, RENDERER).fingerprint != identity.fingerprint
-    file.unlink()
-    for refused in (
-        lambda: check_scene(file, LimitSettings(), RENDERER),
-        lambda: identify_scene(file, RENDERER),
-    ):
+    before = of.identity()
+    assert before["renderer"] == RENDERER
+    write_scene(of.file, wall())
+    assert of.identity()["fingerprint"] != before["fingerprint"]
+    of.file.unlink()
+    for refused in (lambda: of.check(LimitSettings()), of.identity):
         with pytest.raises(SceneError, match="scene"):
             refused()
 
 
-@pytest.mark.parametrize("name", ["gone:load", "support.analytic:gone", "support.analytic", ""])
+@pytest.mark.parametrize("name", ["gone:load", "support.analytic:gone", "support.analytic"])
 def test_a_renderer_that_does_not_exist(scene, name):
     with pytest.raises(SettingsError, match=r"there is no renderer .*module:function"):
-        check_scene(scene(BALL), LimitSettings(), name)
+        Scene(scene(BALL), name).check(LimitSettings())
 
 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("room.blend", "mitsuba-blender add-on .*docs/camera-paths"),
+        ("room.blend", "mitsuba-blender add-on .*docs/formats.md"),
         ("walk.json", "a camera path is given by --path"),
         ("room", r"is not a scene in Mitsuba's XML format \(\.xml\)$"),
     ],
 )
 def test_other_files_are_refused_with_advice(tmp_path, name, words):
-    for refused in (
-        lambda: check_scene(tmp_path / name, LimitSettings()),
-        lambda: open_renderer(tmp_path / name, TraceSettings()),
-        lambda: identify_scene(tmp_path / name),
-    ):
+    of = Scene(tmp_path / name)
+    for refused in (lambda: of.check(LimitSettings()), lambda: of.open(Settings()), of.identity):
         with pytest.raises(SceneError, match=words):
             refused()

@@ -32,7 +32,7 @@ def test_it_reports_why_lobes_are_inseparable(scene):
     [
         ('<shape type="nonesuch"/>', "'nonesuch' is not one of Mitsuba's plugins"),
         ('<shape type="sphere"><integer name="a" value="1"/></shape>', r"can't load .*scene\.xml"),
-        (f'<integrator type="direct"/>{BALL}', "leave --trace-max-depth out"),
+        (f'<integrator type="direct"/>{BALL}', "leave --max-depth out"),
     ],
 )
 def test_it_refuses_what_mitsuba_refuses(scene, body, words):
@@ -92,7 +92,7 @@ def test_it_ends_with_the_command_that_began_it(endless):
 
 
 def run(file, parent, seconds=60.0):
-    tables = Settings(limits=LimitSettings(preflight_s=seconds)).to_tables()
+    tables = Settings(LimitSettings(preflight_s=seconds)).to_tables()
     line = [sys.executable, "-P", "-m", "enfilade.scene.preflight", str(file)]
     line += [json.dumps(tables), "llvm_ad_rgb", str(parent)]
     return subprocess.run(line, check=False, timeout=60, capture_output=True).returncode  # noqa: S603

@@ -13,7 +13,6 @@ from enfilade.methods.decoupled import LightCache, Shader, open_cache, open_page
 from enfilade.records import LightPage, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from enfilade.settings import TraceSettings
 from studies.scenes import write_scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -236,7 +235,7 @@ def test_pages_that_count_for_nothing_make_nothing_known(diffuse):
 
 def test_what_mitsuba_prepares_late_is_no_hindrance(tmp_path):
     files = write_scene("room", tmp_path, preset="small")  # has meshes that emit
-    renderer = MitsubaRenderer(files.scene, TraceSettings())
+    renderer = MitsubaRenderer(files.scene)
     camera = Camera(look_at((1, 1.5, 1.5), (0, 0.6, 0)), 45.0, 32, 24)
     assert _shaded(renderer, LightCache(), camera, spp=1).color.any()
 

@@ -39,7 +39,7 @@ def scene_integrator(scene: Any, max_depth: int) -> Any:
     if own.class_name() not in PATH_TRACERS:
         raise SceneError(
             f"the scene's integrator, {own.class_name()}, has no limit of the path depth: leave "
-            '--trace-max-depth out, or write <integrator type="path"/> in its place'
+            '--max-depth out, or write <integrator type="path"/> in its place'
         )
     return _limited(own, max_depth, _depths(own)[1])
 
