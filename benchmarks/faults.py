@@ -194,13 +194,14 @@ def continued(case: Case, out: Path, what: str, *more: str) -> str:
     return compare(case, out, what)
 
 
-def descendants(pid: int) -> list[int]:
-    """Processes below a process; without those of Python's own bookkeeping."""
-    found: list[int] = []
-    with contextlib.suppress(OSError):
+def descendants(pid: int) -> dict[int, bytes]:
+    """Processes below a process, with their command lines; without those of Python's own bookkeeping."""
+    found: dict[int, bytes] = {}
+    with contextlib.suppress(OSError):  # it has ended
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-            if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes():
-                found += [int(child), *descendants(int(child))]
+            line = Path(f"/proc/{child}/cmdline").read_bytes()
+            if b"resource_tracker" not in line:
+                found |= {int(child): line, **descendants(int(child))}
     return found
 
 
@@ -253,17 +254,15 @@ def struck(
     case: Case, out: Path, chance: random.Random, blow: signal.Signals, *more: str, title: bytes = b""
 ) -> str:
     """Run a command, with a signal for one of its workers once so many tasks are done; it must succeed."""
-    tasks, what = chance.randrange(2, 60), "no worker was hit"
+    tasks, what = chance.randrange(2, 40), "no worker was hit"
     prefix = ALONE if "ray" in more else ()
     with start([*prefix, *render(case.inputs, out, *more)], subprocess.PIPE) as process:
         while process.poll() is None and what.startswith("no"):
             time.sleep(0.01)
             ledger = out / "ledger.jsonl"
             if ledger.exists() and ledger.read_bytes().count(b"\n") >= tasks:
-                found = [
-                    p for p in descendants(process.pid) if title in Path(f"/proc/{p}/cmdline").read_bytes()
-                ]
-                if found:
+                found = [pid for pid, line in descendants(process.pid).items() if line.startswith(title)]
+                with contextlib.suppress(IndexError, ProcessLookupError):  # there is none now
                     os.kill(victim := chance.choice(found), blow)
                     what = f"{blow.name} for worker {victim} after {tasks} tasks"
         _, errors = process.communicate(timeout=TIMEOUT_S)
