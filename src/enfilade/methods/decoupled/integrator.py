@@ -267,7 +267,7 @@ class Integrator:
         is_queried: bool = True,
         on_miss: OnMiss | None = None,
     ) -> None:
-        """Add the diffuse reflection at vertices whose irradiance was not found: look further, or estimate it.
+        """Add the diffuse reflection at vertices whose irradiance was not found: query further, or estimate.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The passes of the decoupled method: what is shared between frames, and what each frame has of its own."""
+"""The passes of the decoupled method: irradiance of keyframes, shading of every frame, delivered frames."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from enfilade.settings import (
 
 
 class Decoupled(Method):
-    """Irradiance cached at keyframes; visibility, texture, edges and specular lobes afresh in every frame."""
+    """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
@@ -57,7 +57,7 @@ class Decoupled(Method):
         self._frames = Frames()
 
     def check(self, settings: Settings) -> None:
-        """Refuse a denoiser that is not installed.
+        """Refuse the denoiser where it is not installed.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Decoupled(Method):
             raise SettingsError(why)
 
     def check_scene(self, renderer: Renderer) -> None:
-        """Refuse scenes whose diffuse lobes can't be separated.
+        """Refuse renderers and scenes whose diffuse lobes can't be separated.
 
         Raises
         ------
@@ -81,16 +81,17 @@ class Decoupled(Method):
         )
         if reason:
             raise SettingsError(
-                f"--method decoupled can't render the scene: {reason}; take --method paper or --method reference"
+                f"--method decoupled can't render the scene: {reason}; "
+                "take --method paper or --method reference"
             )
 
     def keyframes(self, analysis: Analysis) -> list[int]:
-        """Keyframes, of which irradiance images are made."""
+        """Keyframes, which have irradiance images."""
         spacing = analysis.settings[DecoupledSettings].spacing
         return [frame for segments in analysis.segments(spacing) for frame in keyframes_of(segments)]
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """Tasks at keyframes, between them, and in all frames."""
+        """Tasks of keyframes, segments, and all frames."""
         path, settings = analysis.path, analysis.settings[DecoupledSettings]
         shots = zip(path.shots(), analysis.segments(settings.spacing), strict=True)
         for number, (shot, segments) in enumerate(shots):
@@ -135,12 +136,13 @@ class Decoupled(Method):
         return chosen or int(shot.inputs.facts("pilot", shot.keyframes[0])["spp"])
 
     def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
+        """The shot of a task, which is kept until the next one begins."""
         if self._integrator is None or self._virtual_images is None:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`check_scene`)
             self._integrator = Integrator(walk.renderer)
             self._virtual_images = VirtualImages(walk.renderer)
         if self._shot is None or self._shot.number != task.shot:
-            self._shot = None  # first, so that there is never memory for two
+            self._shot = None  # free its memory before the next one allocates
             segments = inputs.analysis.segments(walk.settings[DecoupledSettings].spacing)[task.shot]
             self._shot = Shot(task.shot, segments, inputs, walk, self._integrator, self._virtual_images)
         return self._shot

@@ -31,7 +31,7 @@ from enfilade.settings import (
     WarpSettings,
 )
 
-MIN_SPP = 2  # the metric's allowance for noise needs the spread of a pixel's paths
+MIN_SPP = 2  # the variance of a pixel, for the metric, is that of its paths
 CACHED_KEYFRAMES = 3
 
 
@@ -70,8 +70,8 @@ class Paper(Method):
         """
         if settings[SamplingSettings].spp < MIN_SPP:
             raise SettingsError(
-                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences by the spread "
-                "of a pixel's paths"
+                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences "
+                "by the spread of a pixel's paths"
             )
 
     def keyframes(self, analysis: Analysis) -> list[int]:
@@ -79,7 +79,7 @@ class Paper(Method):
         return [frame for segments in analysis.segments() for frame in keyframes_of(segments)]
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """Keyframes; a task for each initial segment, which splits it; all frames before and after filtering."""
+        """Initial keyframes, initial segments, and all frames before and after filtering."""
         path, settings = analysis.path, analysis.settings[AntialiasSettings]
         reach = max(settings.frames, settings.slow_frames) // 2
         shots = zip(path.shots(), analysis.segments(), strict=True)
@@ -112,7 +112,7 @@ class Paper(Method):
                 return self._filtered(task, inputs, walk)
 
     def _refined(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Split an initial segment until reuse can't be seen in it; trace the keyframes that this inserts."""
+        """Split an initial segment until reuse can't be seen; traces the keyframes that this inserts."""
         if self._refinement is None:
             self._refinement = Refinement(walk)
         segment = next(s for s in inputs.analysis.segments()[task.shot] if s.first == task.frame)
@@ -131,12 +131,16 @@ class Paper(Method):
         return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
 
     def _inbetween(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """A frame before filtering: a keyframe, a repeated one, or one derived from both keyframes around it."""
+        """A frame before filtering: a repeated pose, a keyframe, or a frame derived from two keyframes."""
         frame, path = task.frame, walk.path
+
+        # Copy the frame of a repeated pose.
         static = path.static_frame(frame)
         if static != frame:
             color = inputs.record("inbetweens", static).color
             return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.REUSED, np.uint8))})
+
+        # Complete an initial keyframe, or one that was inserted by a split.
         segments = inputs.analysis.segments()[task.shot]
         if frame in keyframes_of(segments):
             made, dropped = fill_slow_pixels(walk, frame, inputs.record("keyframes", frame))
@@ -147,12 +151,15 @@ class Paper(Method):
         if any(result.is_split and result.middle == frame for result in results):
             made, dropped = fill_slow_pixels(walk, frame, inputs.record("segments", frame))
             return Output({frame: made}, {"dropped": dropped})
+
+        # Derive all others from the keyframes of their segment.
         result = leaf_of(results, frame)
         first, last = (self._keyframe(inputs, walk, k, initial) for k in (result.first, result.last))
         made, dropped = derive(walk, result, first, last, frame)
         return Output({frame: made}, {"dropped": dropped})
 
     def _keyframe(self, inputs: Inputs, walk: Walkthrough, frame: int, initial: Segment) -> Keyframe:
+        """A keyframe of an initial segment."""
         pass_name = "keyframes" if frame in (initial.first, initial.last) else "segments"
         return self._keyframes.get(
             frame, lambda: Keyframe(frame, walk.view(frame).geometry, inputs.record(pass_name, frame))
@@ -162,9 +169,13 @@ class Paper(Method):
         """A delivered frame: antialiased along the motion (§5)."""
         frame, settings = task.frame, walk.settings[AntialiasSettings]
         reach = max(settings.frames, settings.slow_frames) // 2
+
+        # Load the frames of the support, of which most were used for the previous frame.
         window = _window(walk.path.shots()[task.shot], frame, reach)
         kept = {f: entry for f, entry in self._slices.items() if f in window}
         self._slices = kept | {f: _slice(inputs, walk, f) for f in window if f not in kept}
+
+        # Filter along the motion.
         here, raw = self._slices[frame]
         color = filter_along_flow(
             here,
@@ -177,7 +188,7 @@ class Paper(Method):
 
 
 def _traced(walk: Walkthrough, frame: int) -> Shading:
-    """A keyframe: paths start at the pixels' centres, where the G-buffer was found, so that each sees one surface."""
+    """A keyframe, traced through the pixels' centres as the G-buffer: each pixel shows a single surface."""
     size = walk.path.height, walk.path.width
     traced = walk.trace(
         frame,
