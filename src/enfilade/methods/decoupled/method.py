@@ -51,8 +51,7 @@ class Decoupled(Method):
     )
 
     def __init__(self) -> None:
-        self._integrator: Integrator | None = None
-        self._virtual_images: VirtualImages | None = None
+        self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
         self._shot: Shot | None = None
         self._frames = Frames()
 
@@ -137,12 +136,11 @@ class Decoupled(Method):
 
     def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
         """The shot of a task, which is kept until the next one begins."""
-        if self._integrator is None or self._virtual_images is None:
+        if self._kernels is None or self._kernels[0] is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`check_scene`)
-            self._integrator = Integrator(walk.renderer)
-            self._virtual_images = VirtualImages(walk.renderer)
-        if self._shot is None or self._shot.number != task.shot:
-            self._shot = None  # free its memory before the next one allocates
+            self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
+        if self._shot is None or not self._shot.is_of(task, inputs, walk):
+            self._shot, self._frames = None, Frames()  # free memory before the next shot allocates
             segments = inputs.analysis.segments(walk.settings[DecoupledSettings].spacing)[task.shot]
-            self._shot = Shot(task.shot, segments, inputs, walk, self._integrator, self._virtual_images)
+            self._shot = Shot(task.shot, segments, inputs, walk, *self._kernels[1:])
         return self._shot

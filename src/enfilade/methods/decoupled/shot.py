@@ -10,7 +10,7 @@ import numpy as np
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.methods.analysis import keyframes_of
-from enfilade.methods.base import Inputs
+from enfilade.methods.base import Inputs, Task
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -78,6 +78,10 @@ class Shot:
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
         self._disocclusions: dict[int, list[int]] | None = None
+
+    def is_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> bool:
+        """Whether its caches are valid for a task."""
+        return self.number == task.shot and self.inputs is inputs and self.walk is walk
 
     @property
     def renderer(self) -> LobeRenderer:
