@@ -5,8 +5,11 @@ import numpy as np
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.methods.decoupled import LightCache, Shader
-from enfilade.records import LightPage, Shading
+from enfilade.methods.decoupled.integrator import Integrator
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
+from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.records import Geometry, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
@@ -42,7 +45,7 @@ def _plane(name: str, transform: str, color: str) -> str:
     )
 
 
-def _scene(balls: dict[str, str], sky: str = CONSTANT) -> str:
+def _scene(balls: dict[str, str], sky: str) -> str:
     shapes = [
         f'<shape type="sphere" id="{name}"><float name="radius" value="0.42"/>'
         f'<point name="center" x="{i % 4 - 1.5}" y="{0.5 + i // 4}" z="0"/>{bsdf}</shape>'
@@ -80,34 +83,48 @@ def front_camera(width: int = 48, height: int = 36, x: float = 0.0) -> Camera:
     return Camera(look_at((x, 1.8, 6), (0.6 * x, 1.5, 0)), 36, width, height)
 
 
-def scattered(renderer, camera: Camera, spp: int = 8) -> list[Shading]:
-    """In layers: reflected, transmitted."""
-    shader = Shader(renderer)
-    whole = Estimate(
+def pixels_of(camera: Camera) -> np.ndarray:
+    return np.arange(camera.width * camera.height, dtype=np.uint32)
+
+
+def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> list[Shading]:
+    """Reflection and transmission, (N,), without a cache."""
+    integrator = Integrator(renderer)
+    estimate = Estimate(
         camera,
-        np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng, square: shader.scattered(LightCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE),
+        pixels_of(camera),
+        lambda rays, rng, square: integrator.specular_radiance(
+            IrradianceCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE
+        ),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(2, 0, Purpose.SPECULAR),
         layers=2,
         is_stratified=True,
     )
-    whole.add(spp)
-    return whole.shadings
+    estimate.add(spp)
+    return estimate.shadings
 
 
-def traced_page(renderer, camera: Camera) -> LightPage:
-    light = Estimate(
+def traced_irradiance(
+    renderer: MitsubaRenderer, camera: Camera, spp: int = 256
+) -> tuple[Geometry, IrradianceImage]:
+    """G-buffer and path traced irradiance of all pixels."""
+    estimate = Estimate(
         camera,
-        np.arange(camera.width * camera.height, dtype=np.uint32),
+        pixels_of(camera),
         lambda rays, rng: Samples(renderer.estimate_diffuse(renderer.intersect(rays), rng)),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(3, 0, Purpose.IRRADIANCE),
         layers=2,
     )
-    light.add(256)
-    size = (camera.height, camera.width)
-    direct, indirect = (Shading(s.color.reshape(*size, 3), s.variance.reshape(size)) for s in light.shadings)
-    return LightPage(0, find_geometry(renderer, camera), direct, indirect, np.ones(size, bool))
+    estimate.add(spp)
+    everywhere = np.ones((camera.height, camera.width), bool)
+    direct, indirect = (shading.spread(everywhere) for shading in estimate.shadings)
+    return find_geometry(renderer, camera), IrradianceImage(direct, indirect, everywhere)
+
+
+def uploaded_irradiance(renderer: MitsubaRenderer, camera: Camera) -> UploadedImage:
+    """The same on the device."""
+    return upload(*traced_irradiance(renderer, camera))

@@ -181,21 +181,21 @@ class Keyframe:
 
 @dataclass(frozen=True, eq=False)
 class Warped:
-    """A keyframe, or what remains of it, seen from another camera (§2.2).
+    """A keyframe reprojected to another camera (§2.2). All values of disoccluded pixels are 0.
 
     Attributes
     ----------
     color : (H, W, 3) float32
-        0 in holes.
     variance : (H, W) float32
         Of the luminance.
     depth : (H, W) float32
-        From the new camera; 0 in holes.
+        From the new camera.
     shape_index : (H, W) uint32
-        0 in holes and where the keyframe saw nothing (sky).
+        0 where the keyframe shows the sky.
     magnification : (H, W) float32
-        Area, in pixels of the new image, of the keyframe's pixel; large where it is stretched.
-    is_hole : (H, W) bool
+        Area of the keyframe's pixel in pixels of the new image.
+    is_disoccluded : (H, W) bool
+        Pixels without a splat; the paper calls them holes.
     """
 
     color: F32
@@ -203,10 +203,10 @@ class Warped:
     depth: F32
     shape_index: U32
     magnification: F32
-    is_hole: Mask
+    is_disoccluded: Mask
 
     def __post_init__(self) -> None:
-        size = self.is_hole.shape
+        size = self.is_disoccluded.shape
         _check(self.color, (*size, 3), np.float32, "color")
         _check(self.variance, size, np.float32, "variance")
         _check(self.depth, size, np.float32, "depth")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Float, image, matrix3, pixel_grid, vector3
+from enfilade.arrays import image
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.rays import pinhole_directions
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.records import F32, Geometry
-from enfilade.renderer import Rays, Renderer
+from enfilade.renderer import Renderer
 
 
 def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
@@ -18,13 +18,7 @@ def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
     Costs one ray a pixel (more where masked surfaces are looked through), and no shading.
     """
     height, width = camera.height, camera.width
-    _, column, row = pixel_grid(height, width)
-    direction = pinhole_directions(
-        Float(column) + 0.5,
-        Float(row) + 0.5,
-        direction_from_pixel=matrix3(camera.direction_from_pixel),
-    )
-    seen = renderer.surfaces(Rays(origin=vector3(camera.eye), direction=direction))
+    seen = renderer.surfaces(camera_rays(camera, pixel_centres(camera)))
 
     # Directions are of unit depth, so that distances along them are depths.
     depth = dr.select(seen.is_hit, seen.distance, 0)

@@ -7,8 +7,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Float, image, lanes, matrix3, pixel_grid, vector3
+from enfilade.arrays import image, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, planar_warp
+from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject
 from enfilade.records import F32, Flow, Geometry
 
@@ -45,13 +46,7 @@ def _flow_to(camera: Camera, disparity: Any, other: Camera | None) -> F32:
     if other is None:
         return np.zeros((height, width, 2), np.float32)
     warp = planar_warp(camera, other)
-    _, column, row = pixel_grid(height, width)
-    flow, _, _ = reproject(
-        Float(column) + 0.5,
-        Float(row) + 0.5,
-        disparity,
-        change=matrix3(warp.change),
-        epipole=vector3(warp.epipole),
-    )
+    at = pixel_centres(camera)
+    flow, _, _ = reproject(at.x, at.y, disparity, change=matrix3(warp.change), epipole=vector3(warp.epipole))
     dr.eval(flow)
     return image(flow, height, width)

@@ -1,1 +1,1 @@
-"""Kernels that two stages share: arrays first, keyword numbers after, arrays back."""
+"""Kernels that several packages share: arrays first, keyword-only numbers after, arrays back."""

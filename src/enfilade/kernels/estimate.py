@@ -1,4 +1,4 @@
-"""Monte Carlo estimates of lists of pixels: what all backends that trace paths share."""
+"""Monte Carlo estimates of lists of pixels, for all renderers and methods that trace paths."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Float, Float64, UInt, lanes, matrix3, opaque, rows, vector3
+from enfilade.arrays import Array3f, Float, Float64, UInt, lanes, opaque, rows
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import stratified, stratified4, streams
-from enfilade.kernels.rays import box_offsets, gaussian_offsets, pinhole_directions
+from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
+from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, RandomKey, Rays
 
-PASS = 64  # paths of a pixel summed in one go; fixed, so that no chunking changes a rounding
+PASS = 64  # paths of a pixel that are summed in float32; fixed, so that no chunk size changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 
 Radiance = Callable[..., Any]
 
 
 @dataclass(frozen=True)
 class Samples:
-    """What paths bring, where that is more than one colour, as lanes.
+    """Results of paths that are more than one colour, as lanes.
 
     Attributes
     ----------
     layers : tuple of Array3f
-        Averaged apart; a path counts only where all of them are finite.
+        Averaged separately; a path counts only where all of them are finite.
     is_marked : Bool or None
         Marks paths, and so their pixels.
     """
@@ -41,26 +41,27 @@ class Samples:
 
 
 class Estimate:
-    """Averages of the paths of each pixel of a list, to which paths can be added.
+    """Means over the paths of each pixel of a list, to which paths can be added.
 
     Parameters
     ----------
     camera
     pixels : (N,) uint32
+        Flat indices ``y * width + x``.
     radiance
-        What arrives along rays (:class:`Rays`, any length of direction), given a random number
-        generator for each: an Array3f or :class:`Samples`. Called once a chunk.
+        Maps camera rays (:class:`Rays` of any length of direction) and a generator (PCG32) each to the
+        radiance along them, an Array3f or :class:`Samples`. Called once for each chunk.
     chunk
-        Paths in flight at once. It changes no random number; what a renderer makes of them is its own.
+        Paths in flight at once. It changes no random number.
     pixel_filter
-        Where in the image the paths begin.
+        Distribution of the camera rays over the image.
     random
-        Of :func:`enfilade.kernels.random.streams`.
+        Key of the random numbers.
     layers
-        How many ``radiance`` answers with.
+        Number of layers of the samples.
     is_stratified
-        Whether ``radiance`` is given an Array4f as a third argument: points of the unit cube that the paths
-        of a pixel share out evenly among them.
+        Whether ``radiance`` receives an Array4f as a third argument: points of the unit cube, evenly spread
+        over the paths of a pixel.
     """
 
     def __init__(
@@ -81,58 +82,61 @@ class Estimate:
         self._chunk = chunk
         self._filter = pixel_filter
         self._random = random
-        self._next = 0  # numbers given to paths so far
-        self._asked = 0
-        self._layers = layers
         self._is_stratified = is_stratified
-        size = max(len(pixels), 1)  # Dr.Jit can't compare no lanes with a number
-        self._sums = [dr.zeros(Float64, size) for _ in range(2 + 4 * layers)]  # as _summed gives them
+        self._next = 0  # index of the next path of each pixel
+        self._traced = 0  # paths of all pixels together
+        size = max(len(pixels), 1)  # Dr.Jit can't compare empty arrays with a number
+        self._sums = [dr.zeros(Float64, size) for _ in range(2 + 4 * layers)]  # in the order of `_summed`
 
     def add(self, spp: int, where: npt.NDArray[np.bool_] | None = None) -> None:
-        """Trace more paths, for all pixels of the list or for some of them.
+        """Trace more paths.
 
         Parameters
         ----------
         spp
             Paths a pixel.
         where : (N,) bool
+            Pixels of the list; None for all of them.
         """
         everyone = np.ones(len(self._pixels), bool) if where is None else where
         chosen = np.flatnonzero(everyone).astype(np.uint32)
         for first in range(self._next, self._next + spp, PASS):
-            width = min(PASS, self._next + spp - first)
-            step = max(self._chunk // width, 1)
+            count = min(PASS, self._next + spp - first)
+            step = max(self._chunk // count, 1)
             for start in range(0, len(chosen), step):
+                # Generate camera rays, `count` neighbouring lanes a pixel.
                 part = chosen[start : start + step]
-                pixel, path = _numbered(self._pixels[part], first, width)
+                pixel, path = _numbered(self._pixels[part], first, count)
                 rng = streams(pixel, path, self._random)
                 more = (stratified4(pixel, path, self._random),) if self._is_stratified else ()
+
+                # Trace them, and add the sums over each pixel's lanes to the totals.
                 found = self._radiance(self._rays(pixel, path), rng, *more)
-                for total, value in zip(self._sums, _summed(found, width), strict=True):
+                for total, value in zip(self._sums, _summed(found, count), strict=True):
                     dr.scatter_add(total, Float64(value), lanes(part), mode=dr.ReduceMode.NoConflicts)
                 dr.eval(self._sums)
         self._next += spp
-        self._asked += spp * len(chosen)
+        self._traced += spp * len(chosen)
 
     @property
     def paths(self) -> int:
         """Paths traced so far, of all pixels together."""
-        return self._asked
+        return self._traced
 
     @property
     def shading(self) -> Shading:
-        """Mean colour of each pixel over its finite samples, and the variance of its mean luminance."""
+        """Mean colour of each pixel over its finite samples, and the variance of its mean luminance, (N,)."""
         return self.shadings[0]
 
     @property
     def shadings(self) -> list[Shading]:
         """The same of every layer."""
         count = dr.maximum(self._sums[0], 1.0)
-        dropped = self._asked - round(dr.sum(self._sums[0])[0])
+        dropped = self._traced - round(dr.sum(self._sums[0])[0])
         found = []
         for first in range(2, len(self._sums), 4):
             *mean, square = (total / count for total in self._sums[first : first + 4])
-            luminance = sum(share * channel for share, channel in zip(LUMINANCE, mean, strict=True))
+            luminance = sum(weight * channel for weight, channel in zip(REC709_LUMINANCE, mean, strict=True))
             spread = dr.maximum(square - luminance * luminance, 0.0)
             variance = dr.select(count > 1.0, spread / dr.maximum(count - 1.0, 1.0), 0.0)
             found.append((Array3f(*map(Float, mean)), Float(variance)))
@@ -146,17 +150,15 @@ class Estimate:
         return np.array(self._sums[1] > 0.0)[: len(self._pixels)]
 
     def _rays(self, pixel: Any, path: Any) -> Rays:
-        camera = self._camera
-        row = pixel // opaque(camera.width)
-        at = Array2f(pixel - row * opaque(camera.width), row) + 0.5
+        """Camera rays of paths, distributed by the pixel filter."""
+        at = pixel_centres(self._camera, pixel)
         match self._filter:
             case PixelFilter.BOX:
                 at += box_offsets(stratified(pixel, path, self._random))
             case PixelFilter.GAUSSIAN:
                 square = stratified(pixel, path, self._random)
                 at += gaussian_offsets(square, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
-        matrix = matrix3(camera.direction_from_pixel)
-        return Rays(vector3(camera.eye), pinhole_directions(at.x, at.y, direction_from_pixel=matrix))
+        return camera_rays(self._camera, at)
 
 
 def estimate(
@@ -169,7 +171,7 @@ def estimate(
     pixel_filter: PixelFilter,
     random: RandomKey,
 ) -> Shading:
-    """Average the paths of each pixel: an :class:`Estimate` with as many paths for all.
+    """Mean radiance of pixels: an :class:`Estimate` with as many paths for all.
 
     Returns
     -------
@@ -181,28 +183,34 @@ def estimate(
     return whole.shading
 
 
-def _numbered(pixels: npt.NDArray[np.uint32], first: int, width: int) -> tuple[Any, Any]:
-    """Pixel and number of each path: `width` neighbouring lanes a pixel."""
-    lane = dr.arange(UInt, len(pixels) * width)
-    slot = lane // opaque(width)
-    return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(width) + opaque(first)
+def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[Any, Any]:
+    """Pixel and index of each path, UInt: `count` neighbouring lanes a pixel."""
+    lane = dr.arange(UInt, len(pixels) * count)
+    slot = lane // opaque(count)
+    return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(count) + opaque(first)
 
 
-def _summed(answer: Any, width: int) -> list[Any]:
-    """Sums over the paths of each pixel, lanes: finite, marked, then r, g, b, squared luminance a layer."""
+def _summed(answer: Any, count: int) -> list[Any]:
+    """Sums over the `count` paths of each pixel.
+
+    Returns
+    -------
+    list of Float
+        Number of finite paths, number of marked ones; of each layer red, green, blue, squared luminance.
+    """
     samples = answer if isinstance(answer, Samples) else Samples((answer,))
     values = []
     for layer in samples.layers:
         color = Array3f(layer)
-        luminance = dr.dot(color, Array3f(*LUMINANCE))
+        luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
         values += [*color, luminance * luminance]
-    # What overflows when squared is no radiance either.
+    # Leave out paths that are not finite, also those whose square overflows.
     is_valid = dr.isfinite(sum(values[3::4], Float(0)))
     values = [dr.select(is_valid, v, 0) for v in (Float(1), *values)]
     if samples.is_marked is not None:
         values.append(dr.select(samples.is_marked, Float(1), 0))
-    # Together, before any sum: each block_sum evaluates its input, and would trace all anew.
+    # Evaluate all together: each block_sum evaluates its input, and would trace the paths again.
     dr.eval(values)
-    count, *sums = (dr.block_sum(v, width) for v in values)
-    marked = sums.pop() if samples.is_marked is not None else dr.zeros(Float, dr.width(count))
-    return [count, marked, *sums]
+    finite, *sums = (dr.block_sum(v, count) for v in values)
+    marked = sums.pop() if samples.is_marked is not None else dr.zeros(Float, dr.width(finite))
+    return [finite, marked, *sums]

@@ -1,4 +1,4 @@
-"""Rays through points of the image, and where in a pixel its paths begin."""
+"""Camera rays: centres of pixels, directions through image points, and samples of the pixel filter."""
 
 from __future__ import annotations
 
@@ -7,23 +7,48 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f
+from enfilade.arrays import Array2f, Array3f, UInt, matrix3, opaque, vector3
+from enfilade.camera.pinhole import Camera
+from enfilade.renderer import Rays
+
+
+def pixel_centres(camera: Camera, pixel: Any = None) -> Any:
+    """Image coordinates of the centres of pixels; Array2f.
+
+    Parameters
+    ----------
+    camera
+    pixel : UInt
+        Flat indices ``y * width + x``; None for all pixels.
+    """
+    if pixel is None:
+        pixel = dr.arange(UInt, camera.height * camera.width)
+    row = pixel // opaque(camera.width)
+    return Array2f(pixel - row * opaque(camera.width), row) + 0.5
+
+
+def camera_rays(camera: Camera, at: Any) -> Rays:
+    """Rays through image points, with directions of unit depth: a distance along them is a depth.
+
+    Parameters
+    ----------
+    camera
+    at : Array2f
+        Image coordinates, pixels.
+    """
+    matrix = matrix3(camera.direction_from_pixel)
+    return Rays(vector3(camera.eye), pinhole_directions(at.x, at.y, direction_from_pixel=matrix))
 
 
 def pinhole_directions(x: Any, y: Any, *, direction_from_pixel: Any) -> Any:
-    """World directions of unit depth through image points.
+    """World directions of unit depth through image points; Array3f.
 
     Parameters
     ----------
     x, y : Float
         Image coordinates, pixels.
     direction_from_pixel : Matrix3f
-        The camera's; see ``camera.Camera``.
-
-    Returns
-    -------
-    Array3f
-        Of unit length along the optical axis: a multiple of it is a depth.
+        Of :class:`enfilade.camera.Camera`.
     """
     return direction_from_pixel @ Array3f(x, y, 1)
 
@@ -34,9 +59,10 @@ def box_offsets(square: Any) -> Any:
 
 
 def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
-    """Offsets from a pixel's centre, distributed as a pixel filter (Ernst et al. 2006).
+    """Offsets from a pixel's centre, distributed as a Gaussian pixel filter (Ernst et al. 2006); Array2f.
 
-    Each path then counts for one pixel alone: no weights, no order of adding.
+    Filter importance sampling: each path contributes to a single pixel with weight one, so that no result
+    depends on an order of additions.
 
     Parameters
     ----------
@@ -45,11 +71,7 @@ def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
     sigma
         Standard deviation, pixels.
     radius
-        Where the Gaussian is cut along each axis, pixels.
-
-    Returns
-    -------
-    Array2f
+        Of the filter along each axis, pixels: the Gaussian is cut there.
     """
     scale = sigma * math.sqrt(2.0)
     kept = math.erf(radius / scale)

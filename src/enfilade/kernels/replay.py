@@ -1,6 +1,6 @@
-"""Kernels that are recorded once and replayed.
+"""Frozen kernels: recorded once and replayed (``drjit.freeze``).
 
-Tracing one through all materials of a scene takes longer than running it on a frame's lanes.
+Tracing a kernel through all materials of a scene takes longer than running it on the lanes of a frame.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from enfilade.arrays import UInt, opaque
 
 __all__ = ["padded", "recorded"]
 
-# Lanes of a recorded kernel are a multiple of this: else they might be as many as some array of the scene
-# has, which is another form of its arguments.
+# Numbers of lanes are rounded up to a multiple of this. A number that happens to be the size of an array of
+# the scene would be another signature, and record the kernel again.
 STEP = 1021
 
 
 def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[..., Any]:
-    """A kernel that is traced when it is first called with arguments of some form, and replayed afterwards.
+    """Freeze a kernel: it is traced at the first call with arguments of a signature, and replayed afterwards.
 
     Parameters
     ----------
     kernel
-        Takes and returns trees of Dr.Jit arrays; what is no array counts as part of the form.
+        Takes and returns trees of Dr.Jit arrays; all other values in them are part of the signature.
     state
-        Tells all other arrays that the kernel reads.
+        Returns all other arrays that the kernel reads.
     """
     frozen = dr.freeze(kernel, auto_opaque=False, state_fn=lambda *_: state())
 
     def replayed(*arguments: Any) -> Any:
-        # Garbage that shares NumPy's memory can't be let go while a kernel is recorded.
+        # Memory shared with NumPy can't be freed while a kernel is recorded: collect no garbage.
         had_collector = gc.isenabled()
         gc.disable()
         try:
@@ -46,7 +46,18 @@ def recorded(kernel: Callable[..., Any], state: Callable[[], Any]) -> Callable[.
 
 
 def padded(lanes: Any) -> tuple[Any, Any]:
-    """Lanes of a list, the last repeated until they suit a recorded kernel, and which are no repetitions."""
+    """A list of lanes for a frozen kernel: the last one repeated up to a multiple of :data:`STEP`.
+
+    Parameters
+    ----------
+    lanes : UInt
+
+    Returns
+    -------
+    lanes : UInt
+    is_real : Bool
+        False for the repetitions.
+    """
     count = dr.width(lanes)
     if count == 1:  # gathering from a single lane would be another kernel
         lanes = UInt([lanes[0]] * 2)

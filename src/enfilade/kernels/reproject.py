@@ -8,11 +8,11 @@ import drjit as dr
 
 from enfilade.arrays import Array2f, Array3f
 
-NEAREST = 1e-3  # smallest ratio of depths: a point that comes closer to the eye counts as behind it
+NEAREST = 1e-3  # least ratio of new depth to old: points that come closer to the eye count as behind it
 
 
 def reproject(x: Any, y: Any, disparity: Any, *, change: Any, epipole: Any) -> tuple[Any, Any, Any]:
-    """Take image points to another camera.
+    """Reproject image points to another camera.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def reproject(x: Any, y: Any, disparity: Any, *, change: Any, epipole: Any) -> t
         One over the depth; 0 at infinity.
     change : Matrix3f
     epipole : Array3f
-        Of ``camera.PlanarWarp``.
+        Of :class:`enfilade.camera.pinhole.PlanarWarp`.
 
     Returns
     -------
@@ -31,9 +31,9 @@ def reproject(x: Any, y: Any, disparity: Any, *, change: Any, epipole: Any) -> t
     depth_ratio : Float
         New depth over old, at least `NEAREST`.
     is_ahead : Bool
-        Whether the new camera has the point before it; the flow of others is not to be used.
+        Whether the point lies before the new camera; the displacement of others is undefined.
     """
-    # The displacement in homogeneous coordinates.
+    # Displace in homogeneous coordinates.
     u = change @ Array3f(x, y, 1) + disparity * epipole
 
     # Divide: (x + u) / (1 + u_z) - x, without the cancellation.
@@ -46,25 +46,27 @@ def reproject(x: Any, y: Any, disparity: Any, *, change: Any, epipole: Any) -> t
 def warp_jacobian(
     x: Any, y: Any, disparity: Any, gradient: Any, *, change: Any, epipole: Any
 ) -> tuple[Any, Any]:
-    """How a neighbourhood on a plane stretches when it is reprojected.
+    """Jacobian of the reprojection of points on a plane.
 
     Parameters
     ----------
     x, y, disparity : Float
     gradient : Array2f
-        Derivative of the disparity by image coordinates: on a plane it is constant.
+        Derivative of the disparity by image coordinates, which is constant on a plane.
     change, epipole
-        As for :func:`reproject`.
+        As of :func:`reproject`.
 
     Returns
     -------
     by_x, by_y : Array2f
         Derivatives of the new position by the old x and y.
     """
+    # Reproject the points.
     u = change @ Array3f(x, y, 1) + disparity * epipole
     ratio = dr.maximum(1.0 + u.z, NEAREST)
     moved = Array2f(x + u.x, y + u.y) / ratio
 
+    # Differentiate the quotient along each axis.
     columns = []
     for axis, slope in enumerate((gradient.x, gradient.y)):
         d = Array3f(change[0, axis], change[1, axis], change[2, axis]) + slope * epipole

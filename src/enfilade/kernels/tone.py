@@ -1,8 +1,8 @@
-"""From linear radiance to what the screen emits: sRGB transfer (IEC 61966-2-1) and the display.
+"""Linear radiance to display luminance: sRGB transfer (IEC 61966-2-1) and the display.
 
-The viewer, and so the metric, sees the image after the view transform of the video (exposure, sRGB
-encoding, clipping at white) and the screen that undoes the encoding. The metric takes this view also where
-the video has one of an OpenColorIO configuration, which may show more or less of what is bright or dark.
+The metric compares images as the viewer sees them: after the view transform of the video (exposure, sRGB
+encoding, clipping at white) and the display, which undoes the encoding. It assumes this transform also for
+videos with a view of an OpenColorIO configuration, which may compress highlights and shadows differently.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def srgb_encode(linear: Float32Array) -> Float32Array:
     Parameters
     ----------
     linear : (...) float32
-        Linear values, 1 = white. Negative ones take the straight part of the curve.
+        Linear values, 1 = white. Negative values lie on the linear segment.
 
     Returns
     -------
@@ -51,12 +51,12 @@ def srgb_encode(linear: Float32Array) -> Float32Array:
 
 
 def srgb_decode(encoded: Float32Array) -> Float32Array:
-    """Linear light that an sRGB screen makes of encoded values (EOTF), without clipping.
+    """Linear light of encoded values on an sRGB display (EOTF), without clipping.
 
     Parameters
     ----------
     encoded : (...) float32
-        Encoded values, 1 = white. Negative ones take the straight part of the curve.
+        Encoded values, 1 = white. Negative values lie on the linear segment.
 
     Returns
     -------
@@ -101,11 +101,10 @@ def luminance(linear_rgb: Float32Array) -> Float32Array:
 def display_luminance(
     linear_rgb: Float32Array, *, exposure_ev: float, peak_cd_m2: float, black_cd_m2: float
 ) -> Float32Array:
-    """Luminance that leaves the screen when a linear image is shown, as the viewer sees it.
+    """Luminance of a linear image on the display.
 
-    Exposure, sRGB encoding, clipping to the encodable range, decoding by the screen, peak and
-    black. Encoding and decoding undo each other, so that of the two only the clipping stays;
-    rounding to 8 bits is left out.
+    Exposure, sRGB encoding, clipping to the encodable range, decoding by the display, peak and black.
+    Encoding and decoding cancel, so that only the clipping remains; rounding to 8 bits is left out.
 
     Parameters
     ----------
@@ -114,12 +113,12 @@ def display_luminance(
     exposure_ev : float
         Exposure in stops: +1 doubles.
     peak_cd_m2, black_cd_m2 : float
-        Luminance of white and of black on the screen, cd/m2.
+        Luminance of white and of black on the display, cd/m2.
 
     Returns
     -------
     (...) float32
-        cd/m2, between black and peak. A NaN stays a NaN: the metric refuses it by name.
+        cd/m2, between black and peak. NaN stays NaN; the metric refuses it.
 
     Raises
     ------

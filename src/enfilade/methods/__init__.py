@@ -1,1 +1,1 @@
-"""How frames come from a scene and a camera path: one folder a method."""
+"""Methods: how frames are made from a scene and a camera path. One folder, or one file, a method."""

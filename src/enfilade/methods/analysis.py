@@ -1,4 +1,4 @@
-"""Statistics of every frame, found before anything is traced: velocities and surfaces (§4.2)."""
+"""Statistics of every frame before anything is traced: velocities and surfaces (§4.2)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FrameStatistics:
 def analyze(walk: Walkthrough, frame: int) -> FrameStatistics:
     """Statistics of a frame, from its G-buffer and motion vectors."""
     view = walk.view(frame)
-    # A point close to the eye may move by any number of pixels; it leaves the image.
+    # Limit motion to the diagonal: points close to the eye may move by any number of pixels.
     diagonal = float(np.hypot(walk.path.width, walk.path.height))
     fastest = walk.viewing.velocity_deg_s(diagonal)
     slow_deg_s = walk.settings[MaskSettings].slow_deg_s
@@ -70,13 +70,13 @@ class Analysis:
 
     @classmethod
     def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
-        """Build from :meth:`FrameStatistics` as plain tables."""
+        """Build from :func:`to_table` of every frame."""
         return cls(path, settings, tuple(FrameStatistics(**table) for table in tables))
 
     def segments(self, spacing: int | None = None) -> list[list[Segment]]:
         """Segments between the initial keyframes of each shot (§4.2).
 
-        A frame that repeats the pose of the one before is never a keyframe.
+        A repeated pose is never a keyframe.
 
         Parameters
         ----------
@@ -112,5 +112,5 @@ def keyframes_of(segments: Sequence[Segment]) -> list[int]:
 
 
 def to_table(statistics: FrameStatistics) -> dict[str, float]:
-    """As a plain table, fit for JSON."""
+    """Statistics as a table, fit for JSON."""
     return asdict(statistics)

@@ -1,9 +1,8 @@
-"""The seam between methods and runs: tasks, passes, and what a method is.
+"""The seam between methods and runs: tasks, passes, and the base class of methods.
 
-A method says how frames come from a scene and a camera path, as passes in order; a pass maps records of
-earlier passes to new records, one task a frame. A method contains no file, ledger, executor or progress
-bar:
-:mod:`enfilade.runs` schedules, stores and resumes its tasks, and a test can call it with a few arrays.
+A method defines how frames are made from a scene and a camera path, as passes in order. A pass maps records
+of earlier passes to new records; most have one task a frame. A method contains no file, ledger, executor or
+progress bar: :mod:`enfilade.runs` schedules, stores and resumes its tasks, and tests run them on few arrays.
 ``reference.py`` is the shortest example.
 """
 
@@ -22,7 +21,7 @@ FRAMES = "frames"  # the last pass of every method; its records are `records.Fra
 
 
 class TaskId(NamedTuple):
-    """The name of a task: folder, progress bar, ledger and ``--pass`` use it.
+    """The name of a task, for its folder, the progress bar, the ledger and ``--pass``.
 
     Attributes
     ----------
@@ -37,7 +36,7 @@ class TaskId(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """A piece of work.
+    """A unit of work.
 
     Attributes
     ----------
@@ -69,13 +68,13 @@ class Pass:
     ----------
     name : str
     record : type or None
-        Class of the records that its tasks write, one file a frame; None: they have facts alone.
+        Class of the records that its tasks write, one file a frame; None for passes that have facts only.
     reads : tuple of str
         Earlier passes whose records or facts its tasks read.
     is_barrier : bool
         Whether its tasks begin when all tasks of earlier passes of the same shot are finished.
     is_shared : bool
-        Whether it has many tasks, which several commands may share out among them.
+        Whether its tasks may be divided among several commands.
     """
 
     name: str
@@ -116,7 +115,7 @@ class Inputs(Protocol):
         Raises
         ------
         DamagedFileError
-            Its file is missing, or is not what was written.
+            Its file is missing, or is not the one that was written.
         """
         ...
 
@@ -132,7 +131,7 @@ class Inputs(Protocol):
 
 
 class Method(ABC):
-    """How frames come from a scene and a camera path.
+    """A way to make the frames of a camera path.
 
     Attributes
     ----------
@@ -144,7 +143,7 @@ class Method(ABC):
         Whether it needs a renderer that separates diffuse from specular lobes, a
         :class:`~enfilade.renderer.LobeRenderer`.
     settings : tuple of type
-        Sections that it reads. Runs that differ in other sections are the same run.
+        Sections that it reads. Runs that differ in other sections only are the same run.
     passes : tuple of Pass
         In order; the last one is ``frames``.
     """
@@ -155,16 +154,17 @@ class Method(ABC):
     settings: ClassVar[tuple[type[Section], ...]] = ()
     passes: ClassVar[tuple[Pass, ...]]
 
-    def check(self, settings: Settings) -> None:  # noqa: B027  (optional)
-        """Refuse settings that the method can't work with, before anything is loaded.
+    def check(self, settings: Settings) -> None:
+        """Refuse settings that the method does not support, before the scene is loaded.
 
         Raises
         ------
         SettingsError
         """
+        del settings
 
     def keyframes(self, analysis: Analysis) -> list[int]:
-        """Frames that are initially keyframes, for plans and charts; none by default."""
+        """Initial keyframes, for plans and charts; none by default."""
         del analysis
         return []
 
@@ -180,4 +180,4 @@ class Method(ABC):
 
     @abstractmethod
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Do a task. The result depends on the arguments alone; caches may live in the instance."""
+        """Do a task. The result depends on the arguments alone; the instance may hold caches."""

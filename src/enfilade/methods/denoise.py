@@ -1,4 +1,4 @@
-"""Open Image Denoise (Áfra, https://www.openimagedenoise.org), by ``pyoidn``, which brings its weights."""
+"""Open Image Denoise (Áfra, https://www.openimagedenoise.org), by ``pyoidn``, which includes its weights."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ __all__ = ["denoise", "denoiser_name", "why_no_denoiser"]
 
 
 def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F32:
-    """Denoise one HDR image by itself, on the CPU, with guides that have no noise of their own.
+    """Denoise an HDR image on the CPU, with noise-free guides.
 
     Parameters
     ----------
     color : (H, W, 3) float32
-        Linear radiance of paths spread uniformly over each pixel (a box filter): the networks were
-        trained on that. Negative values count as 0.
+        Linear radiance, box filtered as the training data of the networks. Negative values count as 0.
     albedo : (H, W, 3) float32
         0..1, filtered as the colours.
     normal : (H, W, 3) float32
-        In the world, -1..1, filtered as the colours.
+        In world space, -1..1, filtered as the colours.
     quality : {"high", "balanced", "fast"}
-        Of Open Image Denoise's networks.
+        Of the network.
 
     Returns
     -------
@@ -55,12 +54,12 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
 
 
 def denoiser_name() -> str:
-    """Name and version of what denoises."""
+    """Name and version of the denoiser."""
     return f"Open Image Denoise (pyoidn {version('pyoidn')})"
 
 
 def why_no_denoiser() -> str:
-    """Why nothing can be denoised here, and how to change it; empty where it can."""
+    """The reason why the denoiser is not available, with the remedy; empty if it is."""
     if find_spec("pyoidn") is None:
         return "Open Image Denoise is not installed: pip install 'enfilade[denoise]' brings it"
     return ""

@@ -16,14 +16,14 @@ def place_keyframes(speed: npt.NDArray[np.float64], settings: KeyframeSettings) 
     Parameters
     ----------
     speed : (N,) float64
-        Mean image flow magnitude of each frame of the shot, pixels per frame (or any unit).
+        Mean magnitude of the image flow of each frame of the shot, in any unit.
     settings
-        Spacing Delta, coefficient A, and which placement.
+        Spacing Delta, coefficient A, and the rule of placement.
 
     Returns
     -------
     list of int
-        Rising indices into `speed`; the first and the last frame are always among them.
+        Rising indices into `speed`, among them the first and the last frame.
     """
     last = len(speed) - 1
     if last <= 0:
@@ -56,23 +56,26 @@ def segment_length(flow: float, mean_flow: float, spacing: int, adaptation: floa
 
 
 def _adapted(speed: npt.NDArray[np.float64], spacing: int, adaptation: float) -> list[int]:
+    """Adapt the length of each segment to its flow."""
+    # Average the flow over segments of uniform spacing.
     last = len(speed) - 1
     flows = [speed[k : k + spacing].sum() for k in range(0, last - spacing + 1, spacing)]
     mean_flow = float(np.mean(flows)) if flows else float(speed.mean()) * spacing
 
+    # Place one keyframe after the other.
     keyframes, at = [], 0
     while at < last:
         ahead = speed[at : at + spacing]
-        flow = float(ahead.sum()) * spacing / len(ahead)  # scaled up where the shot ends earlier
+        flow = float(ahead.sum()) * spacing / len(ahead)  # scaled up at the end of the shot
         at += segment_length(flow, mean_flow, spacing, adaptation)
         keyframes.append(at)
     return keyframes
 
 
 def _equal_flow(speed: npt.NDArray[np.float64], spacing: int) -> list[int]:
-    """Split the accumulated flow evenly: the paper's first attempt, which it found worse (§4.2).
+    """Split the accumulated flow evenly into as many segments as uniform spacing has.
 
-    Into as many segments as uniform spacing makes, so that both can be compared.
+    The paper's first attempt, which it found worse (§4.2).
     """
     accumulated = np.concatenate([[0.0], np.cumsum(speed[:-1])])
     count = math.ceil((len(speed) - 1) / spacing)

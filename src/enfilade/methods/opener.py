@@ -1,4 +1,4 @@
-"""A method by its name."""
+"""Opening methods by name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def open_method(name: str) -> Method:
     Parameters
     ----------
     name
-        One of :data:`METHODS`, or ``module:Class`` of a method of your own.
+        One of :data:`METHODS`, or ``module:Class``.
 
     Raises
     ------
@@ -30,14 +30,14 @@ def open_method(name: str) -> Method:
     module, _, attribute = METHODS.get(name, name).partition(":")
     if not attribute:
         raise SettingsError(
-            f"there is no method {name!r}; choose one of {', '.join(METHODS)}, or give your own as module:Class"
+            f"there is no method {name!r}; choose one of {', '.join(METHODS)}, or give module:Class"
         )
     try:
         kind = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise SettingsError(f"the method {name!r} can't be imported: {error}") from error
     if not (isinstance(kind, type) and issubclass(kind, Method)):
-        raise SettingsError(f"{name!r} is no method: it must be a subclass of enfilade.Method")
+        raise SettingsError(f"{name!r} is not a method: it must be a subclass of enfilade.Method")
     return kind()
 
 
@@ -47,15 +47,15 @@ def name_of(method: str | Method | type[Method]) -> str:
     Raises
     ------
     SettingsError
-        Its class is not at the top level of a module that can be imported.
+        Its class is not at the top level of an importable module.
     """
     if isinstance(method, str):
         return method
     kind = method if isinstance(method, type) else type(method)
     if kind.__module__ == "__main__" or "." in kind.__qualname__:
         raise SettingsError(
-            f"the method {kind.__qualname__} must be a class at the top level of a module, which worker processes "
-            "can import"
+            f"the method {kind.__qualname__} must be a class at the top level of a module that worker "
+            "processes can import"
         )
     name = f"{kind.__module__}:{kind.__qualname__}"
     return next((short for short, full in METHODS.items() if full == name), name)

@@ -1,4 +1,4 @@
-"""Every pixel of every frame path traced: the result that other methods are compared with."""
+"""Path tracing of every pixel of every frame: the reference for the other methods."""
 
 from __future__ import annotations
 

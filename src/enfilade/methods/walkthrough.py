@@ -1,4 +1,4 @@
-"""A scene along a camera path: everything that a task may use beside the records of earlier passes."""
+"""A scene along a camera path: cameras, settings, renderer, G-buffers and path tracing for the methods."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Walkthrough:
     renderer
         With the scene loaded.
     timed
-        Context manager that counts the time of tracing and of G-buffers, by its name.
+        Returns a context manager that measures the time of tracing, or of G-buffers, by its name.
 
     Attributes
     ----------
@@ -74,9 +74,9 @@ class Walkthrough:
 
     def view(self, frame: int) -> View:
         """G-buffer and motion vectors of a frame."""
-        return self._views.get(frame, lambda: self._found(frame))
+        return self._views.get(frame, lambda: self._computed(frame))
 
-    def _found(self, frame: int) -> View:
+    def _computed(self, frame: int) -> View:
         with self._timed("gbuffer"):
             geometry = find_geometry(self.renderer, self.path.cameras[frame])
         return View(geometry, *self.path.neighbours(frame), self.viewing)
@@ -103,7 +103,7 @@ class Walkthrough:
         Returns
         -------
         Shading
-            Of shape (N,), in the order of the image's rows.
+            Of shape (N,), in the order of rows.
         """
         with self._timed("trace"):
             return self.renderer.trace(
@@ -115,7 +115,7 @@ class Walkthrough:
             )
 
     def display_luminance(self, color: F32) -> F32:
-        """Luminance that the display emits for linear colours, (H, W) cd/m2."""
+        """Luminance of linear colours on the display, (H, W) cd/m2."""
         of = self.settings[ViewingSettings]
         luminance: F32 = display_luminance(
             color, exposure_ev=of.exposure_ev, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2

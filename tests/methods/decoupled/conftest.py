@@ -1,15 +1,13 @@
-"""What several tests of the irradiance cache share."""
+"""A scene that several tests share."""
 
 import pytest
 
-from balls import MATERIALS, front_camera, opened_scene, traced_page
+from balls import MATERIALS, front_camera, opened_scene, traced_irradiance
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def diffuse(tmp_path_factory):
-    """Diffuse balls, with the light of two pages."""
-    renderer = opened_scene(
-        tmp_path_factory.mktemp("diffuse"), {"one": MATERIALS["diffuse"], "two": MATERIALS["diffuse"]}
-    )
-    pages = [traced_page(renderer, front_camera(x=x)) for x in (-0.5, 0.5)]
-    return renderer, pages
+    """Diffuse balls, with the irradiance of two images: pairs of G-buffer and record."""
+    balls = {"one": MATERIALS["diffuse"], "two": MATERIALS["diffuse"]}
+    renderer = opened_scene(tmp_path_factory.mktemp("diffuse"), balls)
+    return renderer, [traced_irradiance(renderer, front_camera(x=x)) for x in (-0.5, 0.5)]

@@ -1,4 +1,4 @@
-"""Irradiance cached at keyframes, visibility and texture afresh in every frame: the default method."""
+"""Irradiance cached at keyframes; visibility, texture and specular lobes in every frame: the default."""
 
 from enfilade.methods.decoupled.method import Decoupled
 

@@ -1,4 +1,4 @@
-"""A frame: camera rays, specular rays, and the accumulation of specular AOVs over time."""
+"""Frames: camera rays, specular rays, and the temporal accumulation of specular AOVs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy.typing as npt
 from enfilade.arrays import halves, widened
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
-from enfilade.kernels.estimate import LUMINANCE, Estimate
+from enfilade.kernels.estimate import Estimate
+from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
@@ -32,7 +33,7 @@ REACH = 3  # distinct frames to each side over which specular AOVs are accumulat
 class Frames:
     """Shades frames, and accumulates their specular AOVs over time.
 
-    The AOVs of the frames that the accumulation spans are kept on the device.
+    Keeps the AOVs of the frames that the accumulation spans on the device.
     """
 
     def __init__(self) -> None:
@@ -41,12 +42,16 @@ class Frames:
         self._last: LruCache[int, Frame] = LruCache(1)
 
     def shade(self, shot: Shot, frame: int) -> Output:
-        """Shade a frame: everything but the accumulation over time."""
+        """Shade a frame, without the temporal accumulation."""
         geometry = shot.walk.view(frame).geometry
+
+        # Trace camera rays, then specular rays where they meet specular lobes.
         view, cache = shot.caches(frame)
         diffuse = _shade_diffuse(shot, frame, view, cache)
         where = _dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         aovs, specular = self._shade_specular(shot, frame, cache, where)
+
+        # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
         provenance = _provenance(geometry, view, diffuse.is_marked, is_keyframe=is_keyframe)
         color = diffuse.shading.color.reshape(*where.shape, 3)
@@ -57,7 +62,7 @@ class Frames:
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
 
     def finish(self, shot: Shot, frame: int) -> Output:
-        """Deliver a frame, once the frames around it are shaded; repeated poses are copies."""
+        """Deliver a frame; the frames of its window are shaded. Repeated poses are copies."""
         static = shot.walk.path.static_frame(frame)
         made = self._last.get(static, lambda: self._accumulated(shot, static))
         if frame != static:
@@ -65,6 +70,7 @@ class Frames:
         return Output({frame: made})
 
     def _accumulated(self, shot: Shot, frame: int) -> Frame:
+        """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
         color = widened(shaded.diffuse)
         if np.any(shaded.provenance == Provenance.SPECULAR):
@@ -74,7 +80,7 @@ class Frames:
                 neighbours = [(aovs[k], weights[f]) for f in others if k < len(aovs := self._aovs(shot, f))]
                 geometry = shot.walk.view(frame).geometry
                 color = color + accumulate_temporally(geometry, here, neighbours)
-        # Samples of a lobe that is a difference may be negative; the sum is not.
+        # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
 
     def _aovs(self, shot: Shot, frame: int) -> list[UploadedImage]:
@@ -96,15 +102,16 @@ class Frames:
     def _shade_specular(
         self, shot: Shot, frame: int, cache: IrradianceCache, where: Mask
     ) -> tuple[list[SpecularAov], Estimate | None]:
-        """Specular AOVs that are not empty, filtered spatially, and their estimate, if any.
+        """Specular AOVs, filtered spatially, without an empty transmission; and their estimate, if any.
 
-        All pixels take as many rays: a second pass for those with remaining noise would cost as much as
-        half as many again for all.
+        All pixels have the same number of rays: a second pass for those with remaining noise would cost as
+        much as half as many more for all.
         """
         if not where.any():
-            return [
-                SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
-            ], None
+            black = np.zeros((*where.shape, 3), np.float16)
+            return [SpecularAov(black, np.zeros(where.shape, np.float16))], None
+
+        # Trace specular rays.
         walk = shot.walk
         camera = walk.path.cameras[frame]
         estimate = Estimate(
@@ -120,6 +127,8 @@ class Frames:
             is_stratified=True,
         )
         estimate.add(specular_spp(shot.settings))
+
+        # Filter the AOVs along the surfaces that are seen in them.
         reflection, *more = (shading.spread(where) for shading in estimate.shadings)
         aovs = [reflection, *(aov for aov in more if aov.color.any())]
         virtual = self._virtual_geometry(shot, frame, len(aovs))
@@ -138,7 +147,7 @@ class Frames:
 
 
 def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: IrradianceCache) -> Estimate:
-    """Emission and diffuse reflection; edges and fine textures take more camera rays."""
+    """Emission and diffuse reflection, with more camera rays at edges and fine textures."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
     estimate = Estimate(
@@ -152,11 +161,13 @@ def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: Irradia
         random=walk.random(frame, Purpose.DIFFUSE),
     )
     estimate.add(settings.min_spp)
+
+    # Add camera rays where the first ones differ, and at small emitters, which they may have missed.
     more = edge_spp(settings) - settings.min_spp
     if more > 0:
         shading = estimate.shading
-        luminance: npt.NDArray[np.float32] = shading.color @ np.array(LUMINANCE, np.float32)
-        is_edge = np.sqrt(shading.variance) > EDGE_CONTRAST * settings.quality * luminance
+        contrast = EDGE_CONTRAST * settings.quality * luminance(shading.color)
+        is_edge = np.sqrt(shading.variance) > contrast
         is_edge = is_edge.reshape(camera.height, camera.width)
         is_edge |= small_emitter_pixels(shot.renderer.emitters, walk.view(frame).geometry)
         estimate.add(more, _dilated(is_edge).ravel())
@@ -176,7 +187,7 @@ def _provenance(
 
 
 def window(path: CameraPath, shot: range, frame: int) -> list[int]:
-    """Distinct frames of a shot over which the AOVs of a frame are accumulated: itself, and some to each side."""
+    """Distinct frames of a shot over which the AOVs of a frame are accumulated, itself among them."""
     first, here, last = (path.distance(f) for f in (shot.start, frame, shot.stop - 1))
     return list(path.distinct_frames[max(here - REACH, first) : min(here + REACH, last) + 1])
 

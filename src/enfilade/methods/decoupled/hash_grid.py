@@ -1,8 +1,8 @@
 """A world-space hash grid of irradiance, for surfaces that no keyframe shows.
 
-Paths off specular and diffuse surfaces land in the same unseen places again and again. Their estimates are
-summed in entries whose keys are made of the quantized position and normal (Binder et al. 2018) and of the
-width of the path (Bekaert et al. 2003): entries are larger the less sharply they are seen.
+Paths from different pixels and frames end on the same such surfaces. Their estimates are summed in entries
+whose keys are hashes of the quantized position and normal (Binder et al. 2018) and of the width of the path
+(Bekaert et al. 2003): entries are larger where they are seen less sharply.
 """
 
 from __future__ import annotations
@@ -21,9 +21,6 @@ LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four time
 MIN_SAMPLES = 4  # of an entry that is used
 SEARCH_STEPS = 22
 MAX_ENTRIES = 1 << SEARCH_STEPS  # that are uploaded; of more, those with the most samples
-COORDINATE_BITS = 14
-LEVEL_BITS = 6
-SHAPE_BITS = 13
 QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
 
 
@@ -57,8 +54,8 @@ class HashGrid:
         width : Float
             Of the path there, scene units.
         offset : Array3f
-            In [0, 1): moves the point by up to half an entry, so that many lookups interpolate. Where there
-            is no entry at the moved point, that of the point itself is used.
+            In [0, 1): moves the point by up to half an entry, so that many lookups interpolate. Moved points
+            without an entry use that of the point itself.
 
         Returns
         -------
@@ -89,11 +86,14 @@ class HashGrid:
 def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: int, offset: Any = 0.5) -> Any:
     """Key of the entry of a point; UInt64.
 
+    A 64-bit hash of the shape index, the size, the three coordinates of the cell (32 bits each) and the axis
+    nearest to the normal. Two entries share a key with a probability of 2^-64. Among 4 million entries the
+    probability of any collision is 5e-7; that of a lookup that finds a wrong entry is 2e-13.
+
     Parameters
     ----------
     position, normal : Array3f
     shape_index : UInt
-        Two shapes never share an entry.
     width : Float
         Of the path, scene units: the entry is as wide, rounded down to a power of two.
     level
@@ -106,17 +106,28 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
     size = dr.exp2(Float(exponent))
     cell = Array3f(position) / size + (offset - 0.5)
 
-    # Pack shape, size, position and direction of the normal.
-    key = UInt64(shape_index & ((1 << SHAPE_BITS) - 1))
-    key = (key << LEVEL_BITS) | UInt64(UInt(exponent + (1 << (LEVEL_BITS - 1))) & ((1 << LEVEL_BITS) - 1))
-    for coordinate in cell:
-        at = UInt(Int(dr.floor(coordinate))) & ((1 << COORDINATE_BITS) - 1)
-        key = (key << COORDINATE_BITS) | UInt64(at)
-    return (key << 3) | UInt64(_nearest_axis(normal))
+    # Hash shape, size and direction of the normal, then the coordinates.
+    x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in cell)
+    key = _mixed(_packed(shape_index, UInt(exponent << 3) | _nearest_axis(normal)))
+    key = _mixed(key ^ _packed(x, y))
+    return _mixed(key ^ UInt64(z))
+
+
+def _packed(high: Any, low: Any) -> Any:
+    """Two UInt in a UInt64."""
+    return (UInt64(high) << 32) | UInt64(low)
+
+
+def _mixed(key: Any) -> Any:
+    """A bijection of 64 bits in which every bit depends on all others (SplitMix64, Steele et al. 2014)."""
+    key = key + UInt64(0x9E3779B97F4A7C15)
+    key = (key ^ (key >> 30)) * UInt64(0xBF58476D1CE4E5B9)
+    key = (key ^ (key >> 27)) * UInt64(0x94D049BB133111EB)
+    return key ^ (key >> 31)
 
 
 def _nearest_axis(normal: Any) -> Any:
-    """Which of the six directions of the axes a normal is nearest to, 0..5; UInt."""
+    """Index of the axis direction nearest to a normal, 0..5: x, -x, y, -y, z, -z; UInt."""
     x, y, z = (dr.abs(component) for component in normal)
     along_x, along_y = (x >= y) & (x >= z), y >= z
     axis = dr.select(along_x, 0, dr.select(along_y, 1, 2))
@@ -144,7 +155,7 @@ class Entries:
     def of(keys: npt.NDArray[np.uint64], light: npt.NDArray[np.floating[Any]]) -> Entries:
         """Sum up estimates; those that are not finite are left out.
 
-        They are rounded to :data:`QUANTUM`, so that sums are exact, and do not depend on the order.
+        They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
         """
         is_finite = np.isfinite(light).all(axis=1)
         rounded = np.rint(light[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
@@ -167,7 +178,7 @@ class Entries:
         return Entries(unique, total, np.bincount(place, counts, len(unique)).astype(np.int64))
 
     def upload(self) -> HashGrid | None:
-        """The entries with enough samples, on the device; None if there are none."""
+        """Upload the entries with enough samples; None if there are none."""
         chosen = np.flatnonzero(self.counts >= MIN_SAMPLES)
         if not len(chosen):
             return None

@@ -1,4 +1,4 @@
-"""Filling the hash grid: irradiance where paths land on surfaces that no prepass image shows."""
+"""Filling the hash grid: irradiance at the end of paths on surfaces that no prepass image shows."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from enfilade.methods.decoupled.shot import Shot
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-SPECULAR_SPP = 4  # rays of a frame's pixel off specular surfaces
-GATHER_SPP = 4  # bounces of a prepass pixel off its diffuse surface
+SPECULAR_SPP = 4  # specular rays of each pixel of the frame
+GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
 
 
 def fill_hash_grid(shot: Shot, frame: int) -> Output:
-    """Estimate irradiance where paths off a keyframe's surfaces land and no prepass image shows the surface."""
+    """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
     camera, geometry = walk.path.cameras[frame], shot.prepass_geometry(frame)
@@ -52,6 +52,8 @@ def fill_hash_grid(shot: Shot, frame: int) -> Output:
         is_stratified=True,
     )
     gathered.add(GATHER_SPP)
+
+    # Sum up their estimates by entry.
     entries = Entries.joined(parts)
     rays = specular.paths + gathered.paths
     return Output({frame: entries}, {"rays": {"prepass": rays}, "entries": len(entries.keys)})

@@ -204,7 +204,8 @@ class Integrator:
         """
         dr.eval(square)  # see `spawn`
         direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), square)
-        indirect = Array3f(vertex.radiance)
+        # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
+        indirect = Array3f(vertex.radiance) if cache.images else dr.zeros(Array3f, dr.width(rng.state))
         self._add_missed(indirect, cache, vertex, on_miss=on_miss)
         onward = compact(vertex.path, dr.compress(vertex.has_specular))
         self._trace_specular(indirect, cache, onward, 1, on_miss)
@@ -267,7 +268,7 @@ class Integrator:
         is_queried: bool = True,
         on_miss: OnMiss | None = None,
     ) -> None:
-        """Add the diffuse reflection at vertices whose irradiance was not found: look further, or estimate it.
+        """Add the diffuse reflection at vertices whose irradiance was not found: query further, or estimate.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Irradiance images of keyframes, by final gathering, and disocclusion images of the frames between them."""
+"""Irradiance images by final gathering: of keyframes, and of disocclusions between them."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from enfilade.records import Mask
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-NOISE_SHARE = 0.25  # of the spread of low-discrepancy samples; images differ by 0.3 to 0.6 of it
-MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer are left to the frames themselves
+NOISE_SHARE = 0.25  # of the samples' variance: low-discrepancy samples have less noise than their spread
+MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
 def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> tuple[IrradianceImage, int]:
@@ -37,7 +37,7 @@ def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> t
     Returns
     -------
     image : IrradianceImage
-        With the variance between images of independent random numbers.
+        Its variance is that between images of independent random numbers.
     paths : int
     """
     walk, cache = shot.walk, shot.rough_cache(frame)
@@ -68,10 +68,10 @@ def gather_keyframe(shot: Shot, frame: int, spp: int) -> Output:
 
 
 def fill_disocclusions(shot: Shot, segment: Segment, spp: int) -> Output:
-    """Images of the surfaces between two keyframes that no keyframe shows.
+    """Disocclusion images: irradiance of surfaces between two keyframes that no keyframe shows.
 
-    The segment is halved until no new surface comes into view. An image contains everything that the
-    keyframes do not show, so that each frame finds it in the images before and after.
+    The segment is halved until no further surface comes into view. An image contains all surfaces of its
+    frame that the keyframes do not show, so that other frames find them in the images before and after.
     """
     images: dict[int, IrradianceImage] = {}
     uploaded: dict[int, UploadedImage] = {}
@@ -82,9 +82,13 @@ def fill_disocclusions(shot: Shot, segment: Segment, spp: int) -> Output:
         middle = shot.walk.path.middle(Segment(first, last))
         if middle is None:
             continue
+
+        # Stop where the keyframes and the nearest images show nearly all surfaces.
         neighbours = {f: uploaded[f] for f in either_side(sorted(uploaded), middle)}
         if shot.uncovered(middle, neighbours).mean() < MIN_DISOCCLUSION:
             continue
+
+        # Gather the surfaces that no keyframe shows, and go on with both halves.
         image, count = gather(shot, middle, shot.uncovered(middle, {}), spp, Purpose.IRRADIANCE)
         images[middle], uploaded[middle] = image, upload(shot.walk.view(middle).geometry, image)
         paths += count

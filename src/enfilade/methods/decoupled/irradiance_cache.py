@@ -1,4 +1,4 @@
-"""The irradiance cache: images of keyframes, filtered, accumulated, and looked up from anywhere a path goes."""
+"""The irradiance cache: images of keyframes, filtered, accumulated, and looked up anywhere in the scene."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, pixel_grid, vector3
-from enfilade.kernels.rays import pinhole_directions
+from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, vector3
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
 from enfilade.methods.decoupled.records import IrradianceImage
@@ -23,20 +23,20 @@ FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are firef
 FIREFLY_LEVELS = 5  # of the wavelet that spreads them
 SMOOTHING_LEVELS = 4
 SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
-NORMAL_EXPONENT = 64.0  # surfaces turned by 12 degrees mix by a quarter
+NORMAL_EXPONENT = 64.0  # of the cosine: normals 12 degrees apart have a weight of a quarter
 
 Layer = tuple[Any, Any]  # Array3f: light, Float: variance of its luminance
 
 
 @dataclass(frozen=True)
 class IrradianceCache:
-    """Several images, and a hash grid for surfaces that none of them shows. Empty, every lookup is a miss.
+    """Irradiance images, and a hash grid for surfaces that none of them shows. By default it is empty.
 
     Attributes
     ----------
     images : tuple of UploadedImage
     weights : tuple of Float
-        One an image, where several show a surface.
+        One an image, for surfaces that several of them show.
     hash_grid : HashGrid or None
     """
 
@@ -62,7 +62,7 @@ class IrradianceCache:
         Returns
         -------
         light : Array3f
-            0 where it is not found.
+            0 where none is found.
         is_found : Bool
         """
         total, weight = Array3f(0), Float(0)
@@ -77,12 +77,12 @@ class IrradianceCache:
 
 
 def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
-    """An irradiance image on the device, its fireflies spread; layers direct and indirect.
+    """Upload an irradiance image in two layers, direct and indirect; spreads the fireflies of the latter.
 
     Parameters
     ----------
     geometry
-        G-buffer of the image's camera.
+        G-buffer of the image.
     irradiance
     """
     guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
@@ -95,7 +95,7 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
 def upload_layers(
     geometry: Geometry, is_known: Any, layers: Sequence[Layer], *, has_normals: bool = True
 ) -> UploadedImage:
-    """Layers of an image on the device, in memory of Dr.Jit's own.
+    """Upload layers of an image into memory that is not shared with NumPy.
 
     Memory shared with NumPy can't be freed while a kernel is recorded.
 
@@ -132,27 +132,27 @@ def accumulate(
     images: Sequence[UploadedImage],
     denoise: Callable[[F32], F32] | None = None,
 ) -> UploadedImage:
-    """Irradiance of one image, averaged with that of others and smoothed along its surfaces.
+    """Average an irradiance image with others, and smooth it along its surfaces.
 
-    Irradiance does not depend on the viewer: each image that shows a point has an estimate of its own.
-    Images of coarser resolution weigh less. Direct light, which has edges, is smoothed apart from indirect
-    light, which has more noise.
+    Irradiance does not depend on the view, so that all images that show a point have independent estimates
+    of it. Images of coarser resolution weigh less. Direct light, which has sharp edges, and indirect light,
+    which has more noise, are smoothed separately.
 
     Parameters
     ----------
     geometry
         G-buffer of the image.
     is_known : (H, W) bool
-        Pixels for which it is known.
+        Its pixels with irradiance.
     images
-        The image itself among them.
+        Irradiance images, itself among them.
     denoise
-        Maps an image of light, (H, W, 3), to one without noise; None: the wavelet filter.
+        Denoiser of images (H, W, 3); None: the wavelet filter.
 
     Returns
     -------
     UploadedImage
-        Of one layer.
+        One layer, direct plus indirect.
     """
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
     if denoise is None:
@@ -168,30 +168,30 @@ def accumulate(
 def reproject_to(
     geometry: Geometry, images: Sequence[UploadedImage], weights: Sequence[float]
 ) -> UploadedImage:
-    """Irradiance of several images at the surfaces of a view, as an image of its own, for its camera rays."""
+    """Reproject irradiance images to a view: an image for the lookups of its camera rays."""
     layers, is_known = _averaged(geometry, images, weights)
     return upload_layers(geometry, is_known, layers)
 
 
 def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
-    """Pixels of a view whose surfaces some image shows, (H, W)."""
+    """Pixels of a view whose surfaces at least one image shows, (H, W)."""
     _, is_known = _averaged(geometry, images, [1.0] * len(images))
     return image(is_known, *geometry.shape_index.shape)
 
 
 def light_of(uploaded: UploadedImage) -> F32:
-    """The sum of all layers, (H, W, 3); 0 where it is not known."""
+    """The sum of all layers, (H, W, 3); 0 where there is no irradiance."""
     return image(sum(uploaded.values, Array3f(0)), uploaded.height, uploaded.width)
 
 
 def smooth_along(geometry: Geometry, groups: U32, light: Any, variance: Any) -> Layer:
-    """Smooth light along surfaces, as far as its noise requires.
+    """Smooth light along surfaces by the wavelet filter.
 
     Parameters
     ----------
     geometry
     groups : (H, W) uint32
-        Only pixels of the same number mix.
+        Only pixels of the same group mix.
     light : Array3f
         Image, width * height lanes.
     variance : Float
@@ -222,19 +222,16 @@ def guide_of(geometry: Geometry, groups: U32) -> Guide:
 
 
 def points_of(geometry: Geometry, depths: Any) -> Any:
-    """Points at some depths along the rays through the pixels' centres, in the world; Array3f."""
-    camera = geometry.camera
-    _, column, row = pixel_grid(camera.height, camera.width)
-    direction = pinhole_directions(
-        Float(column) + 0.5, Float(row) + 0.5, direction_from_pixel=matrix3(camera.direction_from_pixel)
-    )
-    return vector3(camera.eye) + depths * direction
+    """Points at given depths along the rays through the pixels' centres, world space; Array3f."""
+    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera))
+    return rays.origin + depths * rays.direction
 
 
 def _averaged(
     geometry: Geometry, images: Sequence[UploadedImage], weights: Sequence[float]
 ) -> tuple[list[Layer], Any]:
-    """Layers of several images at the surfaces of a view, averaged; and where they are known, Bool."""
+    """Layers of several images at the surfaces of a view, averaged; and whether any shows them, Bool."""
+    # Compute the points, and their footprints in this view.
     camera = geometry.camera
     normal, shape_index = lanes(geometry.normal), lanes(geometry.shape_index)
     position = points_of(geometry, lanes(geometry.depth))
@@ -244,12 +241,12 @@ def _averaged(
     weight, valid = Float(0), Float(0)
     dr.eval(position, own)
     for one, share in zip(images, weights, strict=True):
-        # Look the image up; one with larger pixels weighs less.
+        # Look up the image; coarser ones weigh less.
         found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
         its = footprint(position, normal, one.eye, one.direction_from_pixel)
         counts = opaque(float(share)) * dr.minimum(own / its, 1.0)
 
-        # Add it.
+        # Accumulate its layers.
         for layer in layers:
             totals[layer] += counts * found.totals[layer]
             variances[layer] += counts * counts * found.variances[layer] * found.weight

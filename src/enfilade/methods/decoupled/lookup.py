@@ -7,7 +7,8 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Float, Int, UInt
+from enfilade.arrays import Array3f, Float, UInt
+from enfilade.kernels.gather import taps_around
 
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
@@ -23,7 +24,7 @@ class UploadedImage:
     shape_indices : UInt
         Images, width * height lanes; the depth of unknown pixels is 0.
     normals : UInt or None
-        Of :func:`packed`; None where normals are not compared, as those of virtual images.
+        Of :func:`packed`; None where normals are not compared, as for virtual images.
     values : tuple of Array3f
     variances : tuple of Float
         One a layer.
@@ -69,19 +70,18 @@ def lookup(
 ) -> Found:
     """Interpolate an image at points in the world.
 
-    Of the four pixels around a point's projection those are valid that show the same shape, within a
-    tolerance of the point's tangent plane: pixels of surfaces that occlude it, or meet it at an edge, are
-    not. Pixels are weighted by the cosine between the normals, as the light differs, too. Images of the
-    other side of a surface are not used.
+    Of the four pixels around a point's projection those are valid that show the same shape within a tolerance
+    of the point's tangent plane, which excludes occluders and surfaces that meet at an edge. Pixels are
+    weighted bilinearly and by the cosine between the normals. Images of the back of the surface are not used.
 
     Parameters
     ----------
     position, normal : Array3f
-        Points in the world, and surface normals on the side that is shaded, of any length.
+        Points in world space, and surface normals on the shaded side, of any length.
     shape_index : UInt
     image
     plane_tolerance
-        Distance from the tangent plane, by depth, up to which a pixel is of the same surface.
+        Largest distance from the tangent plane on the same surface, as a part of the depth.
 
     Returns
     -------
@@ -92,36 +92,34 @@ def lookup(
     is_ahead = seen.z > 0.0
     x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
     is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < image.width - 0.5) & (y < image.height - 0.5)
-    left, top = dr.floor(x), dr.floor(y)
-    across, down = x - left, y - top
 
     # Prepare the distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
     scale = dr.rcp(dr.norm(normal))
     offset = dr.dot(normal, image.eye - position) * scale
     slope = (image.direction_from_pixel.T @ normal) * scale
     tolerance = plane_tolerance * seen.z
-    is_inside &= offset > 0.0  # the image shows the same side
+    is_inside &= offset > 0.0  # the camera is in front of the surface
 
-    # Weight the four neighbouring pixels, and sum them up.
+    # Interpolate between the four neighbouring pixels.
     totals, variances = [Array3f(0) for _ in image.values], [Float(0) for _ in image.values]
     weight = Float(0)
-    for row, weight_y in ((0, 1.0 - down), (1, down)):
-        for column, weight_x in ((0, 1.0 - across), (1, across)):
-            i = dr.clip(Int(left) + column, 0, image.width - 1)
-            j = dr.clip(Int(top) + row, 0, image.height - 1)
-            lane = UInt(j * image.width + i)
-            depth = dr.gather(Float, image.depths, lane, is_inside)
-            distance = offset + depth * dr.dot(slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1))
-            is_same = is_inside & (dr.gather(UInt, image.shape_indices, lane, is_inside) == shape_index)
-            is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
-            share = dr.select(is_same, weight_x * weight_y + MIN_TAP_WEIGHT, 0.0)
-            if image.normals is not None:
-                turned = dr.dot(normal, _unpacked(dr.gather(UInt, image.normals, lane, is_inside))) * scale
-                share *= dr.maximum(turned, 0.0)
-            for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
-                totals[layer] += share * dr.gather(Array3f, value, lane, is_same)
-                variances[layer] += share * dr.gather(Float, variance, lane, is_same)
-            weight += share
+    for tap in taps_around(x, y, width=image.width, height=image.height):
+        # Test that the pixel shows the same surface.
+        depth = dr.gather(Float, image.depths, tap.lane, is_inside)
+        pixel = Array3f(Float(tap.column) + 0.5, Float(tap.row) + 0.5, 1)
+        distance = offset + depth * dr.dot(slope, pixel)
+        is_same = is_inside & (dr.gather(UInt, image.shape_indices, tap.lane, is_inside) == shape_index)
+        is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
+
+        # Weight it, and accumulate its layers.
+        share = dr.select(is_same, tap.weight + MIN_TAP_WEIGHT, 0.0)
+        if image.normals is not None:
+            other = _unpacked(dr.gather(UInt, image.normals, tap.lane, is_inside))
+            share *= dr.maximum(dr.dot(normal, other) * scale, 0.0)
+        for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
+            totals[layer] += share * dr.gather(Array3f, value, tap.lane, is_same)
+            variances[layer] += share * dr.gather(Float, variance, tap.lane, is_same)
+        weight += share
     return Found(tuple(totals), tuple(variances), weight)
 
 
@@ -139,7 +137,7 @@ def _unpacked(word: Any) -> Any:
 def footprint(position: Any, normal: Any, eye: Any, direction_from_pixel: Any) -> Any:
     """Area of a surface that a pixel in the middle of a view covers at points, scene units squared; Float.
 
-    At grazing angles no more than twenty times that of a surface met head-on.
+    At grazing angles it is limited to twenty times the area at normal incidence.
     """
     toward = position - eye
     squared = dr.squared_norm(toward)

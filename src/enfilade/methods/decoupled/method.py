@@ -1,4 +1,4 @@
-"""The passes of the decoupled method: what is shared between frames, and what each frame has of its own."""
+"""The passes of the decoupled method: irradiance of keyframes, shading of every frame, delivered frames."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from enfilade.settings import (
 
 
 class Decoupled(Method):
-    """Irradiance cached at keyframes; visibility, texture, edges and specular lobes afresh in every frame."""
+    """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
     needs_lobes = True
@@ -52,13 +52,12 @@ class Decoupled(Method):
     )
 
     def __init__(self) -> None:
-        self._integrator: Integrator | None = None
-        self._virtual_images: VirtualImages | None = None
+        self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
         self._shot: Shot | None = None
         self._frames = Frames()
 
     def check(self, settings: Settings) -> None:
-        """Refuse a denoiser that is not installed.
+        """Refuse the denoiser where it is not installed.
 
         Raises
         ------
@@ -68,12 +67,12 @@ class Decoupled(Method):
             raise SettingsError(why)
 
     def keyframes(self, analysis: Analysis) -> list[int]:
-        """Keyframes, of which irradiance images are made."""
+        """Keyframes, which have irradiance images."""
         spacing = analysis.settings[DecoupledSettings].spacing
         return [frame for segments in analysis.segments(spacing) for frame in keyframes_of(segments)]
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """Tasks at keyframes, between them, and in all frames."""
+        """Tasks of keyframes, segments, and all frames."""
         path, settings = analysis.path, analysis.settings[DecoupledSettings]
         shots = zip(path.shots(), analysis.segments(settings.spacing), strict=True)
         for number, (shot, segments) in enumerate(shots):
@@ -118,12 +117,12 @@ class Decoupled(Method):
         return chosen or int(shot.inputs.facts("pilot", shot.keyframes[0])["spp"])
 
     def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
-        if self._integrator is None or self._virtual_images is None:
+        """The shot of a task, which is kept until the next one begins."""
+        if self._kernels is None or self._kernels[0] is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
-            self._integrator = Integrator(walk.renderer)
-            self._virtual_images = VirtualImages(walk.renderer)
-        if self._shot is None or self._shot.number != task.shot:
-            self._shot = None  # first, so that there is never memory for two
+            self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
+        if self._shot is None or not self._shot.is_of(task, inputs, walk):
+            self._shot, self._frames = None, Frames()  # free memory before the next shot allocates
             segments = inputs.analysis.segments(walk.settings[DecoupledSettings].spacing)[task.shot]
-            self._shot = Shot(task.shot, segments, inputs, walk, self._integrator, self._virtual_images)
+            self._shot = Shot(task.shot, segments, inputs, walk, *self._kernels[1:])
         return self._shot

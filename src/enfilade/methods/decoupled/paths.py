@@ -1,4 +1,4 @@
-"""Paths through a scene, as lanes: lists that are compacted from bounce to bounce."""
+"""Paths through a scene, as lanes that are compacted from bounce to bounce."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def spawn(rays: Rays, rng: Any, spread: float) -> Path:
         spread=dr.opaque(Float, spread, count),
         rng=rng,
     )
-    # Evaluate now: memory of NumPy's can't be freed while a kernel is recorded.
+    # Evaluate now: memory shared with NumPy can't be freed while a kernel is recorded.
     dr.eval(path)
     return path
 
 
 def compact(path: Path, lanes: Any) -> Path:
-    """The paths of some lanes; paths added as padding are not active."""
+    """Gather the paths of a list of lanes; paths added as padding are not active."""
     if not dr.width(lanes):
         return Path(UInt(), path.rays, path.bounce, path.throughput, path.width, path.spread, path.rng)
     lanes, is_real = padded(lanes)

@@ -1,7 +1,7 @@
-"""The irradiance prepass: a rough estimate at half resolution, which final gathering looks up.
+"""The irradiance prepass: a rough estimate at half resolution, looked up by final gathering.
 
-A gathered bounce lands at many places, so that the irradiance there may be rough (Ward and Heckbert 1992;
-Jensen 1996).
+A final gather averages the irradiance of many points, so that it may be rough at each of them (Ward and
+Heckbert 1992; Jensen 1996).
 """
 
 from __future__ import annotations

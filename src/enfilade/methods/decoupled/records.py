@@ -14,13 +14,13 @@ F16 = npt.NDArray[np.float16]
 
 @dataclass(frozen=True, eq=False)
 class IrradianceImage:
-    """Light that arrives at the surfaces that a keyframe shows.
+    """Irradiance of the surfaces in an image.
 
     Attributes
     ----------
     direct, indirect : Shading
-        Of shape (H, W): radiance that the diffuse lobe would reflect if the albedo were one, that is
-        irradiance over pi, by light straight from emitters and by all other; 0 where it is not known.
+        Of shape (H, W): irradiance over pi, that is radiance reflected by the diffuse lobe at an albedo of
+        one, from emitters directly and by all other light; 0 where it was not estimated.
     is_known : (H, W) bool
         Pixels whose irradiance was estimated.
     """
@@ -59,7 +59,7 @@ class ShadedFrame:
         Radiance emitted, and reflected by diffuse lobes.
     reflection : SpecularAov
     transmission : SpecularAov or None
-        Straight through clear surfaces; None where the frame shows none.
+        Straight through clear surfaces; None for frames without any.
     provenance : (H, W) uint8
         :class:`enfilade.records.Provenance`.
     """
@@ -71,5 +71,5 @@ class ShadedFrame:
 
     @property
     def specular(self) -> list[SpecularAov]:
-        """The specular AOVs that there are."""
+        """The specular AOVs of the frame."""
         return [aov for aov in (self.reflection, self.transmission) if aov is not None]

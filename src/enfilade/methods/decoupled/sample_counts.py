@@ -1,4 +1,4 @@
-"""Numbers of samples that follow from the quality: a pilot pass for irradiance, edges, specular lobes."""
+"""Numbers of samples as functions of the quality: irradiance (by a pilot pass), edges, specular lobes."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from enfilade.settings import DecoupledSettings
 
 PILOT_SPP = 4  # of each of the two images that the pilot compares
 IRRADIANCE_SPP = 4, 256  # fewest and most
-MIN_DIFFUSE = 0.5  # of the most diffuse pixels of any keyframe: the pilot uses no keyframe with fewer
-EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel takes more camera rays
+MIN_DIFFUSE = 0.5  # of the largest number of diffuse pixels of a keyframe: the pilot uses none with fewer
+EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel has more camera rays
 EDGE_SPP = 256.0, 8, 64  # of a pixel at an edge, at a quality of one JND; fewest and most
-SPECULAR_SPP = 34.0, 2, 34  # of a pixel with specular lobes, likewise, by the root of the quality
+SPECULAR_SPP = 34.0, 2, 34  # of a pixel with specular lobes; the same, by the root of the quality
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 FFT_THREADS = 2
 
 
 def run_pilot(shot: Shot) -> Output:
-    """Choose the paths a pixel of irradiance images: measure the visible difference of two rough images."""
+    """Choose the paths a pixel of irradiance images by the visible difference of two rough ones."""
     settings = shot.settings
     frame = _pilot_frame(shot)
     where = shot.walk.view(frame).geometry.has_diffuse
@@ -48,7 +48,7 @@ def irradiance_spp(jnd: float, quality: float, keyframes: int) -> int:
     keyframes
         Of the shot.
     """
-    # Either image has half of the squared difference; accumulation shares the rest among the images.
+    # Each image has half of the squared difference, which accumulation divides by the number of images.
     images = max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
     spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * images)
     return int(np.clip(4 * math.ceil(spp / 4), *IRRADIANCE_SPP))
@@ -67,12 +67,13 @@ def specular_spp(settings: DecoupledSettings) -> int:
 def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
 
-    The first camera rays may miss them, and few hits among many rays would lose most of their light.
+    The first camera rays may miss them, and more rays for the pixels that were hit by chance would lose most
+    of their energy.
 
     Parameters
     ----------
     emitters
-        Points on them.
+        Points on all emitters.
     geometry
         G-buffer of the frame.
     """
@@ -86,7 +87,7 @@ def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
     depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
 
-    # Leave out occluded ones, and pixels that have the same emitter all around.
+    # Leave out occluded points, and the interior of large emitters.
     farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
     farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
     lowest, highest = (

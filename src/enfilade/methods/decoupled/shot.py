@@ -1,4 +1,4 @@
-"""The irradiance of a shot: its keyframes, their images on the device, and their weights at a frame."""
+"""The irradiance of a shot: keyframes, their images on the device, and the weights of images at a frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.methods.analysis import keyframes_of
-from enfilade.methods.base import Inputs
+from enfilade.methods.base import Inputs, Task
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -30,10 +30,10 @@ from enfilade.renderer import LobeRenderer
 from enfilade.settings import DecoupledSettings
 
 ACCUMULATED = 4  # keyframes to each side that are averaged with one
-PREPASS_IMAGES = 4  # nearest ones in which a point is looked up
-HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries a frame uses
-DISOCCLUSION_IMAGES = 2  # in which a frame looks: the ones before and after it
-MIN_WEIGHT = 1e-3  # of an image: it counts where no other shows the surface
+PREPASS_IMAGES = 4  # nearest ones that are looked up
+HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
+DISOCCLUSION_IMAGES = 2  # that are looked up: before and after a frame
+MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 
 
 class Shot:
@@ -69,7 +69,7 @@ class Shot:
         self.integrator = integrator
         self.virtual_images = virtual_images
         self.settings = walk.settings[DecoupledSettings]
-        # Sizes such that a walk along the path uploads and accumulates each image once.
+        # Sized so that each image is uploaded and accumulated once along the path.
         self._prepass: LruCache[int, UploadedImage] = LruCache(2 * ACCUMULATED + 1 + PREPASS_IMAGES)
         self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
@@ -79,6 +79,10 @@ class Shot:
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
         self._disocclusions: dict[int, list[int]] | None = None
 
+    def is_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> bool:
+        """Whether its caches are valid for a task."""
+        return self.number == task.shot and self.inputs is inputs and self.walk is walk
+
     @property
     def renderer(self) -> LobeRenderer:
         """The renderer."""
@@ -86,7 +90,7 @@ class Shot:
         return self.walk.renderer
 
     def prepass_cache(self, frame: int) -> IrradianceCache:
-        """The prepass images near a frame, accumulated; always as many, so that one kernel serves all."""
+        """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
         missing = PREPASS_IMAGES - len(images)
@@ -107,20 +111,20 @@ class Shot:
         return self._hash_grid[1]
 
     def caches(self, frame: int) -> tuple[IrradianceCache, IrradianceCache]:
-        """Irradiance reprojected to the very view of a frame, and the images near it.
+        """Irradiance reprojected to the view of a frame, and the images near it.
 
-        Weights are such that no image comes or goes abruptly.
+        The weights change continuously along the path.
         """
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
         images, shares = [self._accumulated_image(f) for f in weights], list(weights.values())
         view = reproject_to(self.walk.view(frame).geometry, images, shares)
-        # Always as many images, so that one kernel serves all frames.
+        # Fill up to a fixed number of images, so that one kernel serves all frames.
         missing = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES - len(images)
         images, shares = [*images, *[images[0]] * missing], [*shares, *[0.0] * missing]
         return IrradianceCache.of([view], [1.0]), IrradianceCache.of(images, shares, self.hash_grid(frame))
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
-        """Diffuse pixels of a frame that neither the keyframes nor some other images show, (H, W)."""
+        """Diffuse pixels of a frame that neither the nearest keyframes nor other images show, (H, W)."""
         geometry = self.walk.view(frame).geometry
         near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)
         return geometry.has_diffuse & ~is_covered(geometry, [*map(self.image, near), *others.values()])
@@ -151,7 +155,7 @@ class Shot:
         return self._accumulated_prepass.get(frame, make)
 
     def _accumulated_image(self, frame: int) -> UploadedImage:
-        """An irradiance image, averaged with all images around it."""
+        """An irradiance image, averaged with the images around it."""
 
         def make() -> UploadedImage:
             around = nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1)
@@ -161,7 +165,7 @@ class Shot:
             is_keyframe = frame in self.keyframes
             own = self.inputs.record("irradiance" if is_keyframe else "disocclusion", frame)
             geometry = self.walk.view(frame).geometry
-            # A disocclusion image shows too little for a denoiser.
+            # Disocclusion images are too sparse for a denoiser.
             has_denoiser = self.settings.denoiser != "none" and is_keyframe
             denoiser = partial(self._denoised, geometry) if has_denoiser else None
             return accumulate(geometry, own.is_known, images, denoiser)
@@ -170,11 +174,11 @@ class Shot:
 
     def _denoised(self, geometry: Geometry, light: F32) -> F32:
         has_diffuse = geometry.has_diffuse[..., None].astype(np.float32)
-        white = np.broadcast_to(has_diffuse, light.shape)  # irradiance has no albedo in it
+        white = np.broadcast_to(has_diffuse, light.shape)  # irradiance is without albedo
         return denoise(light, white, geometry.normal, quality=self.settings.denoiser)
 
     def _keyframe_weights(self, frame: int) -> dict[int, float]:
-        """Weights of the nearest keyframes, which fall to nothing where another one takes over."""
+        """Weights of the nearest keyframes, which fall to zero where the next one replaces them."""
         count = self.settings.lookup_keyframes
         *near, beyond = nearest(self.walk.path, self.keyframes, frame, count + 1)
         reach = float(self._distance(frame, beyond))
@@ -183,10 +187,9 @@ class Shot:
         return {f: max(1.0 - self._distance(frame, f) / reach, MIN_WEIGHT) for f in near}
 
     def _disocclusion_weights(self, frame: int) -> dict[int, float]:
-        """Weights of the disocclusion images before and after a frame, which blend into each other.
+        """Weights of the disocclusion images before and after a frame, which are blended linearly.
 
-        The outermost ones of a segment fall to nothing at its ends, where those of the next segment take
-        over.
+        The outermost ones of a segment fall to zero at its ends, where the next segment has its own.
         """
         segment = self._segment(frame)
         pair = either_side(self.disocclusions()[segment.first], frame)
@@ -202,7 +205,7 @@ class Shot:
 
     def _segment(self, frame: int) -> Segment:
         """The segment of a frame, whose disocclusion images it uses."""
-        # The last segment ends where the camera stops: all frames after it show the same.
+        # The last segment ends where the camera stops: all frames after it repeat its pose.
         return next((s for s in self.segments if frame <= s.last), self.segments[-1])
 
     def disocclusions(self) -> dict[int, list[int]]:
@@ -217,12 +220,12 @@ class Shot:
 
 
 def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list[int]:
-    """The frames of a list that are nearest on the path, nearest first; repeated poses are no distance."""
+    """The frames of a list that are nearest on the path, nearest first; repeated poses do not count."""
     here = path.distance(frame)
     return sorted(frames, key=lambda k: (abs(path.distance(k) - here), k))[:count]
 
 
 def either_side(frames: list[int], frame: int) -> list[int]:
-    """The last frame of a list that is not after one, and the first one that is not before."""
+    """The last frame of a list up to a frame, and the first one from it on."""
     before, after = [f for f in frames if f <= frame], [f for f in frames if f >= frame]
     return sorted({*before[-1:], *after[:1]})

@@ -1,4 +1,4 @@
-"""The specular filter: AOVs smoothed along visible surfaces, and accumulated over time along their own motion."""
+"""The specular filter: AOVs smoothed along the surfaces seen in them, and accumulated along their motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import Array3f, Float, halves, image, lanes, opaque, vector3, widened
-from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX, LUMINANCE
+from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX
+from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.irradiance_cache import (
     MIN_WEIGHT,
     PLANE_TOLERANCE,
@@ -24,13 +25,13 @@ from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
 from enfilade.records import F32, Geometry, Mask, Shading
 
-NOISE_SHARE = 0.5  # of the spread of samples: low-discrepancy samples are less noisy than their spread
+NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than their spread
 FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 
 
 def filter_spatially(virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask) -> list[SpecularAov]:
-    """Smooth specular AOVs along the surfaces that are seen in them, as far as their noise requires.
+    """Smooth specular AOVs along the surfaces that are seen in them by the wavelet filter.
 
     Parameters
     ----------
@@ -39,27 +40,31 @@ def filter_spatially(virtual: Sequence[Geometry], aovs: Sequence[Shading], where
     aovs
         Of shape (H, W).
     where : (H, W) bool
-        Pixels that were sampled. Other pixels of the same shapes do not contribute.
+        Pixels that were sampled; others do not contribute.
 
     Returns
     -------
     list of SpecularAov
     """
     height, width = where.shape
-    # Find fireflies in the sum: in a single AOV that few rays hit, each of them would be one.
+    # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
     weights = firefly_weights(total, width=width, height=height, times=FIREFLY)
     return [_filtered(g, aov, where, weights) for g, aov in zip(virtual, aovs, strict=True)]
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
-    # The normals of virtual images are not those of the planes that they appear to lie in: ignore their
-    # depths.
+    """Clamp the fireflies of an AOV by their weights, smooth it, and antialias its edges."""
+    # Ignore the depths of virtual images: their normals are not those of the planes that they appear to form.
     is_real = geometry.shape_index < IN_VIRTUAL_IMAGE
     geometry = replace(geometry, depth=np.where(is_real, geometry.depth, np.float32(0)))
+
+    # Smooth along surfaces.
     noise = NOISE_SHARE * lanes(aov.variance)
     groups = np.where(where, geometry.shape_index, np.uint32(0))
     light, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
+
+    # Antialias edges.
     height, width = aov.variance.shape
     light = soften_edges(
         light, lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
@@ -69,7 +74,7 @@ def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> Sp
 
 
 def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:
-    """A filtered AOV on the device.
+    """Upload a filtered AOV.
 
     Parameters
     ----------
@@ -77,7 +82,7 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
         G-buffer of the frame with the AOV's virtual images.
     aov
     where : (H, W) bool
-        Pixels that have it.
+        Pixels that were sampled.
     """
     layers = [(lanes(widened(aov.color)), lanes(np.square(widened(aov.deviation))))]
     return upload_layers(geometry, lanes(where), layers, has_normals=False)
@@ -88,8 +93,8 @@ def accumulate_temporally(
 ) -> F32:
     """Average an AOV with that of neighbouring frames, reprojected along its own motion.
 
-    Virtual images are reprojected where they appear to be. Values that differ from the frame's own by more
-    than its noise weigh less, so that highlights and rough reflections stay where they are.
+    Virtual images are reprojected at their apparent positions. Values that differ from the frame's own by
+    more than their noise weigh less, so that highlights and rough reflections, which move otherwise, remain.
 
     Parameters
     ----------
@@ -98,20 +103,21 @@ def accumulate_temporally(
     here
         The AOV of the frame.
     others
-        The same AOV of other frames with their weights; that of the frame is one.
+        The same AOV of other frames, with weights relative to the frame's own.
 
     Returns
     -------
     (H, W, 3) float32
-        0 where the frame has none.
+        0 where the frame was not sampled.
     """
     (color,), (variance,) = here.values, here.variances
+
+    # Compute the apparent positions; virtual images face the eye.
     position = points_of(geometry, here.depths)
-    # Virtual images face the eye.
     is_real = here.shape_indices < IN_VIRTUAL_IMAGE
     normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
     total, weight = Array3f(color), dr.ones(Float, dr.width(color))
-    luminance = dr.dot(color, Array3f(*LUMINANCE))
+    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, luminance)
     for other, share in others:
         # Reproject.
@@ -120,7 +126,7 @@ def accumulate_temporally(
         value, noise = found.totals[0] * scale, found.variances[0] * scale
 
         # Weight by the difference, in units of the noise.
-        difference = dr.abs(dr.dot(value, Array3f(*LUMINANCE)) - luminance)
+        difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - luminance)
         counts = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
         counts = dr.select(found.weight > MIN_WEIGHT, opaque(share) * counts, 0.0)
 

@@ -1,4 +1,4 @@
-"""Virtual images: the apparent places of surfaces seen in mirrors and through glass (§5.4's future work).
+"""Virtual images: apparent positions of surfaces seen in mirrors and through glass (future work of §5.4).
 
 Reprojecting them gives motion vectors of reflections and transmissions (Zimmer et al. 2015).
 """
@@ -13,24 +13,22 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, matrix3, opaque, rows, vector3
+from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, opaque, rows
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.rays import pinhole_directions
+from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.paths import Path, compact, spawn
 from enfilade.records import Geometry, SurfaceClass
-from enfilade.renderer import LobeRenderer, Rays
+from enfilade.renderer import LobeRenderer
 
 __all__ = ["IN_VIRTUAL_IMAGE", "VirtualImages"]
 
-IN_VIRTUAL_IMAGE = np.uint32(
-    1 << 30
-)  # added to the index of a shape that is seen in a mirror or through glass
+IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mirrors or through glass
 CLEAR = (SurfaceClass.TRANSPARENT,)
 SHARP = (SurfaceClass.MIRROR, *CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
-REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that choose the reflecting and the transmitting lobe
-MAX_INTERFACES = 8  # mirrors and panes in a row
+REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the reflecting or transmitting lobe
+MAX_INTERFACES = 8  # mirrors and panes along a path
 
 
 class VirtualImages:
@@ -46,24 +44,26 @@ class VirtualImages:
         self._extend = recorded(self._extend_kernel, lambda: renderer.state)
 
     def reflected(self, geometry: Geometry) -> Geometry:
-        """The G-buffer of a frame with the virtual images in mirrors, and in panes as far as they reflect.
+        """The G-buffer of a frame with the virtual images of reflections in mirrors and panes.
 
-        Pixels on a mirror or pane get shape index (plus :data:`IN_VIRTUAL_IMAGE`) and normal of the surface
-        at the end of the chain, and the depth of the virtual image: the length of the whole path, which is
-        exact for plane mirrors. All other pixels stay.
+        Pixels of mirrors and panes have the shape index (plus :data:`IN_VIRTUAL_IMAGE`) and normal of the
+        surface at the end of the path, and the depth of its virtual image: the length of the whole path,
+        which is exact for plane mirrors. All other pixels stay.
         """
         return self._image(geometry, SHARP, REFLECT)
 
     def transmitted(self, geometry: Geometry) -> Geometry:
-        """The G-buffer of a frame with the surfaces behind panes; as :meth:`reflected`, but mirrors stay."""
+        """The G-buffer of a frame with the virtual images of surfaces behind panes; see :meth:`reflected`."""
         return self._image(geometry, CLEAR, TRANSMIT)
 
     def _image(self, geometry: Geometry, kinds: Sequence[SurfaceClass], choice: float) -> Geometry:
+        # Spawn a path at each mirror and pane.
         pixels = np.flatnonzero(np.isin(geometry.surface, kinds)).astype(np.uint32)
         if not len(pixels):
             return geometry
         shape_index, normal = geometry.shape_index.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
-        path = spawn(*_centre_rays(geometry.camera, pixels), spread=0.0)
+        rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
+        path = spawn(rays, PCG32(len(pixels)), spread=0.0)
         path = compact(path, path.lane)
         length = np.ones(len(shape_index), np.float32)  # of the path, in distances of the first surface
         first = geometry.depth.ravel() * _lengths(geometry.camera)
@@ -72,7 +72,7 @@ class VirtualImages:
             path, found, turned, distance, is_image, is_sharp = self._extend(path, opaque(choice))
             choice = TRANSMIT  # a pane seen in a mirror shows the surface behind it
 
-            # Replace the surface by the next one, where the interface forms an image: rough glass forms none.
+            # Replace the surface by the next one where the interface forms an image; rough glass forms none.
             shown = np.array(is_image)[:count]
             lane = pixels[np.array(path.lane)[:count][shown]]
             shape_index[lane] = np.array(found)[:count][shown] + IN_VIRTUAL_IMAGE
@@ -80,7 +80,7 @@ class VirtualImages:
             far = np.array(distance)[:count][shown] / first[lane]
             length[lane] = np.minimum(length[lane] + far, SKY_DISTANCE)
 
-            # Go on where the next surface is another interface.
+            # Keep the paths whose next surface is another interface.
             onward: Any = dr.compress(is_sharp)
             count = dr.width(onward)
             if not count:
@@ -95,44 +95,35 @@ class VirtualImages:
         )
 
     def _extend_kernel(self, path: Path, choice: Any) -> tuple[Path, Any, Any, Any, Any, Any]:
-        """Reflect or transmit the paths at the next surface, and intersect the one after.
+        """Reflect or transmit paths at the next surface, and intersect the following one.
 
         Returns
         -------
         path
         shape_index, normal, distance
-            Of the surface after.
+            Of the following surface.
         is_image : Bool
             Whether the interface forms an image.
         is_sharp : Bool
-            Whether the surface after may form another.
+            Whether the following surface may form another one.
         """
+        # Scatter.
         rng = PCG32(path.rng)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
         sample = self._renderer.sample_specular(point, rng, choice)
         ahead = replace(path, rays=sample.rays, bounce=sample.bounce, rng=rng)
+
+        # Intersect.
         surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces
         is_sharp = Bool(False)
         for sharp in SHARP:
             is_sharp |= surfaces.surface == int(sharp)
         shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)
-        # Give the sky a single normal, so that it is smoothed.
+        # Give the sky a single normal, so that the filter treats it as one surface.
         normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
         is_image = sample.is_alive & sample.bounce.is_delta
         is_sharp &= surfaces.is_hit & is_image
         return ahead, shape_index, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
-
-
-def _centre_rays(camera: Camera, pixels: npt.NDArray[np.uint32]) -> tuple[Rays, Any]:
-    """Rays through the centres of pixels, with a generator each."""
-    pixel = lanes(pixels)
-    row = pixel // opaque(camera.width)
-    direction = pinhole_directions(
-        Float(pixel - row * opaque(camera.width)) + 0.5,
-        Float(row) + 0.5,
-        direction_from_pixel=matrix3(camera.direction_from_pixel),
-    )
-    return Rays(vector3(camera.eye), direction), PCG32(dr.width(pixel))
 
 
 def _lengths(camera: Camera) -> npt.NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""Edge-avoiding wavelets: noise is smoothed along surfaces, and not across features."""
+"""Edge-avoiding wavelets (Dammertz et al. 2010; Schied et al. 2017), fireflies, and soft edges."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import drjit as dr
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, opaque, pixel_grid
+from enfilade.kernels.tone import REC709_LUMINANCE
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # linear Rec.709
 TINY = 1e-8
-ALL = 1e12  # deviations: any difference
-# Neighbours at a later level are averages over common pixels. They reduce the logarithm of the variance by
-# this part of what independent ones would (exact for a flat image), by 0.535 from the fifth level on.
-INDEPENDENT = (1.0, 0.613, 0.552, 0.539)
+ALL = 1e12  # deviations: no difference of luminance counts
+# Neighbours at later levels are correlated, since they are averages over common pixels. They reduce the
+# logarithm of the variance by this part of the reduction by independent ones (exact for a flat image).
+INDEPENDENT, INDEPENDENT_BEYOND = (1.0, 0.613, 0.552, 0.539), 0.535
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Guide:
     depths : Float
     normals : Array3f
     shape_indices : UInt
-        Images, width * height lanes; shape 0 is nothing.
+        Images, width * height lanes. Pixels of different shapes do not mix.
     direction_from_pixel : Matrix3f
         Of the camera.
     width, height : int
@@ -49,7 +49,7 @@ class Guide:
 
 
 def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: float) -> tuple[Any, Any]:
-    """Smooth an image along its surfaces, as far as its noise requires.
+    """Smooth an image along its surfaces, where it differs within its noise.
 
     Edge-avoiding a-trous wavelets (Dammertz et al. 2010), guided by the variance (Schied et al. 2017).
 
@@ -60,7 +60,7 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
         Of the luminance.
     guide
     levels
-        Of the wavelet: the last one reaches 2 ** levels pixels to each side.
+        Of the wavelet; the last one reaches 2 ** levels pixels to each side.
     deviations
         Difference of luminance, in standard deviations, at which a pixel's weight falls to 1/e.
 
@@ -73,23 +73,23 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
     related = Float(1)  # variance of the result over that of independent pixels
     for level in range(levels):
         color, variance, share = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
-        part = INDEPENDENT[level] if level < len(INDEPENDENT) else 0.535
+        part = INDEPENDENT[level] if level < len(INDEPENDENT) else INDEPENDENT_BEYOND
         related *= share ** (part - 1.0)
         dr.eval(color, variance, related)
     return color, variance * related
 
 
 def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float) -> tuple[Any, Any, Any]:
-    """One level: colour, its variance as of independent pixels, and that over the variance before."""
-    # Blur the variance, and take luminance as the measure of difference.
+    """One level: colour, variance as if pixels were independent, and the ratio of that to the one before."""
+    # Blur the variance, and compute the luminance.
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
     spread = _blurred(variance, column, row, width, height)
     dr.eval(spread)
-    luminance = dr.dot(color, Array3f(*LUMINANCE))
+    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
 
-    # Prepare the distance of a tap from this pixel's tangent plane.
+    # Prepare the distance of taps from this pixel's tangent plane.
     normal = dr.gather(Array3f, guide.normals, lane)
     depth = dr.gather(Float, guide.depths, lane)
     shape_index = dr.gather(UInt, guide.shape_indices, lane)
@@ -106,27 +106,31 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
             if not across and not down:
                 weight += Float(weight_x * weight_y)
                 continue
-            # Weight the tap by surface, then by luminance in units of the noise, the same seen from both
-            # sides.
+            # Weight the tap by the difference of luminance in units of the noise of both pixels.
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.shape_indices, tap) == shape_index)
             other = dr.gather(Array3f, color, tap)
             deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
-            difference = dr.abs(dr.dot(other, Array3f(*LUMINANCE)) - luminance) / deviation
+            difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance) / deviation
+
+            # Weight it by the distance from the tangent plane, and by the cosine of the normals.
             beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
             cosine: Any = dr.clip(dr.dot(normal, dr.gather(Array3f, guide.normals, tap)), 0.0, 1.0)
             surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**guide.normal_exponent
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
+
+            # Accumulate.
             share = surface * dr.exp(-difference)
             total += share * other
             total_variance += share * share * dr.gather(Float, variance, tap)
             squares += share * share
             weight += surface
             taken += share
-    # Replace the weight of taps that differ too much by the pixel itself: leaving them out of the mean
-    # would lose light that few pixels have found.
+
+    # Give the weight of taps that differ too much to the pixel itself: leaving them out of the mean would
+    # lose the energy of rare bright samples.
     own = weight - taken
     total += own * color
     total_variance += own * own * variance
@@ -147,17 +151,20 @@ def spread_fireflies(
         Of the luminance.
     guide
     times
-        Limit, in units of the second brightest neighbour's luminance, as fireflies come in pairs, too.
+        Limit, in units of the second brightest neighbour's luminance, since fireflies also come in pairs.
     levels
-        Of the wavelet that spreads it, as of :func:`smooth`.
+        Of the wavelet that spreads them, as of :func:`smooth`.
 
     Returns
     -------
     color : Array3f
     variance : Float
     """
+    # Split the image into its clamped part and the remainder.
     kept = firefly_weights(color, width=guide.width, height=guide.height, times=times, rank=2)
     beyond = 1.0 - kept
+
+    # Smooth the remainder, and add it again.
     spread, spread_variance = smooth(
         beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
     )
@@ -179,7 +186,9 @@ def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: 
     """
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
-    luminance = dr.abs(dr.dot(color, Array3f(*LUMINANCE)))
+
+    # Find the brightest neighbours.
+    luminance = dr.abs(dr.dot(color, Array3f(*REC709_LUMINANCE)))
     dr.eval(luminance)
     brightest = [Float(0)] * rank
     for down in (-1, 0, 1):
@@ -190,6 +199,8 @@ def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: 
                 around = dr.gather(Float, luminance, UInt(j * columns + i), is_inside)
                 for place, other in enumerate(brightest):
                     brightest[place], around = dr.maximum(other, around), dr.minimum(other, around)
+
+    # Clamp.
     limit = times * brightest[-1]
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
 
@@ -197,17 +208,17 @@ def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: 
 def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sigma: float) -> Any:
     """Antialias the edges between shapes as a Gaussian pixel filter does; Array3f.
 
-    Smoothing treats each pixel as the shape at its centre, which leaves stairs.
+    The wavelet filter treats each pixel as the shape at its centre, which leaves aliased edges.
 
     Parameters
     ----------
     color : Array3f
         Image, width * height lanes.
     shape_indices : UInt
-        The same.
+        Likewise.
     width, height
     sigma
-        Standard deviation of the filter, pixels, of which 3x3 pixels are taken.
+        Standard deviation of the filter, pixels; its support is 3x3 pixels.
     """
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
@@ -225,7 +236,7 @@ def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sig
 
 
 def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
-    """Variance averaged over 3x3 pixels, since that of a single one is noisy."""
+    """Variance, blurred over 3x3 pixels to reduce its own noise."""
     spread = Float(0)
     for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
         for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):

@@ -1,4 +1,4 @@
-"""Gaussian convolution whose width changes from pixel to pixel."""
+"""Gaussian convolution whose width varies from pixel to pixel."""
 
 from __future__ import annotations
 
@@ -8,27 +8,31 @@ import drjit as dr
 
 from enfilade.arrays import Array3f, Float, Int, UInt, opaque, pixel_grid
 
-SIGMAS = 6.0  # a filter's support is six standard deviations: three pixels for a sigma of one half
+SIGMAS = 6.0  # support in standard deviations: three pixels for a standard deviation of one half
 
 
 def blur_axis(values: Any, support: Any, *, width: int, height: int, axis: int) -> Any:
-    """Convolve an image along one axis with a Gaussian of each pixel's own support.
+    """Convolve an image along one axis with a Gaussian of each pixel's own support; Array3f.
 
-    Both axes one after the other make the two-dimensional Gaussian, exactly where the support is
-    constant. Beyond the border there is nothing: weights are normalised over what there is.
+    Both axes one after the other are the two-dimensional Gaussian, exactly where the support is constant.
+    At the border the weights are normalized over the pixels inside.
 
     Parameters
     ----------
     values : Array3f
+        Image, width * height lanes.
     support : Float
-        Full width of the filter, pixels; its standard deviation is a sixth of that.
+        Full width of the filter, pixels; :data:`SIGMAS` standard deviations.
     width, height
     axis
         0 along x, 1 along y.
     """
+    # Address the taps: lane + offset * stride.
     lane, column, row = pixel_grid(height, width)
     at, size, stride = (column, width, 1) if axis == 0 else (row, height, width)
     at, last = Int(at), opaque(size - 1, Int)
+
+    # Prepare each pixel's Gaussian.
     sigma = support / SIGMAS
     falloff = -0.5 / (sigma * sigma)
     radius = Int(dr.floor(0.5 * support))
@@ -37,10 +41,11 @@ def blur_axis(values: Any, support: Any, *, width: int, height: int, axis: int) 
         where = at + offset
         is_inside = (where >= 0) & (where <= last)
         w = dr.select(is_inside, dr.exp(falloff * Float(offset * offset)), 0.0)
-        source = UInt(Int(lane) + offset * stride)
-        total = total + w * dr.gather(Array3f, values, source, is_inside)
+        tap = UInt(Int(lane) + offset * stride)
+        total = total + w * dr.gather(Array3f, values, tap, is_inside)
         return offset + 1, total, weight + w
 
+    # Sum up the taps of the support, and normalize.
     _, total, weight = dr.while_loop(
         state=(Int(-radius), Array3f(0), Float(0)),
         cond=lambda offset, *_: offset <= radius,

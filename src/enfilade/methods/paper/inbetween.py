@@ -14,10 +14,10 @@ from enfilade.settings import MaskSettings, SamplingSettings, WarpSettings
 
 
 def fill_slow_pixels(walk: Walkthrough, frame: int, shading: Shading) -> tuple[Frame, int]:
-    """A keyframe whose slow pixels are traced again.
+    """A keyframe whose slow pixels are traced again, with paths spread over the pixel.
 
-    The temporal filter finds no new samples for them along the motion (§5.2), so that paths spread over the
-    pixel antialias them. The keyframe that is warped keeps its paths through the pixels' centres.
+    The temporal filter finds no new samples for them along the motion (§5.2), so that they must be
+    antialiased here. The keyframe that is warped keeps its paths through the pixels' centres.
 
     Returns
     -------

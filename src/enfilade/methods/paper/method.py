@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from enfilade.settings import (
     WarpSettings,
 )
 
-MIN_SPP = 2  # the metric's allowance for noise needs the spread of a pixel's paths
+MIN_SPP = 2  # the variance of a pixel, for the metric, is that of its paths
 CACHED_KEYFRAMES = 3
 
 
@@ -57,9 +58,7 @@ class Paper(Method):
     )
 
     def __init__(self) -> None:
-        self._keyframes: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
-        self._slices: dict[int, tuple[Slice, Frame]] = {}
-        self._refinement: Refinement | None = None
+        self._context: _Context | None = None
 
     def check(self, settings: Settings) -> None:
         """Refuse a single path a pixel.
@@ -70,8 +69,8 @@ class Paper(Method):
         """
         if settings[SamplingSettings].spp < MIN_SPP:
             raise SettingsError(
-                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences by the spread "
-                "of a pixel's paths"
+                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences "
+                "by the spread of a pixel's paths"
             )
 
     def keyframes(self, analysis: Analysis) -> list[int]:
@@ -79,7 +78,7 @@ class Paper(Method):
         return [frame for segments in analysis.segments() for frame in keyframes_of(segments)]
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """Keyframes; a task for each initial segment, which splits it; all frames before and after filtering."""
+        """Initial keyframes, initial segments, and all frames before and after filtering."""
         path, settings = analysis.path, analysis.settings[AntialiasSettings]
         reach = max(settings.frames, settings.slow_frames) // 2
         shots = zip(path.shots(), analysis.segments(), strict=True)
@@ -100,84 +99,117 @@ class Paper(Method):
 
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
         """Do a task."""
+        if self._context is None or self._context.inputs is not inputs or self._context.walk is not walk:
+            self._context = _Context(inputs, walk)
         match task.pass_name:
             case "keyframes":
                 shading = _traced(walk, task.frame)
                 return Output({task.frame: shading}, {"dropped": shading.dropped})
             case "segments":
-                return self._refined(task, inputs, walk)
+                return _refined(task, self._context)
             case "inbetweens":
-                return self._inbetween(task, inputs, walk)
+                return _inbetween(task, self._context)
             case _:
-                return self._filtered(task, inputs, walk)
+                return _filtered(task, self._context)
 
-    def _refined(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Split an initial segment until reuse can't be seen in it; trace the keyframes that this inserts."""
-        if self._refinement is None:
-            self._refinement = Refinement(walk)
-        segment = next(s for s in inputs.analysis.segments()[task.shot] if s.first == task.frame)
-        inserted: dict[int, Shading] = {}
 
-        def keyframe(frame: int) -> Keyframe:
-            if frame in (segment.first, segment.last):
-                return self._keyframe(inputs, walk, frame, segment)
-            if frame not in inserted:
-                inserted[frame] = _traced(walk, frame)
-            geometry = walk.view(frame).geometry
-            return self._keyframes.get(frame, lambda: Keyframe(frame, geometry, inserted[frame]))
+class _Context:
+    """Inputs of the tasks of a walkthrough, and values that several of them use."""
 
-        results = self._refinement.refine(segment, keyframe)
-        facts = [result.to_table(walk.path.numbers) for result in results]
-        return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
+    def __init__(self, inputs: Inputs, walk: Walkthrough) -> None:
+        self.inputs = inputs
+        self.walk = walk
+        self.keyframes: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
+        self.slices: dict[int, tuple[Slice, Frame]] = {}
 
-    def _inbetween(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """A frame before filtering: a keyframe, a repeated one, or one derived from both keyframes around it."""
-        frame, path = task.frame, walk.path
-        static = path.static_frame(frame)
-        if static != frame:
-            color = inputs.record("inbetweens", static).color
-            return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.REUSED, np.uint8))})
-        segments = inputs.analysis.segments()[task.shot]
-        if frame in keyframes_of(segments):
-            made, dropped = fill_slow_pixels(walk, frame, inputs.record("keyframes", frame))
-            return Output({frame: made}, {"dropped": dropped})
-        initial = next(s for s in segments if s.first < frame < s.last)
-        tables = inputs.facts("segments", initial.first)["segments"]
-        results = [SegmentResult.from_table(table, path.numbers) for table in tables]
-        if any(result.is_split and result.middle == frame for result in results):
-            made, dropped = fill_slow_pixels(walk, frame, inputs.record("segments", frame))
-            return Output({frame: made}, {"dropped": dropped})
-        result = leaf_of(results, frame)
-        first, last = (self._keyframe(inputs, walk, k, initial) for k in (result.first, result.last))
-        made, dropped = derive(walk, result, first, last, frame)
+    @cached_property
+    def refinement(self) -> Refinement:
+        """Splits segments."""
+        return Refinement(self.walk)
+
+    def keyframe(self, frame: int, initial: Segment) -> Keyframe:
+        """A keyframe of an initial segment."""
+        pass_name = "keyframes" if frame in (initial.first, initial.last) else "segments"
+        return self.keyframe_of(frame, lambda: self.inputs.record(pass_name, frame))
+
+    def keyframe_of(self, frame: int, shading: Callable[[], Shading]) -> Keyframe:
+        """A keyframe with its shading."""
+        return self.keyframes.get(frame, lambda: Keyframe(frame, self.walk.view(frame).geometry, shading()))
+
+
+def _refined(task: Task, context: _Context) -> Output:
+    """Split an initial segment until reuse can't be seen; traces the keyframes that this inserts."""
+    walk = context.walk
+    segment = next(s for s in context.inputs.analysis.segments()[task.shot] if s.first == task.frame)
+    inserted: dict[int, Shading] = {}
+
+    def keyframe(frame: int) -> Keyframe:
+        if frame in (segment.first, segment.last):
+            return context.keyframe(frame, segment)
+        if frame not in inserted:
+            inserted[frame] = _traced(walk, frame)
+        return context.keyframe_of(frame, lambda: inserted[frame])
+
+    results = context.refinement.refine(segment, keyframe)
+    facts = [result.to_table(walk.path.numbers) for result in results]
+    return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
+
+
+def _inbetween(task: Task, context: _Context) -> Output:
+    """A frame before filtering: a repeated pose, a keyframe, or a frame derived from two keyframes."""
+    frame, inputs, walk = task.frame, context.inputs, context.walk
+
+    # Copy the frame of a repeated pose.
+    static = walk.path.static_frame(frame)
+    if static != frame:
+        color = inputs.record("inbetweens", static).color
+        return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.REUSED, np.uint8))})
+
+    # Complete an initial keyframe, or one that was inserted by a split.
+    segments = inputs.analysis.segments()[task.shot]
+    if frame in keyframes_of(segments):
+        made, dropped = fill_slow_pixels(walk, frame, inputs.record("keyframes", frame))
+        return Output({frame: made}, {"dropped": dropped})
+    initial = next(s for s in segments if s.first < frame < s.last)
+    tables = inputs.facts("segments", initial.first)["segments"]
+    results = [SegmentResult.from_table(table, walk.path.numbers) for table in tables]
+    if any(result.is_split and result.middle == frame for result in results):
+        made, dropped = fill_slow_pixels(walk, frame, inputs.record("segments", frame))
         return Output({frame: made}, {"dropped": dropped})
 
-    def _keyframe(self, inputs: Inputs, walk: Walkthrough, frame: int, initial: Segment) -> Keyframe:
-        pass_name = "keyframes" if frame in (initial.first, initial.last) else "segments"
-        return self._keyframes.get(
-            frame, lambda: Keyframe(frame, walk.view(frame).geometry, inputs.record(pass_name, frame))
-        )
+    # Derive all others from the keyframes of their segment.
+    result = leaf_of(results, frame)
+    first, last = (context.keyframe(k, initial) for k in (result.first, result.last))
+    made, dropped = derive(walk, result, first, last, frame)
+    return Output({frame: made}, {"dropped": dropped})
 
-    def _filtered(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """A delivered frame: antialiased along the motion (§5)."""
-        frame, settings = task.frame, walk.settings[AntialiasSettings]
-        reach = max(settings.frames, settings.slow_frames) // 2
-        window = _window(walk.path.shots()[task.shot], frame, reach)
-        kept = {f: entry for f, entry in self._slices.items() if f in window}
-        self._slices = kept | {f: _slice(inputs, walk, f) for f in window if f not in kept}
-        here, raw = self._slices[frame]
-        color = filter_along_flow(
-            here,
-            [self._slices[f][0] for f in sorted(window, reverse=True) if f < frame],
-            [self._slices[f][0] for f in window if f > frame],
-            temporal_limits(walk.viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
-            settings,
-        )
-        return Output({frame: Frame(color, raw.provenance)})
+
+def _filtered(task: Task, context: _Context) -> Output:
+    """A delivered frame: antialiased along the motion (§5)."""
+    frame, walk = task.frame, context.walk
+    settings = walk.settings[AntialiasSettings]
+
+    # Load the frames of the support, of which most were used for the previous frame.
+    reach = max(settings.frames, settings.slow_frames) // 2
+    window = _window(walk.path.shots()[task.shot], frame, reach)
+    kept = {f: entry for f, entry in context.slices.items() if f in window}
+    slices = kept | {f: _slice(context.inputs, walk, f) for f in window if f not in kept}
+    context.slices = slices
+
+    # Filter along the motion.
+    here, raw = slices[frame]
+    color = filter_along_flow(
+        here,
+        [slices[f][0] for f in sorted(window, reverse=True) if f < frame],
+        [slices[f][0] for f in window if f > frame],
+        temporal_limits(walk.viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
+        settings,
+    )
+    return Output({frame: Frame(color, raw.provenance)})
 
 
 def _traced(walk: Walkthrough, frame: int) -> Shading:
-    """A keyframe: paths start at the pixels' centres, where the G-buffer was found, so that each sees one surface."""
+    """A keyframe, traced through the pixels' centres as the G-buffer: each pixel shows a single surface."""
     size = walk.path.height, walk.path.width
     traced = walk.trace(
         frame,

@@ -1,4 +1,4 @@
-"""Adaptive refinement of keyframe placement: the metric decides which segments are split (§4.3)."""
+"""Adaptive refinement of keyframe placement: segments are split by the metric (§4.3)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from enfilade.metric import Aqm, Pursuit
 from enfilade.records import F32, Keyframe, Mask, Warped
 from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, ViewingSettings, WarpSettings
 
-MIN_JUDGED = 0.05  # share of the image: fewer unmasked pixels than this are not representative of a segment
-GAIN = 0.9  # a half must show less than this part of its parent's differences to be split again
+MIN_JUDGED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
+GAIN = 0.9  # of its parent's visible pixels: a half with more is not split again
 FFT_THREADS = 2
 
 
@@ -37,7 +37,7 @@ class SegmentResult:
     depth : int
         Number of splits that led to the segment.
     middle : int or None
-        The frame that was judged; None where there is none.
+        The frame that was judged; None for segments without in-betweens.
     reusable : frozenset of int
         Specular shapes whose reuse can't be seen; all others must be traced in the whole segment.
     percent_visible, percent_visible_no_pursuit : float
@@ -82,15 +82,15 @@ class SegmentResult:
 
 
 def leaf_of(results: Sequence[SegmentResult], frame: int) -> SegmentResult:
-    """The segment, not split any further, of which a frame is an in-between."""
+    """The unsplit segment of an in-between."""
     return next(r for r in results if not r.is_split and r.first < frame < r.last)
 
 
 class Refinement:
-    """Splits segments until the metric sees no difference between what is reused and what would be traced.
+    """Splits segments until the metric finds few visible differences between their warped keyframes.
 
     Splitting also ends where it does not help: differences that do not shrink with the segment, such as the
-    aliasing of keyframes sampled at pixel centres, are not differences of reuse.
+    aliasing of keyframes sampled at pixel centres, do not come from reuse.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Refinement:
         ----------
         initial
         keyframe
-            Gives a keyframe, which is traced where there is none yet.
+            Returns the keyframe at a frame, and traces it at the first call.
         """
         results: list[SegmentResult] = []
         pending: list[tuple[Segment, float]] = [(initial, np.inf)]
@@ -134,12 +134,12 @@ class Refinement:
         view, masks = walk.view(middle), walk.settings[MaskSettings]
         before, after = warped_pair(walk, keyframe(segment.first), keyframe(segment.last), middle)
 
-        # Compare where both keyframes show the surface.
+        # Compare at the pixels at which both keyframes show the surface.
         tolerance = walk.settings[WarpSettings].depth_tolerance
         is_judged = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
         jnd, jnd_no_pursuit = self._differences(view, before, after, is_judged)
 
-        # Mask the pixels that will be traced: slow ones, then specular shapes whose reuse would be seen.
+        # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.
         reusable = reusable_specular_shapes(jnd, is_judged, view.geometry, masks)
         is_slow = slow_pixels(view.speed_deg_s, masks)
         unmasked = is_judged & ~is_slow & ~specular_pixels(view.geometry, reusable)
@@ -159,15 +159,15 @@ class Refinement:
     def _differences(self, view: View, before: Warped, after: Warped, is_judged: Mask) -> tuple[F32, F32]:
         """JND maps between two warped keyframes, with smooth pursuit and without.
 
-        Both are filtered as the delivered frame will be. A difference that their noise explains does not
-        count.
+        Both are filtered spatially as the delivered frame will be. The metric discounts differences within
+        their noise.
         """
         walk = self._walk
         density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]
         support = spatial_support_px(view.speed_deg_s, density, settings)
         shown = [
             walk.display_luminance(
-                reconstruct(np.where(one.is_hole[..., None], other.color, one.color), support)
+                reconstruct(np.where(one.is_disoccluded[..., None], other.color, one.color), support)
             )
             for one, other in ((before, after), (after, before))
         ]

@@ -1,4 +1,4 @@
-"""The spatial part of the filter: a Gaussian as wide as the velocity allows (§5.2)."""
+"""The spatial part of the filter: a Gaussian whose width depends on the velocity (§5.2)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Forward splatting into a z-buffer: each source pixel covers the parallelogram that it stretches to.
 
-Shade et al. (1998) size splats by depth and orientation; here the size is the Jacobian of the warp on
-the surface's own plane, so that the splats of a plane tile it: no pinholes, and no bleeding over
+Shade et al. (1998) size splats by depth and orientation. Here a splat is the Jacobian of the warp on the
+surface's own plane, so that the splats of a plane tile it: there are no pinholes, and no bleeding over
 silhouettes beyond `OVERLAP`.
 """
 
@@ -14,19 +14,19 @@ import drjit as dr
 
 from enfilade.arrays import Bool, Float, Int, UInt, UInt64
 
-OVERLAP = 0.05  # how far a splat reaches into its neighbours, source pixels: closes hairline cracks
-EMPTY = 0xFFFF_FFFF_FFFF_FFFF  # key of a target pixel that nothing covers
-INFINITE = 3.0e38  # depth at which surfaces at infinity stand in the z-buffer
+OVERLAP = 0.05  # of a splat with its neighbours, source pixels: closes hairline cracks
+EMPTY = 0xFFFF_FFFF_FFFF_FFFF  # key of a target pixel without a splat
+INFINITE = 3.0e38  # depth of surfaces at infinity in the z-buffer
 
 
 @dataclass(frozen=True)
 class Splats:
-    """Source pixels as the parallelograms to which a warp stretches them; lanes of the source.
+    """Source pixels, stretched by a warp to parallelograms; lanes of the source.
 
     Attributes
     ----------
     x, y : Float
-        Where the pixels' centres land, target pixels.
+        Positions of the pixels' centres, target pixels.
     inverse_depth : Float
         One over the depth there, seen from the target; 0 at infinity.
     by_x, by_y : Array2f
@@ -55,14 +55,14 @@ def splat_nearest(splats: Splats, *, width: int, height: int, reach: float) -> A
     width, height
         Of the target.
     reach
-        Largest half extent of the box around a splat, target pixels; larger ones are left out, which
-        bounds the work.
+        Largest half extent of the box around a splat, target pixels. Larger splats are left out, which bounds
+        the cost.
 
     Returns
     -------
     UInt64, width * height
-        Depth (as the bits of a positive float) in the upper half, source lane in the lower half:
-        the smallest key is the nearest splat, whatever the order. `EMPTY` where there is none.
+        Depth (as the bits of a positive float) in the upper half, source lane in the lower half: the smallest
+        key is the nearest splat, in any order. `EMPTY` where there is none.
     """
     x, y, by_x, by_y = splats.x, splats.y, splats.by_x, splats.by_y
     keys = dr.full(UInt64, EMPTY, width * height)
@@ -73,7 +73,7 @@ def splat_nearest(splats: Splats, *, width: int, height: int, reach: float) -> A
     is_facing = splats.is_splat & (det > 1e-6)
     scale = dr.select(is_facing, 1.0 / det, 0.0)
 
-    # The target pixels whose centres the splat's bounding box holds.
+    # Find the target pixels whose centres lie in the splat's bounding box.
     half_x = (0.5 + OVERLAP) * (dr.abs(by_x.x) + dr.abs(by_y.x))
     half_y = (0.5 + OVERLAP) * (dr.abs(by_x.y) + dr.abs(by_y.y))
     is_facing &= (half_x <= reach) & (half_y <= reach)
@@ -84,13 +84,13 @@ def splat_nearest(splats: Splats, *, width: int, height: int, reach: float) -> A
     last_y = dr.minimum(Int(dr.floor(y + half_y - 0.5)), Int(height - 1))
 
     def cover(column: Any, row: Any) -> None:
-        # Where in the source pixel does the target's centre lie?
+        # Test whether the target's centre lies in the source pixel.
         dx, dy = Float(column) + 0.5 - x, Float(row) + 0.5 - y
         s = scale * (by_y.y * dx - by_y.x * dy)
         t = scale * (by_x.x * dy - by_x.y * dx)
         is_inside = (dr.abs(s) <= 0.5 + OVERLAP) & (dr.abs(t) <= 0.5 + OVERLAP)
 
-        # Depth of the plane there, as an integer of the same order.
+        # Write the depth of the plane there, as an integer of the same order.
         nearness = splats.inverse_depth + s * splats.slope.x + t * splats.slope.y
         depth = dr.select(nearness > 1.0 / INFINITE, 1.0 / nearness, INFINITE)
         bits = dr.reinterpret_array(UInt, depth)
@@ -98,6 +98,7 @@ def splat_nearest(splats: Splats, *, width: int, height: int, reach: float) -> A
         target = UInt(row * width + column)
         dr.scatter_reduce(dr.ReduceOp.Min, keys, key, target, is_inside)
 
+    # Cover the pixels of the box one after the other.
     column, row = Int(first_x), Int(first_y)
     is_open = is_facing & (first_x <= last_x) & (first_y <= last_y)
 

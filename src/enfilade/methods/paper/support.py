@@ -1,4 +1,4 @@
-"""How wide the filter is, by the velocity of the pattern (§5.2)."""
+"""Spatial and temporal support of the filter, by the velocity (§5.2)."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from enfilade.records import F32, Geometry
 from enfilade.settings import AntialiasSettings
 
 PAPER_PIXELS_PER_DEGREE = 27.928  # 640x480 on a diagonal of 0.25 m, seen from 0.5 m (§5.2)
-COVERED_PX = 0.5  # flow after which the samples along it cover the pixel (§5.2)
+COVERED_PX = 0.5  # length of a trajectory whose samples cover the pixel (§5.2)
 
 
 @dataclass(frozen=True, eq=False)
 class TemporalLimits:
-    """How far along the flow each pixel of a frame looks.
+    """Temporal support of the pixels of a frame.
 
     Attributes
     ----------
     reach : (H, W) float32
         Most frames to either side.
     least : (H, W) float32
-        Frames to either side before the growth may end; the same as `reach` where it does not grow.
+        Frames to either side before a slow trajectory may end; elsewhere the same as `reach`.
     """
 
     reach: F32
@@ -32,9 +32,9 @@ class TemporalLimits:
 def spatial_support_px(speed_deg_s: F32, pixels_per_degree: float, settings: AntialiasSettings) -> F32:
     """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11.
 
-    These are the paper's pixels, of which 28 make a degree. The three pixels at rest antialias, and
-    stay three on any screen; what velocity adds is blur that the eye does not see, an angle. Settings
-    that take some away leave one pixel at least.
+    The support at rest antialiases: it is three pixels on any display. The part that velocity adds is blur
+    that the eye does not resolve, an angle: it is given in the paper's pixels, of which 28 make a degree.
+    The support is at least one pixel.
     """
     rise = settings.support_fast_px - settings.support_still_px
     beyond = settings.support_beyond_px - settings.support_still_px
@@ -44,11 +44,11 @@ def spatial_support_px(speed_deg_s: F32, pixels_per_degree: float, settings: Ant
 
 
 def temporal_limits(speed_deg_s: F32, geometry: Geometry, settings: AntialiasSettings) -> TemporalLimits:
-    """Temporal support: 11 frames, up to 15 where the pattern is slow, few on specular surfaces.
+    """Temporal support: 11 frames, up to 15 for slow pixels, few on specular surfaces.
 
-    Slow pixels (below 0.15 deg/s) collect samples until these cover half a pixel, or until the
-    largest support. On mirroring, transparent and glossy surfaces (§5.4) the flow of the surface is
-    not the flow of what is seen in it.
+    The samples of slow pixels (below 0.15 deg/s) are collected until they cover half a pixel, or up to the
+    largest support. On glossy, mirroring and transparent surfaces the motion of the surface is not that of
+    the reflection or transmission (§5.4).
     """
     normal, most = settings.frames // 2, max(settings.slow_frames, settings.frames) // 2
     is_slow = speed_deg_s < settings.slow_deg_s

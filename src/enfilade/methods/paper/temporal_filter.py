@@ -8,19 +8,20 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, opaque, pixel_grid
+from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, opaque
 from enfilade.kernels.gather import sample
+from enfilade.kernels.rays import pixel_centres
 from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.support import COVERED_PX, TemporalLimits
 from enfilade.records import F32, Flow, Geometry
 from enfilade.settings import AntialiasSettings
 
-SAME_SURFACE = 0.05  # relative change of depth along the flow, frame to frame, on one surface
+SAME_SURFACE = 0.05  # largest relative change of depth from frame to frame on one surface
 
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """One frame as the filter needs it.
+    """One frame of the filter's support.
 
     Attributes
     ----------
@@ -44,17 +45,17 @@ def filter_along_flow(
 ) -> F32:
     """Average a frame with its neighbours along the trajectory of each pixel.
 
-    The trajectory follows the flow of every frame that it passes, interpolated bilinearly where it
-    passes between pixels, and so are the colours; it ends at the image's border.
+    From frame to frame a trajectory follows the flow, which is interpolated bilinearly, as are the colours.
+    It ends at the image's border.
 
     Parameters
     ----------
     frame
         The frame to filter.
     earlier, later
-        Neighbours of the same shot, the nearest first; as many as there are, at most the reach.
+        Neighbours of the same shot, the nearest first; at most the reach, fewer at the ends of the shot.
     limits
-        How far each pixel looks.
+        Temporal support.
     settings
         With ``separate_items`` a trajectory ends where it meets another surface (§5.3).
 
@@ -63,20 +64,23 @@ def filter_along_flow(
     (H, W, 3) float32
     """
     height, width = limits.reach.shape
-    reach, least = lanes(limits.reach), lanes(limits.least)
-    weights = _Weights(reach, least, settings.separate_items)
+    weights = _Weights(lanes(limits.reach), lanes(limits.least), settings.separate_items)
     color = lanes(frame.color)
     total, weight = Array3f(color), Float(1)
     for neighbours, is_later in ((earlier, False), (later, True)):
-        walk = _Walk.start(frame, weights)
+        trajectories = _Trajectories.start(frame, weights)
         present = frame
         for distance, following in enumerate(neighbours, start=1):
+            # Advance to the next frame.
             flow = present.flow.forward if is_later else present.flow.backward
-            walk.step(flow, following, distance)
-            w = walk.weight(distance)
-            total += w * sample(lanes(following.color), walk.x, walk.y, width=width, height=height)
+            trajectories.step(flow, following, distance)
+
+            # Accumulate its colours.
+            w = trajectories.weight(distance)
+            at = trajectories.x, trajectories.y
+            total += w * sample(lanes(following.color), *at, width=width, height=height)
             weight += w
-            walk.evaluate(total, weight)
+            trajectories.evaluate(total, weight)
             present = following
     return image(total / weight, height, width)
 
@@ -89,8 +93,8 @@ class _Weights:
 
 
 @dataclass
-class _Walk:
-    """Where the trajectories stand, and which go on; lanes of the frame that is filtered."""
+class _Trajectories:
+    """Positions of all trajectories at a frame; lanes of the frame that is filtered."""
 
     weights: _Weights
     x: Any  # Float
@@ -98,18 +102,18 @@ class _Walk:
     travelled: Any  # Float, pixels
     shape_index: Any  # UInt
     depth: Any  # Float
-    is_open: Any  # Bool
+    is_open: Any  # Bool: not ended yet
     width: int
     height: int
 
     @staticmethod
-    def start(frame: Slice, weights: _Weights) -> _Walk:
+    def start(frame: Slice, weights: _Weights) -> _Trajectories:
         height, width = frame.geometry.shape_index.shape
-        _, column, row = pixel_grid(height, width)
-        return _Walk(
+        at = pixel_centres(frame.geometry.camera)
+        return _Trajectories(
             weights=weights,
-            x=Float(column) + 0.5,
-            y=Float(row) + 0.5,
+            x=at.x,
+            y=at.y,
             travelled=Float(0),
             shape_index=lanes(frame.geometry.shape_index),
             depth=lanes(frame.geometry.depth),
@@ -120,15 +124,18 @@ class _Walk:
 
     def step(self, flow: F32, into: Slice, distance: int) -> None:
         """Follow the flow into the next frame."""
-        # A slow trajectory goes on until its samples cover the pixel; all end with their reach.
+        # End at the reach, and slow trajectories where their samples cover the pixel.
         count = opaque(float(distance))
         is_wanted = (count <= self.weights.least) | (self.travelled < COVERED_PX)
         is_wanted &= count <= self.weights.reach
 
+        # Move by the flow.
         step = sample(lanes(flow), self.x, self.y, width=self.width, height=self.height)
         self.x += step.x
         self.y += step.y
         self.travelled += dr.norm(Array2f(step.x, step.y))
+
+        # End outside the image, and on another surface.
         is_inside = (self.x >= 0) & (self.x < self.width) & (self.y >= 0) & (self.y < self.height)
         self.is_open &= is_wanted & is_inside
         if self.weights.separate_items:
@@ -141,10 +148,11 @@ class _Walk:
         return dr.select(self.is_open, dr.exp(-0.5 * distance_sigmas * distance_sigmas), 0.0)
 
     def evaluate(self, *values: Any) -> None:
-        """Compute everything so far: the next frame's step is then the same kernel."""
+        """Evaluate everything so far, so that the step to the next frame is the same kernel."""
         dr.eval(self.x, self.y, self.travelled, self.depth, self.is_open, *values)
 
     def _separate(self, into: Slice) -> None:
+        """End trajectories that meet another surface."""
         column = UInt(dr.clip(self.x, 0, self.width - 1))
         row = UInt(dr.clip(self.y, 0, self.height - 1))
         lane = row * self.width + column

@@ -1,4 +1,4 @@
-"""Forward 3D warp of a keyframe (McMillan 1997) with adaptive splats (Shade et al. 1998)."""
+"""Forward 3D warp of a keyframe (McMillan 1997) with adaptive splats (Shade et al. 1998; §2.2)."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3, pixel_grid, vector3
+from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, planar_warp
 from enfilade.kernels.gather import bilinear_taps
+from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject, warp_jacobian
 from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
 from enfilade.records import F32, U32, Geometry, Keyframe, Warped
 from enfilade.settings import WarpSettings
 
-CONTINUOUS = 0.1  # relative change of disparity between neighbours that is still one surface
-EVEN = 0.1  # relative difference of two such changes in a row that make one slope
+CONTINUOUS = 0.1  # largest relative change of disparity between neighbours on one surface
+EVEN = 0.1  # largest relative difference of two such changes in a row on one slope
 
 
 def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) -> Warped:
-    """See a keyframe from another camera.
+    """Reproject a keyframe to another camera.
 
-    Each pixel of the keyframe becomes a splat of the shape to which the warp stretches it; the
-    nearest splat over a pixel's centre wins (a z-buffer: the same surfaces as in McMillan's
-    occlusion-compatible order, whatever the order). Its colour is interpolated bilinearly among
-    those neighbours in the keyframe that lie on the same surface.
+    Each pixel of the keyframe becomes a splat, stretched by the Jacobian of the warp. The nearest splat over
+    a pixel's centre wins: a z-buffer shows the same surfaces as McMillan's occlusion-compatible order, in any
+    order. Colours are interpolated bilinearly among neighbours in the keyframe on the same surface.
 
     Returns
     -------
     Warped
-        Its variance is that of the keyframe's pixels, weighted as their colours, and larger where
-        they are magnified: the density of the noise, which resampling makes coarser, not weaker.
+        The variance is interpolated as the colours, and grows with the magnification: it is the density of
+        the noise, which resampling makes coarser, not weaker.
     """
     landing = _land(keyframe.geometry, camera)
     longest = settings.max_magnification
@@ -49,9 +49,9 @@ def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) ->
 def disparity_gradient(geometry: Geometry) -> F32:
     """Change of the disparity from pixel to pixel on each pixel's own surface, (H, W, 2).
 
-    On a plane the disparity is linear in image coordinates, so that one difference to a neighbour
-    is exact; of the two neighbours along an axis the one with the smaller change is taken, and
-    none beyond a jump or on another shape.
+    On a plane the disparity is linear in image coordinates, so that the difference to one neighbour is exact.
+    Of the two neighbours along an axis the one with the smaller change is used; changes across a jump or to
+    another shape are not.
     """
     disparity, shape_index = geometry.disparity, geometry.shape_index
     gradient = np.zeros((*disparity.shape, 2), np.float32)
@@ -65,7 +65,7 @@ def _smaller_step(disparity: F32, shape_index: U32) -> F32:
     step = np.diff(disparity, axis=1)
     is_same = np.diff(shape_index.astype(np.int64), axis=1) == 0
 
-    # A small step, or one of an even slope: towards the horizon of a plane every step is large.
+    # Keep small steps, and steps of an even slope: towards the horizon of a plane every step is large.
     is_small = np.abs(step) <= CONTINUOUS * np.minimum(disparity[:, 1:], disparity[:, :-1])
     size = np.abs(step)
     is_even = is_same[:, 1:] & is_same[:, :-1]
@@ -73,6 +73,7 @@ def _smaller_step(disparity: F32, shape_index: U32) -> F32:
     is_sloped = np.pad(is_even, ((0, 0), (1, 0))) | np.pad(is_even, ((0, 0), (0, 1)))
     step = np.where(is_same & (is_small | is_sloped[:, : step.shape[1]]), step, np.inf)
 
+    # Choose the smaller one of the two.
     behind = np.pad(step, ((0, 0), (1, 0)), constant_values=np.inf)
     ahead = np.pad(step, ((0, 0), (0, 1)), constant_values=np.inf)
     smaller = np.where(np.abs(behind) < np.abs(ahead), behind, ahead)
@@ -81,7 +82,7 @@ def _smaller_step(disparity: F32, shape_index: U32) -> F32:
 
 @dataclass(frozen=True)
 class _Landing:
-    """Where the pixels of a keyframe land in another image, as lanes of the keyframe."""
+    """Positions of the pixels of a keyframe in another image, as lanes of the keyframe."""
 
     splats: Splats
     disparity: Any  # Float, in the keyframe
@@ -89,15 +90,17 @@ class _Landing:
 
 
 def _land(source: Geometry, camera: Camera) -> _Landing:
+    """Reproject all pixels of a keyframe."""
     warp = planar_warp(source.camera, camera)
     change, epipole = matrix3(warp.change), vector3(warp.epipole)
     disparity, gradient = lanes(source.disparity), lanes(disparity_gradient(source))
 
-    _, column, row = pixel_grid(source.camera.height, source.camera.width)
-    x, y = Float(column) + 0.5, Float(row) + 0.5
+    # Reproject the centres, and differentiate.
+    x, y = pixel_centres(source.camera)
     flow, ratio, is_ahead = reproject(x, y, disparity, change=change, epipole=epipole)
     by_x, by_y = warp_jacobian(x, y, disparity, gradient, change=change, epipole=epipole)
 
+    # Differentiate the inverse depth, too.
     inverse_depth = disparity / ratio
     rise = Array2f(change[2, 0], change[2, 1]) + gradient * epipole.z  # of the depth ratio
     slope = (gradient - inverse_depth * rise) / ratio
@@ -107,63 +110,66 @@ def _land(source: Geometry, camera: Camera) -> _Landing:
 
 
 def _within(splats: Splats, longest: float) -> Splats:
-    """Splats whose sides are no longer than this, in pixels, however they are turned."""
+    """Splats whose sides are at most as long as this, in pixels."""
     square = longest * longest
     is_short = (dr.squared_norm(splats.by_x) <= square) & (dr.squared_norm(splats.by_y) <= square)
     return replace(splats, is_splat=splats.is_splat & is_short)
 
 
 def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, tolerance: float) -> Warped:
+    """Interpolate the keyframe at the winning splats."""
     height, width = camera.height, camera.width
     source, splats = keyframe.geometry.camera, landing.splats
-    is_hole = keys == EMPTY
+
+    # Unpack the keys of the z-buffer.
+    is_empty = keys == EMPTY
     winner: Any = UInt(keys & 0xFFFF_FFFF)
     depth: Any = dr.reinterpret_array(Float, UInt(keys >> 32))
 
-    # Where in the keyframe does this pixel's centre lie?
-    _, column, row = pixel_grid(height, width)
+    # Invert the Jacobian for the position in the keyframe.
     at_x, at_y, by_x, by_y = (
-        dr.gather(type(v), v, winner, ~is_hole) for v in (splats.x, splats.y, splats.by_x, splats.by_y)
+        dr.gather(type(v), v, winner, ~is_empty) for v in (splats.x, splats.y, splats.by_x, splats.by_y)
     )
-    dx, dy = Float(column) + 0.5 - at_x, Float(row) + 0.5 - at_y
+    target = pixel_centres(camera)
+    dx, dy = target.x - at_x, target.y - at_y
     det = by_x.x * by_y.y - by_y.x * by_x.y
     offset = Array2f(by_y.y * dx - by_y.x * dy, by_x.x * dy - by_x.y * dx) / det
     winner_row = winner // source.width
     centre = Array2f(winner - winner_row * source.width, winner_row) + 0.5
     at = centre + offset
 
-    # Mix the neighbours that lie on the winner's surface.
+    # Interpolate among the neighbours on the winner's surface.
     shape_indices, colors, variances = (
         lanes(v) for v in (keyframe.geometry.shape_index, keyframe.shading.color, keyframe.shading.variance)
     )
-    shape_index = dr.gather(UInt, shape_indices, winner, ~is_hole)
-    disparity = dr.gather(Float, landing.disparity, winner, ~is_hole)
-    gradient = dr.gather(Array2f, landing.gradient, winner, ~is_hole)
+    shape_index = dr.gather(UInt, shape_indices, winner, ~is_empty)
+    disparity = dr.gather(Float, landing.disparity, winner, ~is_empty)
+    gradient = dr.gather(Array2f, landing.gradient, winner, ~is_empty)
     total, color, variance = Float(0), Array3f(0), Float(0)
-    for lane, bilinear in bilinear_taps(at.x, at.y, width=source.width, height=source.height):
-        tap_row = lane // source.width
-        step = Array2f(lane - tap_row * source.width, tap_row) + 0.5 - centre
+    for tap in bilinear_taps(at.x, at.y, width=source.width, height=source.height):
+        step = Array2f(tap.column, tap.row) + 0.5 - centre
         expected = disparity + dr.dot(gradient, step)
-        jump = dr.abs(dr.gather(Float, landing.disparity, lane) - expected)
-        is_same = (dr.gather(UInt, shape_indices, lane) == shape_index) & (jump <= tolerance * disparity)
-        weight = dr.select(is_same & ~is_hole, bilinear, 0.0)  # in a hole the position is a NaN
+        jump = dr.abs(dr.gather(Float, landing.disparity, tap.lane) - expected)
+        is_same = (dr.gather(UInt, shape_indices, tap.lane) == shape_index) & (jump <= tolerance * disparity)
+        weight = dr.select(is_same & ~is_empty, tap.weight, 0.0)  # the position may be NaN where it is empty
         total += weight
-        color += weight * dr.gather(Array3f, colors, lane)
-        variance += weight * dr.gather(Float, variances, lane)
+        color += weight * dr.gather(Array3f, colors, tap.lane)
+        variance += weight * dr.gather(Float, variances, tap.lane)
 
-    is_hole |= total <= 0.0
-    share = dr.select(is_hole, 0.0, 1.0 / total)
-    magnification = dr.select(is_hole, 0.0, det)
+    # Normalize, and clear disoccluded pixels.
+    is_disoccluded = is_empty | (total <= 0.0)
+    share = dr.select(is_disoccluded, 0.0, 1.0 / total)
+    magnification = dr.select(is_disoccluded, 0.0, det)
     color, variance = color * share, variance * share * dr.maximum(det, 1.0)
-    variance = dr.select(is_hole, 0.0, variance)
-    depth = dr.select(is_hole | (depth >= INFINITE), 0.0, depth)
-    shape_index = dr.select(is_hole, 0, shape_index)
-    dr.eval(color, variance, depth, shape_index, magnification, is_hole)
+    variance = dr.select(is_disoccluded, 0.0, variance)
+    depth = dr.select(is_disoccluded | (depth >= INFINITE), 0.0, depth)
+    shape_index = dr.select(is_disoccluded, 0, shape_index)
+    dr.eval(color, variance, depth, shape_index, magnification, is_disoccluded)
     return Warped(
         color=image(color, height, width),
         variance=image(variance, height, width),
         depth=image(depth, height, width),
         shape_index=image(shape_index, height, width),
         magnification=image(magnification, height, width),
-        is_hole=image(is_hole, height, width),
+        is_disoccluded=image(is_disoccluded, height, width),
     )

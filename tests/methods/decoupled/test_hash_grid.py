@@ -1,0 +1,132 @@
+"""The hash grid: keys against tuples, lookups against a dictionary."""
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import Array3f, Float, UInt
+from enfilade.methods.decoupled import hash_grid as module
+from enfilade.methods.decoupled.hash_grid import LEVELS, MIN_SAMPLES, Entries, entry_key
+
+UP = np.float32([[0.0, 0.0, 1.0]])
+
+
+def keys(points, normals, width, level=0, shape_index=1):
+    points, normals = np.asarray(points, np.float32).T, np.asarray(normals, np.float32).T
+    return np.array(entry_key(Array3f(points), Array3f(normals), UInt(shape_index), Float(width), level))
+
+
+def random_points(count, seed=0):
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(count, 3))
+    return rng.uniform(-5.0, 5.0, (count, 3)), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def names_of(points, normals, size):
+    """Entries as tuples: cell, and axis of the normal with its sign."""
+    axis = np.abs(normals).argmax(axis=1)
+    return [
+        (*np.floor(p.astype(np.float32) / size).astype(int), a, n[a] < 0)
+        for p, n, a in zip(points, normals, axis, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(("width", "size"), [(0.7, 0.5), (0.004, 2.0**-8), (3e-4, 2.0**-12)])
+def test_keys_are_one_to_one_with_cells_and_directions(width, size):
+    # Widths are rounded down to a power of two; the smallest cells are those of a path near the camera.
+    points, normals = random_points(30_000)
+    names = names_of(points, normals, size)
+    found = dict(zip(names, keys(points, normals, width), strict=True))
+    assert all(found[name] == key for name, key in zip(names, keys(points, normals, width), strict=True))
+    assert len(set(found.values())) == len(found)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_far_surfaces_do_not_share_entries(axis):
+    # Points 1 m to 8 km apart, in cells of 2 mm.
+    points = np.full((15, 3), 0.3)
+    points[1:, axis] += 2.0 ** np.arange(14)
+    assert len(set(keys(points, np.tile(UP, (15, 1)), 2.0**-9).tolist())) == 15
+
+
+def test_shapes_and_sizes_do_not_share_entries():
+    point = np.float32([[0.3, 0.3, 0.3]])
+    by_shape = {int(keys(point, UP, 1.0, shape_index=1 + k)[0]) for k in (0, *(1 << b for b in range(31)))}
+    assert len(by_shape) == 32
+    by_size = {int(keys(0.0 * point, UP, 2.0**k)[0]) for k in range(-29, 40)}
+    assert len(by_size) == 69
+    points, normals = random_points(500)
+    np.testing.assert_array_equal(keys(points, normals, 0.7, 1), keys(points, normals, 1.4, 0))
+
+
+def test_keys_are_spread_evenly():
+    # Neighbouring cells: each bit of the key is set in half of them, and none depends on another.
+    cells = np.stack(np.meshgrid(*[np.arange(24.0)] * 3), -1).reshape(-1, 3) + 0.5
+    key = keys(cells, np.tile(UP, (len(cells), 1)), 1.0)
+    bits = (key[:, None] >> np.arange(64, dtype=np.uint64)) & np.uint64(1)
+    limit = 5.0 / np.sqrt(len(cells))  # five standard errors of 64 means, and of 2016 correlations
+    assert np.abs(2.0 * bits.mean(axis=0) - 1.0).max() < limit
+    assert np.abs(np.corrcoef(bits.T) - np.eye(64)).max() < limit
+
+
+def test_lookup_finds_the_mean_of_the_smallest_entry():
+    points, normals = random_points(2000)
+    light = np.abs(points)
+    parts = [Entries.of(keys(points, normals, 0.7, level), light) for level in range(LEVELS)]
+    whole = Entries.joined([*parts, *parts])  # twice, in any order
+    mean = whole.sums / whole.counts[:, None]
+    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(0.7)
+    found, is_found = (np.array(v) for v in whole.upload().lookup(*at, Array3f(0.5)))
+    enough = dict(zip(whole.keys, whole.counts >= MIN_SAMPLES, strict=True))
+    place = {key: i for i, key in enumerate(whole.keys)}
+    by_level = [keys(points, normals, 0.7, level) for level in range(LEVELS)]
+    for i in range(len(points)):
+        first = next((k[i] for k in by_level if enough[k[i]]), None)
+        assert is_found[i] == (first is not None)
+        if first is not None:
+            np.testing.assert_allclose(found[:, i], mean[place[first]], rtol=1e-5)
+    assert 0.1 < is_found.mean() < 1.0
+
+
+def test_lookup_of_points_without_an_entry_misses():
+    points, _ = random_points(200)
+    grid = Entries.of(keys(points * 0.0, np.tile(UP, (200, 1)), 0.7), np.ones((200, 3))).upload()
+    far = Array3f((points + 50).T.astype(np.float32))
+    assert not np.array(grid.lookup(far, Array3f(0, 0, 1), UInt(1), Float(0.7), Array3f(0.5))[1]).any()
+
+
+def test_moved_points_without_an_entry_use_their_own():
+    point = np.float32([[0.1, 0.2, 0.01]])
+    own = Entries.of(np.repeat(keys(point, UP, 0.5), MIN_SAMPLES), np.ones((MIN_SAMPLES, 3)))
+    below = keys(point + np.float32([0.0, 0.0, -0.1]), UP, 0.5)
+    assert below != keys(point, UP, 0.5)
+    at = Array3f(point.T), Array3f(UP.T), UInt(1), Float(0.5)
+    offset = Array3f(0.5, 0.5, 0.0)  # half a cell down
+    light, is_found = own.upload().lookup(*at, offset)
+    assert np.array(is_found).all()
+    np.testing.assert_allclose(np.array(light), 1.0)
+    both = Entries.joined([own, Entries.of(np.repeat(below, MIN_SAMPLES), np.full((MIN_SAMPLES, 3), 7.0))])
+    np.testing.assert_allclose(np.array(both.upload().lookup(*at, offset)[0]), 7.0)
+
+
+def test_of_too_many_entries_those_with_most_samples_are_uploaded(monkeypatch):
+    monkeypatch.setattr(module, "MAX_ENTRIES", 50)
+    points, normals = random_points(200)
+    key = keys(points, normals, 0.01)
+    parts = [Entries.of(k, np.ones((len(k), 3))) for k in (key, *[key] * 3, *[key[:40]] * 4)]
+    kept = set(np.array(Entries.joined(parts).upload().keys).tolist())
+    assert len(kept) == 50
+    assert kept >= set(key[:40].tolist())
+
+
+def test_samples_that_are_not_finite_are_left_out():
+    light = np.ones((6, 3))
+    light[2, 1], light[4, 0] = np.nan, np.inf
+    entries = Entries.of(np.full(6, 9, np.uint64), light)
+    assert entries.counts.tolist() == [4]
+    np.testing.assert_array_equal(entries.sums, [[4.0, 4.0, 4.0]])
+
+
+@pytest.mark.parametrize("count", [0, MIN_SAMPLES - 1])
+def test_entries_of_few_samples_are_not_uploaded(count):
+    entries = Entries.joined([Entries.of(np.full(count, 9, np.uint64), np.ones((count, 3)))])
+    assert entries.upload() is None

@@ -1,0 +1,268 @@
+"""With an empty cache the integrator is an unbiased path tracer; with a filled one it is near it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from balls import MATERIALS, PIXEL_ANGLE, front_camera, opened_scene, pixels_of, traced_irradiance
+from enfilade.arrays import lanes
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.gbuffer import find_geometry, positions
+from enfilade.images import write_exr
+from enfilade.kernels.estimate import Estimate
+from enfilade.methods.decoupled.integrator import Integrator
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
+from enfilade.records import Shading
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+EMPTY = IrradianceCache()
+
+
+@pytest.fixture(scope="module")
+def materials(tmp_path_factory):
+    """Balls of all materials, and their path traced irradiance."""
+    renderer = opened_scene(tmp_path_factory.mktemp("materials"), MATERIALS)
+    return renderer, traced_irradiance(renderer, front_camera())[1]
+
+
+def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> Shading:
+    """Diffuse and specular radiance together."""
+    integrator = integrator_of(renderer)
+
+    def radiance(rays, rng, square):
+        at = {"pixel_angle": PIXEL_ANGLE}
+        diffuse = integrator.diffuse_radiance(irradiance, irradiance, rays, rng, **at).layers[0]
+        specular = integrator.specular_radiance(irradiance, rays, rng, square, **at)
+        return diffuse + sum(specular.layers)
+
+    return estimated(radiance, camera, spp, **more)[0]
+
+
+def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> list[Shading]:
+    """Irradiance by final gathering, direct and indirect."""
+
+    def radiance(rays, rng, square):
+        return integrator_of(renderer).final_gather(irradiance, rays, rng, square, pixel_angle=PIXEL_ANGLE)
+
+    return estimated(radiance, camera, spp, layers=2, **more)
+
+
+@cache
+def integrator_of(renderer) -> Integrator:
+    """One integrator a renderer, whose kernels are recorded once."""
+    return Integrator(renderer)
+
+
+def estimated(radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None):
+    estimate = Estimate(
+        camera,
+        pixels_of(camera)[:pixels],
+        radiance,
+        chunk=chunk,
+        pixel_filter=pixel_filter,
+        random=RandomKey(2, 0, Purpose.DIFFUSE),
+        layers=layers,
+        is_stratified=True,
+    )
+    estimate.add(spp)
+    return estimate.shadings
+
+
+def traced(renderer, camera: Camera, spp: int) -> Shading:
+    return renderer.trace(camera, pixels_of(camera), RandomKey(1, 0, Purpose.REFERENCE), spp=spp)
+
+
+def cache_of(*images) -> IrradianceCache:
+    return IrradianceCache.of([upload(*image) for image in images], [1.0] * len(images))
+
+
+def standard_errors(ours: Shading, reference: Shading, where=slice(None)) -> float:
+    """Difference of energy, in standard errors."""
+    difference = ((ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE)[where].sum()
+    variance = ours.variance.ravel() + reference.variance.ravel()
+    return float(difference / np.sqrt(variance[where].sum()))
+
+
+def test_without_a_cache_every_material_keeps_its_energy(materials):
+    renderer, camera = materials[0], front_camera()
+    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    names = renderer.describe().shapes
+    errors = {
+        names[number - 1]: standard_errors(ours, reference, shape_index == number)
+        for number in np.unique(shape_index[shape_index > 0])
+    }
+    assert set(MATERIALS) < set(errors)
+    # Of 15 shapes one exceeds four standard errors once in 1000 runs.
+    assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+
+
+@pytest.mark.parametrize("opacity", [0.3, 0.7])
+def test_without_a_cache_partly_transparent_surfaces_keep_their_energy(tmp_path, opacity):
+    def veil(share):
+        black = '<bsdf type="diffuse"><rgb name="reflectance" value="0.02"/></bsdf>'
+        return f'<bsdf type="mask"><float name="opacity" value="{share}"/>{black}</bsdf>'
+
+    camera = front_camera()
+    where = find_geometry(opened_scene(tmp_path, {"veil": veil(1.0)}), camera).shape_index.ravel() == 1
+    assert where.sum() > 20
+    renderer = opened_scene(tmp_path, {"veil": veil(opacity)})
+    ours, reference = shaded(renderer, EMPTY, camera, 1024), traced(renderer, camera, 1024)
+    assert abs(standard_errors(ours, reference, where)) < 4.0
+    deviation = np.sqrt((ours.variance + reference.variance)[where].sum())
+    assert deviation < 0.05 * (reference.color @ LUMINANCE)[where].sum()
+
+
+def test_with_a_cache_one_sample_is_near_many_paths(diffuse):
+    renderer, images = diffuse
+    camera = front_camera()
+    cached, uncached = (shaded(renderer, of, camera, 1) for of in (cache_of(*images), EMPTY))
+    reference = traced(renderer, camera, 1024).color
+    error, error_uncached = (np.sqrt(((c.color - reference) ** 2).mean()) for c in (cached, uncached))
+    # Irradiance of 512 paths for one camera ray; shadow edges and surfaces in neither image remain.
+    assert error < 0.25 * error_uncached
+    assert abs(cached.color.mean() / reference.mean() - 1.0) < 0.02
+
+
+def test_irradiance_of_one_view_is_valid_in_another(tmp_path):
+    checks = (
+        '<texture type="checkerboard" name="reflectance"><rgb name="color0" value="0.8, 0, 0"/>'
+        '<rgb name="color1" value="0.8"/><transform name="to_uv"><scale x="9" y="9"/></transform></texture>'
+    )
+    balls = {
+        "blend": MATERIALS["blend"],
+        "two sides": f'<bsdf type="twosided">{MATERIALS["blend"]}</bsdf>',
+        "checks": f'<bsdf type="diffuse">{checks}</bsdf>',
+        "principled": MATERIALS["principled"],
+    }
+    renderer = opened_scene(tmp_path, balls)
+    image = traced_irradiance(renderer, front_camera(96, 72))
+    camera = Camera(look_at((4, 1.8, 5), (0, 0.7, 0)), 36, 48, 36)
+    ours, reference = shaded(renderer, cache_of(image), camera, 64), traced(renderer, camera, 256)
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    ratios = {
+        name: ours.color[shape_index == number].sum(axis=0)
+        / reference.color[shape_index == number].sum(axis=0)
+        for number, name in enumerate(renderer.describe().shapes, 1)
+        if name in balls
+    }
+    assert set(ratios) == set(balls)
+    assert {name: ratio for name, ratio in ratios.items() if np.abs(ratio - 1.0).max() > 0.04} == {}
+
+
+@pytest.mark.parametrize("name", ["plastic", "roughplastic"])
+def test_irradiance_under_a_coat_seen_at_a_grazing_angle_is_valid_from_above(tmp_path, name):
+    """A coat transmits a fifth less at a grazing angle: the irradiance must not contain that."""
+    table = (
+        '</shape><shape type="rectangle" id="table"><transform name="to_world"><rotate x="1" angle="-90"/>'
+    )
+    renderer = opened_scene(tmp_path, {"ball": f'{table}<translate y="1.5"/></transform>{MATERIALS[name]}'})
+    grazing = Camera(look_at((0, 1.75, 2.5), (0, 1.5, 0)), 36, 96, 36)
+    steep = Camera(look_at((0, 3.6, 0.8), (0, 1.5, 0)), 25, 32, 24)
+    shape_index = find_geometry(renderer, steep).shape_index.ravel()
+    where = shape_index == renderer.describe().shapes.index("table") + 1
+    assert where.sum() > 200
+    ours = shaded(renderer, cache_of(traced_irradiance(renderer, grazing)), steep, 64)
+    reference = traced(renderer, steep, 256)
+    ratio = (ours.color @ LUMINANCE)[where].sum() / (reference.color @ LUMINANCE)[where].sum()
+    assert abs(ratio - 1.0) < 0.03
+
+
+def test_an_image_is_found_at_its_own_pixels(diffuse):
+    renderer, ((geometry, irradiance), _) = diffuse
+    camera = geometry.camera
+    image = shaded(renderer, cache_of((geometry, irradiance)), camera, 1).color.reshape(36, 48, 3)
+    expected = geometry.albedo * (irradiance.direct.color + irradiance.indirect.color)
+    # Floor and back wall; the lamp emits, and taps at the edges of balls lie on other surfaces.
+    inside = (geometry.shape_index == 3) | (geometry.shape_index == 4)
+    assert (np.abs(image - expected).max(axis=2)[inside] > 0.01).mean() < 0.02
+
+
+def test_surfaces_in_no_image_are_path_traced(diffuse):
+    renderer, images = diffuse
+    away = Camera(look_at((0, 1.5, 3), (3.5, 0.5, -1.5)), 30, 24, 18)
+    cached, reference = shaded(renderer, cache_of(images[0]), away, 128), traced(renderer, away, 128)
+    difference = ((cached.color - reference.color) @ LUMINANCE).mean()
+    deviation = np.sqrt((cached.variance + reference.variance).sum()) / cached.variance.size
+    assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
+
+
+def test_final_gathering_converges_to_path_traced_irradiance(materials):
+    renderer, irradiance = materials
+    camera = front_camera()
+    filled = cache_of((find_geometry(renderer, camera), irradiance))
+    for cached, bias in ((EMPTY, 0.0), (filled, 0.02)):
+        found = gathered(renderer, cached, camera, 64)
+        for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
+            error = standard_errors(ours, reference)
+            deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+            assert abs(error) < 4.0 + bias * (reference.color @ LUMINANCE).sum() / deviation
+
+
+def test_final_gathering_under_an_environment_map(tmp_path):
+    # Directions in which the sampled lobe reflects nothing count as samples, too.
+    rows = np.linspace(0.2, 0.6, 16, dtype=np.float32)
+    write_exr(tmp_path / "sky.exr", {"RGB": np.tile(rows[:, None, None], (1, 32, 3))}, is_portable=True)
+    sky = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
+    renderer, camera = opened_scene(tmp_path, {"blend": MATERIALS["blend"]}, sky), front_camera()
+    irradiance = traced_irradiance(renderer, camera)[1]
+    found = gathered(renderer, EMPTY, camera, 64)
+    for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
+        assert abs(standard_errors(ours, reference)) < 4.0
+        assert ours.dropped == 0
+
+
+def test_final_gathering_without_a_cache_at_any_number_of_pixels(diffuse):
+    # A recorded kernel returns literals in the size of its first call.
+    renderer, _ = diffuse
+    few, many = (gathered(renderer, EMPTY, front_camera(), 4, pixels=count)[1] for count in (500, 900))
+    np.testing.assert_array_equal(few.color, many.color[:500])
+
+
+def test_metal_and_glass_have_no_diffuse_lobe(tmp_path):
+    balls = {
+        name: f'<bsdf type="principled"><float name="{name}" value="{share}"/></bsdf>'
+        for name, share in (("metallic", 1.0), ("spec_trans", 0.75), ("roughness", 1.0))
+    }
+    renderer = opened_scene(tmp_path, balls)
+    geometry = find_geometry(renderer, front_camera())
+    names = renderer.describe().shapes
+    albedos = [geometry.albedo[geometry.shape_index == names.index(name) + 1].mean() for name in balls]
+    assert albedos == pytest.approx([0.0, 0.125, 0.5], abs=0.01)
+
+
+def test_images_of_weight_zero_add_no_surfaces(diffuse):
+    renderer, images = diffuse
+    # At ten times the resolution some points have taps of tiny weight.
+    finer = find_geometry(renderer, front_camera(width=480, height=360, x=-0.5))
+    at = [lanes(values) for values in (positions(finer), finer.normal, finer.shape_index)]
+    image = upload(*images[0])
+    alone, filled = IrradianceCache.of([image], [1.0]), IrradianceCache.of([image] * 6, [1.0, *[0.0] * 5])
+    np.testing.assert_array_equal(np.array(alone.lookup(*at)[1]), np.array(filled.lookup(*at)[1]))
+
+
+def test_other_scenes_may_be_open(tmp_path):
+    # Mitsuba numbers the materials of all open scenes; one of them is an emitting mesh.
+    mesh = '<emitter type="area"><rgb name="radiance" value="1"/></emitter></shape><shape type="cube">'
+    shared = '</shape><bsdf type="diffuse" id="used"/><bsdf type="conductor" id="unused"/><shape type="cube">'
+    balls = {"glass": '<bsdf type="dielectric"/>', "plastic": f'{shared}{mesh}<ref id="used"/>'}
+    camera = front_camera(24, 18)
+    earlier = opened_scene(tmp_path, balls)
+    alone = shaded(earlier, EMPTY, camera, spp=4)
+    assert alone.color.any()
+    renderer = opened_scene(tmp_path, balls)
+    for opened in (renderer, earlier, renderer):
+        assert (shaded(opened, EMPTY, camera, spp=4).color == alone.color).all()
+
+
+def test_chunks_change_no_byte(materials, diffuse):
+    # The number of lanes of a recorded kernel is padded, also that of the last chunk.
+    camera = front_camera(24, 18)
+    for renderer, of in ((materials[0], EMPTY), (diffuse[0], cache_of(*diffuse[1]))):
+        one, many = (
+            shaded(renderer, of, camera, 4, chunk=chunk, pixel_filter=PixelFilter.GAUSSIAN)
+            for chunk in (1 << 20, 600)
+        )
+        np.testing.assert_array_equal(one.color, many.color)
