@@ -1,0 +1,1 @@
+"""A run: its folder, ledger, scheduler, workers, shards, farms and statistics."""

@@ -1,0 +1,202 @@
+"""Tasks on a Ray cluster. Only paths, numbers and ledger lines travel; the run folder is on a disk that all nodes see."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import threading
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from enfilade.errors import EnfiladeError
+from enfilade.runs.executor import Ended, Order, Workers
+from enfilade.runs.failure import Failure, FailureKind
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.resources import cores
+
+TIMED_OUT = 75  # exit code of a Ray worker that took too long
+_WORKERS: dict[tuple[str, int], Any] = {}  # in a Ray worker: the one with the scene loaded
+
+
+class Cluster:
+    """Workers on a Ray cluster.
+
+    Parameters
+    ----------
+    run
+    workers
+        Number of tasks at once (None: as many as the cluster has GPUs, or CPUs for), and threads of each.
+    address
+        Of a cluster to join; empty: a local one is started.
+    device
+        ``cpu`` or ``gpu``.
+    timeout_s
+        After which a worker that has not finished its task ends itself; 0: never.
+
+    Raises
+    ------
+    EnfiladeError
+        Ray is not installed, the cluster does not answer, or has no GPU where one is needed.
+    """
+
+    def __init__(
+        self, run: RunFolder, workers: Workers, *, address: str, device: str, timeout_s: float
+    ) -> None:
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        try:
+            import ray
+        except ImportError as error:
+            raise EnfiladeError(
+                "--executor ray needs Ray: install it with: pip install 'enfilade[cluster]'"
+            ) from error
+        self._ray = ray
+        self._in_hand: dict[Any, int] = {}
+        threads = max(workers.threads, 1)
+        try:
+            self._connect(address, cpus=max((workers.count or cores() // threads) * threads, 1))
+            nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+        except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
+            raise EnfiladeError(f"no Ray cluster at {address or 'this machine'}: {error}") from error
+        try:
+            share = Share.of(nodes, workers, has_gpu=device == "gpu")
+        except EnfiladeError:
+            ray.shutdown()
+            raise
+        self.slots = share.slots
+        self._terms = str(run.folder.resolve()), device, share.cpus, timeout_s
+        # Ray repeats nothing by itself: the scheduler does, with fewer paths in flight where memory was short.
+        self._do = ray.remote(num_cpus=share.cpus, num_gpus=share.gpus, max_retries=0)(do_task)
+
+    def begin(self, slot: int, order: Order) -> None:
+        """Submit a task."""
+        with self._answering():
+            self._in_hand[self._do.remote(*self._terms, order)] = slot
+
+    def wait(self, timeout_s: float | None) -> list[Ended]:
+        """Wait until Ray has finished a task, or has lost its worker or node."""
+        with self._answering():
+            ready, _ = self._ray.wait(list(self._in_hand), num_returns=1, timeout=timeout_s)
+        return [self._ended(reference) for reference in ready]
+
+    def discard(self, slot: int) -> None:
+        """Nothing: after a failure a Ray worker opens the run anew."""
+
+    def close(self) -> None:
+        """Cancel what is in hand and leave the cluster; a local one ends."""
+        for reference in self._in_hand:
+            with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
+                self._ray.cancel(reference, force=True)
+        self._ray.shutdown()
+
+    @contextlib.contextmanager
+    def _answering(self) -> Iterator[None]:
+        try:
+            yield
+        except (self._ray.exceptions.RayError, ConnectionError) as error:
+            raise EnfiladeError(
+                f"the Ray cluster does not answer: {_first_line(error)}; start one, then run the same command again"
+            ) from error
+
+    def _connect(self, address: str, *, cpus: int) -> None:
+        quiet = {"log_to_driver": False, "logging_level": "error"}
+        if address:
+            self._ray.init(address=address, **quiet)
+        else:
+            self._ray.init(address="local", num_cpus=cpus, include_dashboard=False, **quiet)
+
+    def _ended(self, reference: Any) -> Ended:
+        slot = self._in_hand.pop(reference)
+        try:
+            result = self._ray.get(reference)
+        except self._ray.exceptions.RayError as error:
+            is_memory = isinstance(error, self._ray.exceptions.OutOfMemoryError)
+            kind = FailureKind.MEMORY if is_memory else FailureKind.ERROR
+            return Ended(slot, failure=Failure(kind, f"Ray says: {_first_line(error)}", str(error)))
+        if isinstance(result, Failure):
+            return Ended(slot, failure=result)
+        return Ended(slot, line=result)
+
+
+@dataclass(frozen=True)
+class Share:
+    """What Ray is asked for.
+
+    Attributes
+    ----------
+    slots : int
+        Tasks at once.
+    cpus : int
+        Of a task, which are its threads.
+    gpus : float
+        Of a task; a part of one where there are more tasks than GPUs.
+    """
+
+    slots: int
+    cpus: int
+    gpus: float = 0.0
+
+    @staticmethod
+    def of(nodes: Sequence[Mapping[str, float]], workers: Workers, *, has_gpu: bool) -> Share:
+        """Share out the resources of the nodes.
+
+        Parameters
+        ----------
+        nodes
+            Resources of each, as Ray names them.
+        workers
+            Number and threads, as far as they are given. A task gets no more threads than the largest node has CPUs.
+        has_gpu
+            Whether a task needs a GPU.
+
+        Raises
+        ------
+        EnfiladeError
+            It does, and there is none.
+        """
+        cpus = [int(node.get("CPU", 0)) for node in nodes]
+        gpus = int(sum(node.get("GPU", 0) for node in nodes))
+        if has_gpu and not gpus:
+            raise EnfiladeError(
+                "the Ray cluster has no GPU, and the run is for one: start its nodes with --num-gpus, or add "
+                "--device cpu"
+            )
+        some = workers.count or (gpus if has_gpu else sum(cpus))
+        wanted = workers.threads or max(sum(cpus) // max(some, 1), 1)
+        each = max(min(wanted, max(cpus, default=0)), 1)
+        slots = workers.count or (gpus if has_gpu else max(sum(count // each for count in cpus), 1))
+        return Share(slots, each, 1 / math.ceil(slots / gpus) if has_gpu else 0.0)
+
+
+def do_task(folder: str, device: str, threads: int, timeout_s: float, order: Order) -> Any:
+    """Do a task in a Ray worker.
+
+    Returns
+    -------
+    dict or Failure
+        The line for the ledger.
+    """
+    from enfilade.runs.child import open_here
+
+    timer: threading.Timer | None = None
+    try:
+        key = folder, order.reduction
+        if key not in _WORKERS:
+            _WORKERS.clear()  # one scene in memory
+            _WORKERS[key] = open_here(folder, device, threads, order.reduction)
+        if timeout_s:
+            timer = threading.Timer(timeout_s, os._exit, (TIMED_OUT,))
+            timer.start()
+        return _WORKERS[key].do(order.task)
+    except Exception as error:  # noqa: BLE001  (the scheduler decides)
+        _WORKERS.clear()
+        return Failure.of(error, traceback.format_exc())
+    finally:
+        if timer is not None:
+            timer.cancel()
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)

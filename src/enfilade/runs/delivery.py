@@ -1,0 +1,121 @@
+"""The passes that every run has beside its method's: analysis before, clips and video after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.arrays import halves
+from enfilade.gbuffer import View, positions
+from enfilade.images import encode_video, exact_fps, join_videos, read_exr, video_suffix, write_exr
+from enfilade.methods.base import FRAMES, Pass, Task, TaskId
+from enfilade.records import F32, Frame
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
+from enfilade.settings import OutputSettings, VideoSettings, ViewingSettings
+
+ANALYSIS, CLIPS, VIDEO = Pass("analysis"), Pass("clips", reads=(FRAMES,)), Pass("video", is_shared=False)
+ANALYZED_FRAMES = 16  # of an analysis task
+CLIP_FRAMES = 240  # of a clip; x264 starts anew after 250
+SKY_DEPTH = 1e10  # layer Z where nothing is hit, as in Blender
+HALF_LAYERS = frozenset({"N", "albedo"})
+
+
+def analysis_tasks(frames: int) -> list[Task]:
+    """Tasks that analyze all frames of a path."""
+    return [Task(ANALYSIS.name, first) for first in range(0, frames, ANALYZED_FRAMES)]
+
+
+def video_tasks(frames: int) -> list[Task]:
+    """Tasks that encode all frames of a path."""
+    clips = []
+    for span in clip_spans(frames):
+        clips.append(Task(CLIPS.name, span.start, needs=tuple(TaskId(FRAMES, frame) for frame in span)))
+    return [*clips, Task(VIDEO.name, 0, needs=tuple(clip.id for clip in clips))]
+
+
+def clip_spans(frames: int) -> list[range]:
+    """Frames of each clip."""
+    return [range(first, min(first + CLIP_FRAMES, frames)) for first in range(0, frames, CLIP_FRAMES)]
+
+
+def video_facts(job: Job) -> dict[str, Any]:
+    """Settings of the video, for the ledger: a clip of other settings is encoded again."""
+    exposure_ev = job.settings[ViewingSettings].exposure_ev
+    return {"video": {**job.settings[VideoSettings].to_table(), "exposure_ev": exposure_ev}}
+
+
+def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:
+    """Write a delivered frame: linear Rec.709 in half floats, and the AOVs of ``[output] layers``.
+
+    Floats of the AOVs are rounded to 16 significant bits. ``Z``, along the optical axis, and ``P``, in the world,
+    are in scene units; ``forward`` and ``backward`` in pixels per frame, x right, y down; ``shape_index`` and
+    ``provenance`` are unsigned integers.
+
+    Raises
+    ------
+    RunFolderError, NoSpaceError
+        The file can't be written.
+    """
+    geometry = view.geometry
+    layers: dict[str, Callable[[], Any]] = {
+        "Z": lambda: np.where(geometry.is_hit, geometry.depth, np.float32(SKY_DEPTH)),
+        "P": lambda: positions(geometry),
+        "N": lambda: halves(geometry.normal),
+        "albedo": lambda: halves(geometry.albedo),
+        "shape_index": lambda: geometry.shape_index,
+        "forward": lambda: view.flow.forward,
+        "backward": lambda: view.flow.backward,
+        "provenance": lambda: frame.provenance.astype(np.uint32),
+    }
+    chosen = job.settings[OutputSettings].chosen
+    file = stem.with_name(f"{stem.name}.exr")
+    write_exr(
+        file,
+        {"RGB": halves(frame.color), **{name: layer() for name, layer in layers.items() if name in chosen}},
+        attributes={"framesPerSecond": exact_fps(job.path.fps)},
+        is_portable=True,
+    )
+    return file
+
+
+def write_clip(run: RunFolder, job: Job, first: int) -> Path:
+    """Encode finished frames as a part of the video."""
+    span = range(first, min(first + CLIP_FRAMES, len(job.path)))
+    file = _clip(run, job, first)
+    encode_video(
+        file,
+        _images(run, job, span),
+        fps=job.path.fps,
+        width=job.path.width,
+        height=job.path.height,
+        settings=job.settings[VideoSettings],
+        exposure_ev=job.settings[ViewingSettings].exposure_ev,
+    )
+    return file
+
+
+def write_video(run: RunFolder, job: Job) -> Path:
+    """Join the clips."""
+    settings, spans = job.settings[VideoSettings], clip_spans(len(job.path))
+    clips = [_clip(run, job, span.start) for span in spans]
+    for clip in clips:
+        run.check(clip.relative_to(run.folder).as_posix())
+    file = run.folder / f"video{video_suffix(settings.codec)}"
+    counted = [(clip, len(span)) for clip, span in zip(clips, spans, strict=True)]
+    join_videos(file, counted, fps=job.path.fps, settings=settings)
+    return file
+
+
+def _clip(run: RunFolder, job: Job, first: int) -> Path:
+    stem = run.stem(CLIPS.name, job.path.numbers[first])
+    return stem.with_name(f"{stem.name}{video_suffix(job.settings[VideoSettings].codec)}")
+
+
+def _images(run: RunFolder, job: Job, span: range) -> Iterator[F32]:
+    for frame in span:
+        file = run.file_of(FRAMES, job.path.numbers[frame])
+        yield read_exr(file)["RGB"].astype(np.float32)

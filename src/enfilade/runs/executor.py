@@ -1,0 +1,197 @@
+"""The seam between the scheduler and the workers, and the worker that is this process."""
+
+from __future__ import annotations
+
+import gc
+import math
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from enfilade.arrays import release_memory
+from enfilade.errors import RunFolderError, SettingsError
+from enfilade.methods.base import Task
+from enfilade.runs.failure import Failure
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
+from enfilade.runs.worker import Worker
+from enfilade.settings import LimitSettings
+
+EXECUTORS = ("in-process", "processes", "ray", "ray:ADDRESS")
+MIN_PATHS_IN_FLIGHT = 1024
+
+
+@dataclass(frozen=True)
+class Workers:
+    """The workers that do the tasks of a run. They change no result.
+
+    Attributes
+    ----------
+    executor : str
+        One of :data:`EXECUTORS`.
+    count : int or None
+        Number of workers; None: one for each GPU, or CPU core.
+    threads : int
+        Of each worker; 0: its share of the cores.
+
+    Raises
+    ------
+    SettingsError
+        There is no such executor, or it has not as many workers.
+    """
+
+    executor: str = "in-process"
+    count: int | None = None
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        if self.executor not in EXECUTORS[:3] and not self.executor.startswith("ray:"):
+            raise SettingsError(
+                f"there is no executor {self.executor!r}; choose one of {', '.join(EXECUTORS)}"
+            )
+        if self.executor == "ray:":
+            raise SettingsError("ray: lacks the address of a cluster; ray:HOST:PORT joins one, ray starts one")
+        if self.executor == EXECUTORS[0] and (self.count or 1) > 1:
+            raise SettingsError(
+                f"--workers {self.count}: in-process is one worker; add --executor processes, or leave it out"
+            )
+
+
+@dataclass(frozen=True)
+class Order:
+    """A task for a worker.
+
+    Attributes
+    ----------
+    task : Task
+    reduction : int
+        Divides the number of paths in flight, after a lack of memory.
+    """
+
+    task: Task
+    reduction: int = 1
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The end of a task.
+
+    Attributes
+    ----------
+    slot : int
+        Of the worker.
+    line : dict or None
+        For the ledger.
+    failure : Failure or None
+        None: the task is finished.
+    """
+
+    slot: int
+    line: dict[str, Any] | None = None
+    failure: Failure | None = None
+
+
+class Executor(Protocol):
+    """Workers, each of which does one task at a time."""
+
+    @property
+    def slots(self) -> int:
+        """Number of workers."""
+        ...
+
+    def begin(self, slot: int, order: Order) -> None:
+        """Give a task to a worker that is free.
+
+        Raises
+        ------
+        EnfiladeError
+            No worker can be started.
+        """
+        ...
+
+    def wait(self, timeout_s: float | None) -> list[Ended]:
+        """Wait until tasks end, or for so long at most."""
+        ...
+
+    def discard(self, slot: int) -> None:
+        """End a worker that is free: the next task of its slot gets a new one."""
+        ...
+
+    def close(self) -> None:
+        """End all workers; tasks in hand are dropped."""
+        ...
+
+
+class InProcess:
+    """The one worker is this process.
+
+    Parameters
+    ----------
+    job
+    run
+    """
+
+    slots = 1
+
+    def __init__(self, job: Job, run: RunFolder) -> None:
+        self._job = job
+        self._run = run
+        self._worker: Worker | None = None
+        self._reduction = 1
+        self._order: Order | None = None
+
+    def begin(self, slot: int, order: Order) -> None:
+        """Take a task; it is done in :meth:`wait`."""
+        del slot
+        self._order = order
+
+    def wait(self, timeout_s: float | None) -> list[Ended]:
+        """Do the task."""
+        del timeout_s
+        order, self._order = self._order, None
+        if order is None:
+            return []
+        try:
+            if self._worker is None or order.reduction != self._reduction:
+                self.discard(0)
+                self._worker, self._reduction = open_worker(self._job, self._run, order.reduction), order.reduction
+            return [Ended(0, self._worker.do(order.task))]
+        except Exception as error:  # noqa: BLE001  (one task must not end the others)
+            self.discard(0)
+            return [Ended(0, failure=Failure.of(error, traceback.format_exc()))]
+
+    def discard(self, slot: int) -> None:
+        """Free the worker's memory."""
+        del slot
+        self._worker = None
+        gc.collect()  # a scene may be part of reference cycles
+        release_memory()
+
+    def close(self) -> None:
+        """Free the worker's memory."""
+        self.discard(0)
+
+
+def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
+    """A worker of this process.
+
+    Raises
+    ------
+    RunFolderError
+        This host would render another result: another scene, version or device.
+    """
+    if job.identity() != run.identity:
+        raise RunFolderError(
+            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer on this host is not "
+            "that with which the run began; `enfilade render` lists the differences"
+        )
+    if reduction > 1:
+        paths = job.settings[LimitSettings].paths_in_flight
+        least = min(MIN_PATHS_IN_FLIGHT, paths)
+        settings = job.settings.replace(LimitSettings, paths_in_flight=max(math.ceil(paths / reduction), least))
+        job = replace(job, settings=settings)
+    return Worker(job, run)
+
+
+Open = Callable[[], Executor]

@@ -1,0 +1,74 @@
+"""Why a task was not finished, and what that means for the run."""
+
+from __future__ import annotations
+
+import errno
+from dataclasses import dataclass
+from enum import Enum
+
+from enfilade import errors
+from enfilade.files import is_passing
+
+# Dr.Jit's words for too little memory; the second one while it records a kernel.
+OUT_OF_MEMORY = ("out of memory", "tried to free the allocation cache", "bad_alloc")
+
+
+class FailureKind(Enum):
+    """Classes of failures."""
+
+    ERROR = "error"  # an unexpected exception, an I/O error, a worker that died or took too long: tried again
+    MEMORY = "memory"  # too little memory: tried again with fewer paths in flight
+    DAMAGED = "damaged"  # a file that the task reads is not what was written: made again
+    FATAL = "fatal"  # the disk is full, or the input is wrong: ends the run
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """Why a task was not finished.
+
+    Attributes
+    ----------
+    kind : FailureKind
+    text : str
+        One line.
+    log : str
+        Traceback, or the last output of the worker.
+    error : EnfiladeError or None
+        To be raised where it ends the run.
+    """
+
+    kind: FailureKind
+    text: str
+    log: str = ""
+    error: errors.EnfiladeError | None = None
+
+    @staticmethod
+    def of(error: Exception, log: str = "") -> Failure:
+        """Classify an exception."""
+        text = f"{type(error).__name__}: {error}"
+        if _is_memory(error):
+            return Failure(FailureKind.MEMORY, text, log)
+        if isinstance(error, errors.DamagedFileError):
+            return Failure(FailureKind.DAMAGED, text, log, error)
+        if isinstance(error, errors.EnfiladeError) and not _is_passing(error):
+            return Failure(FailureKind.FATAL, text, log, error)
+        return Failure(FailureKind.ERROR, text, log)
+
+
+def _is_memory(error: BaseException | None) -> bool:
+    while error is not None:
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+            return True
+        if isinstance(error, RuntimeError) and any(words in str(error).lower() for words in OUT_OF_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _is_passing(error: BaseException | None) -> bool:
+    """Whether a disk or a network caused it, which may answer the next time."""
+    while error is not None:
+        if isinstance(error, OSError):
+            return is_passing(error)
+        error = error.__cause__
+    return False

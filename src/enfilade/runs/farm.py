@@ -1,0 +1,278 @@
+"""A run on a render farm: a job template of Open Job Description, or Slurm jobs through submitit.
+
+Each job task is an ordinary `enfilade work` command on a run folder that all hosts see, and may be given to any host
+again (https://github.com/OpenJobDescription, 2023-09).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.files import write_json
+from enfilade.runs.delivery import CLIPS, VIDEO, clip_spans
+from enfilade.runs.job import read_job
+from enfilade.runs.scheduler import passes_of
+
+TEMPLATE = "farm.template.json"  # in the run folder
+SPECIFICATION = "jobtemplate-2023-09"
+FRAMES_PER_SHARD = 16  # by default
+# A worker process of its own: one that crashes, or is killed for its memory, costs an attempt at its unit.
+WORKER = ("--executor", "processes", "--workers", "1")
+TIMEOUT_MIN = 60
+CORES = 8  # of a Slurm task: Slurm itself gives one
+TIMEOUTS = 10  # times that a Slurm task is queued again: what it has finished is not done again
+MOST_TASKS = 1001  # of an array, where Slurm's settings say nothing else
+CORE_OPTIONS = frozenset({"cpus_per_task", "slurm_cpus_per_task", "slurm_cpus_per_gpu", "slurm_exclusive"})
+TAIL = 20  # lines of what a task said that are told when it fails
+
+
+def shards_for(frames: int) -> int:
+    """Shards of a pass, by default."""
+    return max(math.ceil(frames / FRAMES_PER_SHARD), 1)
+
+
+def write_template(folder: Path, file: Path, shards: int | None = None) -> None:
+    """Write an Open Job Description template for a run that was begun.
+
+    Parameters
+    ----------
+    folder
+        The run.
+    file
+    shards
+        Shards of a pass; None: one for each 16 frames.
+
+    Raises
+    ------
+    RunFolderError
+        It holds no run, or the file can't be written.
+    """
+    write_json(file, template(folder, shards))
+
+
+def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
+    """See :func:`write_template`."""
+    job = read_job(folder)
+    count = shards or shards_for(len(job.path))
+    steps: list[dict[str, Any]] = []
+    for of in passes_of(job):
+        most = len(clip_spans(len(job.path))) if of.name == CLIPS.name else count
+        steps.append(_step(of.name, steps, min(count, most) if of.is_shared else 1))
+    return {
+        "specificationVersion": SPECIFICATION,
+        "name": f"enfilade {folder.resolve().name}"[:128],
+        "parameterDefinitions": [
+            {
+                "name": "Run",
+                "type": "STRING",
+                "default": str(folder.resolve()),
+                "description": "The run folder, by the name under which all hosts see it.",
+            },
+            {
+                "name": "Enfilade",
+                "type": "STRING",
+                "default": _executable(),
+                "description": "The command on the hosts.",
+            },
+        ],
+        "steps": steps,
+    }
+
+
+class Task:
+    """A command line as submitit runs it; one that is out of time, or gives way to others, is queued again.
+
+    Parameters
+    ----------
+    line
+    """
+
+    def __init__(self, line: list[str]) -> None:
+        self.line = line
+
+    def __call__(self) -> None:
+        """Run it, here; what it says goes into the job's logs.
+
+        Raises
+        ------
+        EnfiladeError
+            It failed.
+        """
+        last: deque[str] = deque(maxlen=TAIL)
+        with subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace") as process:  # noqa: S603
+            try:
+                for text in process.stderr or ():
+                    sys.stderr.write(text)
+                    last.append(text)
+            except BaseException:  # submitit ends the job from within a signal
+                process.kill()
+                raise
+        if process.returncode:
+            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {process.returncode}")
+
+    def checkpoint(self) -> Any:
+        """The same again: what is in the run folder is not done again."""
+        import submitit
+
+        return submitit.helpers.DelayedSubmission(self)
+
+
+def submit(
+    folder: Path, cluster: str, shards: int | None, options: dict[str, Any], tell: Callable[[str], object]
+) -> list[str]:
+    """Give a run that was begun to Slurm, step by step, each after the one before.
+
+    A step that fails takes those after it out of the queue.
+
+    Parameters
+    ----------
+    folder
+        The run.
+    cluster
+        ``slurm``, or ``local``: processes of this machine, one after the other, waited for.
+    shards
+        Shards of a pass; None: one for each 16 frames. Where Slurm takes fewer in an array, they
+        come as several arrays.
+    options
+        More parameters of submitit's executor, such as ``slurm_partition``, ``timeout_min`` and
+        ``cpus_per_task``, which is 8 where none says otherwise.
+    tell
+        Takes a line on each job as soon as it is submitted.
+
+    Returns
+    -------
+    list of str
+        Numbers of the jobs; of an array, the one that stands for all its tasks.
+
+    Raises
+    ------
+    EnfiladeError
+        submitit is not installed, Slurm refused a job, or a local one failed.
+    SettingsError
+        submitit knows no such parameter.
+    RunFolderError
+        It holds no run.
+    """
+    try:
+        import submitit
+    except ImportError as error:
+        raise EnfiladeError("Slurm needs submitit: pip install 'enfilade[farm]'") from error
+    made: list[str] = []
+    previous: list[str] = []
+    most = 1 if cluster == "local" else _most_tasks()  # one by one: each takes all cores, and memory
+    for step in template(folder, shards)["steps"]:
+        tasks = [Task(line) for line in _lines(step, folder)]
+        groups = [tasks[first : first + most] for first in range(0, len(tasks), most)]
+        ids: list[str] = []
+        for group in groups:
+            executor = _executor(submitit, folder, cluster, options, previous)
+            try:
+                with executor.batch():
+                    jobs = [executor.submit(task) for task in group]
+                ids.append(jobs[0].job_id.partition("_")[0])
+            except RuntimeError as error:  # all that submitit says of sbatch
+                raise EnfiladeError(_refused(step["name"], error, made)) from error
+            made.append(ids[-1])
+            tell(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
+            if cluster == "local":
+                _wait(step["name"], jobs[0], submitit.core.utils.UncompletedJobError)
+        previous = ids
+    return made
+
+
+def _executor(submitit: Any, folder: Path, cluster: str, options: dict[str, Any], previous: list[str]) -> Any:
+    """What takes the tasks of a step, after jobs of the step before."""
+    given = {"timeout_min": TIMEOUT_MIN, **options}
+    timeouts = given.pop("slurm_max_num_timeout", TIMEOUTS)
+    if cluster == "slurm":
+        if not CORE_OPTIONS & given.keys():
+            given["cpus_per_task"] = CORES
+        cores = given.get("slurm_cpus_per_task", given.get("cpus_per_task"))
+        if cores is not None:  # srun doesn't ask sbatch how many
+            given.setdefault("slurm_srun_args", [f"--cpus-per-task={cores}"])
+        more = {"requeue": True, **given.get("slurm_additional_parameters", {})}
+        if previous:
+            more |= {"dependency": "afterok:" + ":".join(previous), "kill-on-invalid-dep": "yes"}
+        given["slurm_additional_parameters"] = more
+    try:
+        executor = submitit.AutoExecutor(
+            folder=folder / "slurm", cluster=cluster, slurm_max_num_timeout=timeouts
+        )
+        executor.update_parameters(**given)
+    except (NameError, ValueError, AssertionError) as error:  # a parameter unknown, or of a wrong type
+        raise SettingsError(f"submitit takes no such --slurm: {error}") from error
+    except RuntimeError as error:
+        raise EnfiladeError(f"submitit: {error}") from error
+    return executor
+
+
+def _refused(step: str, error: Exception, made: list[str]) -> str:
+    numbers = " ".join(made)
+    after = (
+        f"jobs {numbers} are in the queue: they do the steps before; `scancel {numbers}` takes them out"
+        if made
+        else "nothing is in the queue"
+    )
+    return f"step {step!r} could not be submitted: {error}; {after}"
+
+
+def _most_tasks() -> int:
+    """How many tasks Slurm takes in an array."""
+    scontrol = shutil.which("scontrol")
+    if scontrol is None:
+        return MOST_TASKS
+    line = [scontrol, "show", "config"]
+    said = subprocess.run(line, capture_output=True, text=True, check=False).stdout  # noqa: S603
+    found = re.search(r"^MaxArraySize\s*=\s*(\d+)", said, re.MULTILINE)
+    return max(int(found[1]), 1) if found else MOST_TASKS
+
+
+def _wait(step: str, job: Any, uncompleted: type[Exception]) -> None:
+    try:
+        error = job.exception()
+    except uncompleted as lost:
+        error = lost
+    if error is not None:
+        raise EnfiladeError(f"step {step!r} failed: {error}")
+
+
+def _step(name: str, before: list[dict[str, Any]], count: int) -> dict[str, Any]:
+    arguments = ["work", "{{Param.Run}}", "--openjd", *WORKER]
+    step: dict[str, Any] = {"name": name}
+    if before:
+        step["dependencies"] = [{"dependsOn": before[-1]["name"]}]
+    if name != VIDEO.name:  # the last step does everything that is left, and writes the summary
+        arguments += ["--pass", name]
+    if count > 1:
+        shard = {"name": "Shard", "type": "INT", "range": f"1-{count}"}
+        step["parameterSpace"] = {"taskParameterDefinitions": [shard]}
+        arguments += ["--shard", "{{Task.Param.Shard}}/" + str(count)]
+    step["script"] = {"actions": {"onRun": {"command": "{{Param.Enfilade}}", "args": arguments}}}
+    return step
+
+
+def _lines(step: dict[str, Any], folder: Path) -> list[list[str]]:
+    """Command lines of a step's tasks."""
+    space = step.get("parameterSpace", {"taskParameterDefinitions": [{"range": "1-1"}]})
+    last = int(space["taskParameterDefinitions"][0]["range"].partition("-")[2])
+    values = {"{{Param.Run}}": str(folder.resolve())}
+    words = step["script"]["actions"]["onRun"]["args"]
+    return [
+        [_executable(), *(values.get(w, w).replace("{{Task.Param.Shard}}", str(shard)) for w in words)]
+        for shard in range(1, last + 1)
+    ]
+
+
+def _executable() -> str:
+    """The command of this installation."""
+    own = Path(sys.executable).with_name("enfilade")
+    return str(own) if own.exists() else "enfilade"

@@ -1,0 +1,205 @@
+"""A walkthrough to render: scene, camera path, method, settings."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade import __version__
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera
+from enfilade.errors import RunFolderError
+from enfilade.files import read_json
+from enfilade.images import check_encodable
+from enfilade.methods.base import Method
+from enfilade.methods.opener import open_method
+from enfilade.methods.walkthrough import viewing_of
+from enfilade.renderer import Renderer
+from enfilade.scene.opener import Scene
+from enfilade.settings import (
+    SECTIONS,
+    LimitSettings,
+    OutputSettings,
+    Settings,
+    VideoSettings,
+    ViewingSettings,
+)
+from enfilade.viewing import Viewing
+
+JOB_FILE = "job.json"  # in a run folder
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A walkthrough to render.
+
+    Attributes
+    ----------
+    scene : Scene
+    path : CameraPath
+    settings : Settings
+    method : str
+        A built-in method's name, or ``module:Class``.
+    """
+
+    scene: Scene
+    path: CameraPath
+    settings: Settings = field(default_factory=Settings)
+    method: str = "decoupled"
+
+    @property
+    def viewing(self) -> Viewing:
+        """Viewing conditions of the video."""
+        return viewing_of(self.path, self.settings)
+
+    def opened_method(self) -> Method:
+        """A new instance of the method.
+
+        Raises
+        ------
+        SettingsError
+            There is no such method.
+        """
+        return open_method(self.method)
+
+    def rendering_settings(self) -> Settings:
+        """The settings with all sections that the method does not read at their defaults."""
+        return self.settings.only([*self.opened_method().settings, LimitSettings])
+
+    def identity(self) -> dict[str, Any]:
+        """Everything on which the frames depend: a run folder holds the results of one identity.
+
+        Limits of resources are left out, and so is the video, which is encoded again where its settings change.
+
+        Raises
+        ------
+        SceneError
+            The scene is missing or malformed.
+        """
+        method = self.opened_method()
+        return {
+            "enfilade": __version__,
+            "method": {"name": method.name, "revision": method.revision},
+            "renderer": self.scene.renderer_identity(),
+            "scene": self.scene.fingerprint(),
+            "path": path_identity(self.path),
+            "settings": self.settings.to_tables([*method.settings, OutputSettings]),
+        }
+
+    def check(self) -> None:
+        """Refuse everything that can be known to be wrong before the scene is loaded.
+
+        Raises
+        ------
+        InputError
+        """
+        _ = self.viewing
+        self.opened_method().check(self.settings)
+        self.scene.check(self.settings[LimitSettings])
+        check_encodable(
+            self.settings[VideoSettings],
+            width=self.path.width,
+            height=self.path.height,
+            exposure_ev=self.settings[ViewingSettings].exposure_ev,
+        )
+
+    def preflight(self) -> None:
+        """Load the scene once in a process of its own, with limits of memory and time.
+
+        Raises
+        ------
+        SceneError
+        """
+        self.scene.preflight(self.settings)
+
+    def open_renderer(self) -> Renderer:
+        """Load the scene.
+
+        Raises
+        ------
+        SceneError
+            The scene is missing or malformed.
+        SettingsError
+            The method can't render it.
+        DeviceError
+            No usable LLVM or CUDA.
+        """
+        renderer = self.scene.open(self.settings)
+        self.opened_method().check_scene(renderer)
+        return renderer
+
+    def to_json(self) -> dict[str, Any]:
+        """All of it, fit for JSON; read back by :meth:`from_json`."""
+        path = self.path
+        return {
+            "scene": self.scene.to_json(),
+            "method": self.method,
+            "settings": self.settings.to_tables(dict.fromkeys([*SECTIONS, *self.opened_method().settings])),
+            "path": {
+                "size": [path.width, path.height],
+                "fps": path.fps,
+                "numbers": list(path.numbers),
+                "cuts": sorted(path.cuts),
+                "poses": [camera.world_from_camera.ravel().tolist() for camera in path.cameras],
+                "fov_deg": [camera.fov_deg for camera in path.cameras],
+            },
+        }
+
+    @staticmethod
+    def from_json(table: dict[str, Any]) -> Job:
+        """Read back from :meth:`to_json`.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            It is something else.
+        """
+        path = table["path"]
+        poses = np.array(path["poses"], np.float64).reshape(-1, 4, 4)
+        cameras = tuple(
+            Camera(pose, float(fov), *path["size"]) for pose, fov in zip(poses, path["fov_deg"], strict=True)
+        )
+        numbers = tuple(int(number) for number in path["numbers"])
+        kinds = list(dict.fromkeys([*SECTIONS, *open_method(table["method"]).settings]))
+        return Job(
+            scene=Scene.from_json(table["scene"]),
+            path=CameraPath(cameras, numbers, float(path["fps"]), frozenset(path["cuts"])),
+            settings=Settings.from_tables(table["settings"], kinds),
+            method=table["method"],
+        )
+
+
+def read_job(folder: Path) -> Job:
+    """The job of a run folder.
+
+    Raises
+    ------
+    RunFolderError
+        It holds none, or is damaged.
+    """
+    file = folder / JOB_FILE
+    if not file.is_file():
+        raise RunFolderError(f"{folder} holds no run; begin one with `enfilade render SCENE --out {folder}`")
+    try:
+        return Job.from_json(read_json(file))
+    except (KeyError, TypeError, ValueError) as error:
+        raise RunFolderError(f"{file} is damaged ({error}); run the command that made the run again") from error
+
+
+def path_identity(path: CameraPath) -> dict[str, Any]:
+    """Plain values, fit for JSON, that differ between any two camera paths."""
+    digest = hashlib.sha256()
+    for camera in path.cameras:
+        digest.update(camera.world_from_camera.tobytes())
+        digest.update(repr(camera.fov_deg).encode())
+    return {
+        "size": [path.width, path.height],
+        "fps": path.fps,
+        "frames": list(path.numbers),
+        "cuts": sorted(path.numbers[i] for i in path.cuts),
+        "poses": digest.hexdigest(),
+    }

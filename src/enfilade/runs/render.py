@@ -1,0 +1,225 @@
+"""From scene and camera path to frames, video and summary: begin a run, continue it, or share it out."""
+
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
+from enfilade.files import read_json, write_json
+from enfilade.images.codecs import odd_size_note
+from enfilade.methods.base import Task
+from enfilade.monitor import Monitor
+from enfilade.runs.delivery import ANALYSIS
+from enfilade.runs.executor import Workers
+from enfilade.runs.folder import LEDGER_FILE, RunFolder, check_place
+from enfilade.runs.job import JOB_FILE, Job, read_job
+from enfilade.runs.scheduler import is_done, passes_of, shortened, work
+from enfilade.runs.statistics import statistics
+from enfilade.settings import VideoSettings
+
+SUMMARY_FILE = "summary.json"
+
+
+def render(
+    job: Job,
+    folder: Path,
+    monitor: Monitor,
+    workers: Workers | None = None,
+    *,
+    is_verified: bool = False,
+    has_preflight: bool = False,
+) -> dict[str, Any]:
+    """Render a walkthrough into a run folder, or go on with one.
+
+    Finished tasks are not done again. Killed at any moment, the same call ends with the same frames, whatever the
+    workers.
+
+    Parameters
+    ----------
+    job
+    folder
+        The run folder; made if it is not there.
+    monitor
+    workers
+        By default this process.
+    is_verified
+        Compare every file with its checksum first, and make damaged ones again. Otherwise sizes are compared now,
+        and a checksum when its file is used.
+    has_preflight
+        Load the scene in a process of its own, with limits, before a new run begins.
+
+    Returns
+    -------
+    dict
+        The summary, which is also in ``summary.json``; see :func:`~enfilade.runs.statistics.statistics`.
+
+    Raises
+    ------
+    InputError
+        The scene, the settings, or a folder that holds another run.
+    DeviceError
+    NoSpaceError
+        The disk is full. All finished tasks stay.
+    UnfinishedError
+        Some tasks failed again and again; the rest is done.
+    """
+    with _created(job, folder, has_preflight=has_preflight) as run:
+        for note in (*run.notes, *_video_notes(job)):
+            monitor.say(note)
+        for name in run.damaged() if is_verified else ():
+            run.forget(name)
+            monitor.say(f"{name} is missing or damaged: its task is done again")
+        work(job, run, workers or Workers(), monitor)
+        summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
+        write_json(folder / SUMMARY_FILE, summary)
+    return summary
+
+
+def prepare(job: Job, folder: Path, *, has_preflight: bool = False) -> None:
+    """Begin a run folder without doing any of its tasks, for commands that share it.
+
+    Raises
+    ------
+    InputError
+        The scene, the settings, or a folder that holds another run.
+    """
+    _created(job, folder, has_preflight=has_preflight).close()
+
+
+def resume(folder: Path, monitor: Monitor, workers: Workers | None = None) -> dict[str, Any]:
+    """Do all tasks that are left of a run; see :func:`render`.
+
+    Raises
+    ------
+    RunFolderError
+        It holds no run.
+    """
+    return render(read_job(folder), folder, monitor, workers)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of several parts of a pass.
+
+    Attributes
+    ----------
+    pass_name : str
+    number : int
+        From 1.
+    count : int
+    """
+
+    pass_name: str
+    number: int = 1
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= self.count:
+            raise SettingsError(f"there is no shard {self.number} of {self.count}; they count from 1")
+
+
+def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers | None = None) -> None:
+    """Do a shard of a pass of a run, while other commands do others.
+
+    Parameters
+    ----------
+    folder
+        A run that was begun.
+    shard
+    monitor
+    workers
+
+    Raises
+    ------
+    RunFolderError
+        It holds no run, or one command has it to itself.
+    SettingsError
+        There is no such pass.
+    UnfinishedError
+        An earlier pass is not finished, or some tasks failed again and again.
+    """
+    job = read_job(folder)
+    names = [of.name for of in passes_of(job)]
+    if shard.pass_name not in names:
+        raise SettingsError(f"--method {job.method} has no pass {shard.pass_name!r}; it has {', '.join(names)}")
+    with RunFolder.share(folder) as run:
+        work(job, run, workers or Workers(), monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
+
+
+def _of_shard(job: Job, run: RunFolder, tasks: Sequence[Task], shard: Shard) -> list[Task]:
+    """Tasks of a shard, and those of earlier passes whose files are lost."""
+    if shard.pass_name != ANALYSIS.name and all(task.pass_name == ANALYSIS.name for task in tasks):
+        raise _too_early(run, ANALYSIS.name)
+    order = {of.name: index for index, of in enumerate(passes_of(job))}
+    earlier = [task for task in tasks if order[task.pass_name] < order[shard.pass_name]]
+    numbers = job.path.numbers
+    missing = [task for task in earlier if not run.was_finished(task.pass_name, numbers[task.frame])]
+    if missing:
+        names = shortened([f"{task.pass_name} {numbers[task.frame]}" for task in missing])
+        raise _too_early(run, missing[0].pass_name, f" ({names})")
+    lost = [task for task in earlier if not is_done(job, run, task)]
+    count = len(job.path)
+    mine = [
+        task
+        for task in tasks
+        if task.pass_name == shard.pass_name and task.frame * shard.count // count + 1 == shard.number
+    ]
+    return [*lost, *mine]
+
+
+def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedError:
+    return UnfinishedError(
+        f"{run.folder}: pass {pass_name!r} is not finished{which}; run `enfilade work {run.folder} --pass {pass_name}` "
+        "first"
+    )
+
+
+def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
+    """The run folder of a job, begun or continued; what is refused leaves nothing behind."""
+    job.check()
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        check_place(folder)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise RunFolderError(f"can't write in {folder}; choose another --out")
+        if has_preflight and not (folder / LEDGER_FILE).exists():
+            job.preflight()
+        run = RunFolder.create(folder, job.identity())
+    except BaseException:
+        for place in made:
+            with suppress(OSError):
+                place.rmdir()
+        raise
+    try:
+        _write_job(folder, job)
+    except BaseException:
+        run.close()
+        raise
+    return run
+
+
+def _write_job(folder: Path, job: Job) -> None:
+    table = job.to_json()
+    with suppress(RunFolderError):  # there is none yet, or it is damaged
+        if read_json(folder / JOB_FILE) == table:
+            return
+    write_json(folder / JOB_FILE, table)
+
+
+def _video_notes(job: Job) -> list[str]:
+    video = job.settings[VideoSettings]
+    odd = odd_size_note(video.codec, job.path.width, job.path.height)
+    view = f"noise is judged as the sRGB curve shows it, clipped at 1, not by the view of {video.ocio}"
+    return [note for note in (odd, view if video.ocio else "") if note]
+
+
+def _peak_memory_bytes() -> int:
+    """Of this process or the largest of its children so far."""
+    whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return 1024 * max(resource.getrusage(who).ru_maxrss for who in whom)

@@ -1,0 +1,105 @@
+"""What a run has done and spent so far, from its ledger alone: Tables 1 and 2, Figs. 12 and 13 (§6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from enfilade.methods.base import FRAMES
+from enfilade.runs.delivery import ANALYSIS, VIDEO
+from enfilade.runs.folder import RunFolder
+
+__all__ = ["TRACED", "add_costs", "speeds_deg_s", "statistics"]
+
+TRACED = {"slow": "slow", "specular": "specular", "occlusion": "disoccluded", "keyframes": "keyframe"}
+
+
+def statistics(run: RunFolder) -> dict[str, Any]:
+    """Gather the figures of a finished or running run.
+
+    Returns
+    -------
+    dict
+        ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``table1``: pixels traced, percent of those
+        of the finished frames, by reason. ``table2``: wall and CPU seconds, in total, by frame of the path and by
+        stage, over all sessions that worked on the run. ``per_frame``: provenance of the pixels of each finished
+        frame, percent, with the mean velocity (or None). ``rays``: per pixel and frame of the path, by kind;
+        ``rays_per_frame``: of each frame. ``segments``: the metric's result for each segment. ``dropped_samples``: NaN
+        or infinite samples that were left out.
+    """
+    lines, path = list(run.lines()), run.identity["path"]
+    count = len(path["frames"])
+    per_frame = _per_frame(path, lines, speeds_deg_s(path, lines))
+    table1 = {
+        name: sum(row[provenance] for row in per_frame) / max(len(per_frame), 1)
+        for name, provenance in TRACED.items()
+    }
+    rays = _rays(path, lines)
+    kinds = dict.fromkeys(kind for row in rays for kind in row if kind != "frame")
+    stages = add_costs(line.get("cost", {}) for line in lines)
+    wall, cpu = (sum(s[kind] for s in stages.values()) for kind in ("wall_s", "cpu_s"))
+    return {
+        "method": run.identity["method"]["name"],
+        "frames": count,
+        "size": list(path["size"]),
+        "fps": path["fps"],
+        "video": next((name for line in lines if line["pass"] == VIDEO.name for name in line["files"]), ""),
+        "table1": {**table1, "total": sum(table1.values())},
+        "table2": {"total_s": wall, "per_frame_s": wall / count, "cpu_s": cpu, "stages": stages},
+        "per_frame": per_frame,
+        "rays": {kind: sum(row.get(kind, 0.0) for row in rays) / count for kind in kinds},
+        "rays_per_frame": rays,
+        "segments": [segment for line in lines for segment in line.get("segments", ())],
+        "dropped_samples": sum(line.get("dropped", 0) for line in lines),
+    }
+
+
+def speeds_deg_s(path: Mapping[str, Any], lines: Iterable[Mapping[str, Any]]) -> dict[int, float]:
+    """Mean image velocity of the frames that are analyzed, deg/s, by index on the path."""
+    places = {number: index for index, number in enumerate(path["frames"])}
+    return {
+        places[line["frame"]] + offset: float(table["speed_deg_s"])
+        for line in lines
+        if line["pass"] == ANALYSIS.name
+        for offset, table in enumerate(line["frames"])
+    }
+
+
+def add_costs(costs: Iterable[Mapping[str, Mapping[str, float]]]) -> dict[str, dict[str, float]]:
+    """Sum the costs of tasks, by stage."""
+    total: dict[str, dict[str, float]] = {}
+    for cost in costs:
+        for stage, spent in cost.items():
+            into = total.setdefault(stage, {"wall_s": 0.0, "cpu_s": 0.0})
+            for kind, seconds in spent.items():
+                into[kind] += seconds
+    return total
+
+
+def _per_frame(
+    path: Mapping[str, Any], lines: list[dict[str, Any]], speed_deg_s: Mapping[int, float]
+) -> list[dict[str, Any]]:
+    counts = {line["frame"]: line["provenance"] for line in lines if line["pass"] == FRAMES}
+    pixels = path["size"][0] * path["size"][1]
+    rows = []
+    for index, number in enumerate(path["frames"]):
+        if number in counts:
+            row = {name: 100.0 * counts[number][name] / pixels for name in TRACED.values()}
+            speed = speed_deg_s.get(index)
+            rows.append({"frame": number, "velocity_deg_s": speed, **row, "traced": sum(row.values())})
+    return rows
+
+
+def _rays(path: Mapping[str, Any], lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rays a pixel of each frame, by kind."""
+    counted: dict[int, dict[str, int]] = {}
+    for line in lines:
+        for kind, count in line.get("rays", {}).items():
+            of = counted.setdefault(line["frame"], {})
+            of[kind] = of.get(kind, 0) + count
+    pixels = path["size"][0] * path["size"][1]
+    return [
+        {"frame": number, **{kind: count / pixels for kind, count in counted[number].items()}}
+        for number in path["frames"]
+        if number in counted
+    ]

@@ -1,0 +1,172 @@
+"""Does tasks of a run: loads the inputs, calls the method, writes the records, returns the ledger line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+from enfilade.cache import LruCache
+from enfilade.errors import RunFolderError
+from enfilade.images.records import read_record, write_record
+from enfilade.methods.analysis import Analysis, analyze, to_table
+from enfilade.methods.base import FRAMES, Output, Task
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.runs.delivery import (
+    ANALYSIS,
+    ANALYZED_FRAMES,
+    CLIPS,
+    VIDEO,
+    video_facts,
+    write_clip,
+    write_frame,
+    write_video,
+)
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
+from enfilade.runs.stopwatch import Stopwatch
+
+CACHED_RECORDS = 4
+RESERVED = frozenset({"pass", "frame", "files", "cost", "sum"})  # keys of a ledger line
+
+
+class Worker:
+    """Does tasks of a run, one after the other.
+
+    Parameters
+    ----------
+    job
+    run
+        It is only read; the lines that :meth:`do` returns are appended by the scheduler.
+    """
+
+    def __init__(self, job: Job, run: RunFolder) -> None:
+        self._job = job
+        self._run = run
+        self._method = job.opened_method()
+        self._records = {of.name: of.record for of in self._method.passes}
+        self._stopwatch = Stopwatch()
+        self._inputs = _Inputs(job, run, self._records, self._stopwatch)
+
+    def load(self) -> None:
+        """Load the scene."""
+        _ = self._walk
+
+    def do(self, task: Task) -> dict[str, Any]:
+        """Do a task.
+
+        Returns
+        -------
+        dict
+            Its line for the ledger. All files that it names are written.
+
+        Raises
+        ------
+        EnfiladeError
+        """
+        number = self._job.path.numbers[task.frame]
+        with self._stopwatch.timed(task.pass_name):
+            output, files = self._done(task)
+        if taken := RESERVED.intersection(output.facts):
+            raise ValueError(f"the ledger keeps these keys for itself: {', '.join(sorted(taken))}")
+        return {
+            "pass": task.pass_name,
+            "frame": number,
+            **output.facts,
+            "files": self._run.record_of(files),
+            "cost": self._stopwatch.take(),
+        }
+
+    def _done(self, task: Task) -> tuple[Output, list[Any]]:
+        match task.pass_name:
+            case ANALYSIS.name:
+                return self._analyzed(task.frame), []
+            case CLIPS.name:
+                return Output(facts=video_facts(self._job)), [write_clip(self._run, self._job, task.frame)]
+            case VIDEO.name:
+                return Output(facts=video_facts(self._job)), [write_video(self._run, self._job)]
+            case _:
+                output = self._method.run(task, self._inputs, self._walk)
+                return self._written(task, output)
+
+    def _analyzed(self, first: int) -> Output:
+        frames = range(first, min(first + ANALYZED_FRAMES, len(self._job.path)))
+        return Output(facts={"frames": [to_table(analyze(self._walk, frame)) for frame in frames]})
+
+    def _written(self, task: Task, output: Output) -> tuple[Output, list[Any]]:
+        files = []
+        with self._stopwatch.timed("files"):
+            for frame, record in output.records.items():
+                stem = self._run.stem(task.pass_name, self._job.path.numbers[frame])
+                if task.pass_name == FRAMES:
+                    files.append(write_frame(stem, record, self._walk.view(frame), self._job))
+                    output = Output(facts={**output.facts, "provenance": record.counts})
+                else:
+                    files.append(write_record(stem, record))
+                    self._inputs.keep(task.pass_name, frame, record)
+        return output, files
+
+    @cached_property
+    def _walk(self) -> Walkthrough:
+        settings = self._job.rendering_settings()
+        return Walkthrough(self._job.path, settings, self._job.open_renderer(), timed=self._stopwatch.timed)
+
+
+class _Inputs:
+    """Records and facts of earlier passes, from the run folder."""
+
+    def __init__(self, job: Job, run: RunFolder, kinds: Mapping[str, type | None], stopwatch: Stopwatch) -> None:
+        self._job = job
+        self._run = run
+        self._kinds = kinds
+        self._stopwatch = stopwatch
+        self._records: LruCache[tuple[str, int], Any] = LruCache(CACHED_RECORDS)
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """Of all frames."""
+        self._run.refresh()
+        return analysis_of(self._job, self._run)
+
+    def record(self, pass_name: str, frame: int) -> Any:
+        """See :class:`enfilade.methods.base.Inputs`."""
+        return self._records.get((pass_name, frame), lambda: self._read(pass_name, frame))
+
+    def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
+        """See :class:`enfilade.methods.base.Inputs`."""
+        number = self._job.path.numbers[frame]
+        line = self._run.line(pass_name, number)
+        if line is None:  # finished by another process, perhaps
+            self._run.refresh()
+            line = self._run.line(pass_name, number)
+        if line is None:
+            raise KeyError(f"{pass_name} {number} is not finished")
+        return line
+
+    def keep(self, pass_name: str, frame: int, record: Any) -> None:
+        """Cache a record that was just written."""
+        self._records.put((pass_name, frame), record)
+
+    def _read(self, pass_name: str, frame: int) -> Any:
+        kind = self._kinds[pass_name]
+        if kind is None:
+            raise ValueError(f"pass {pass_name!r} writes no records")
+        with self._stopwatch.timed("files"):
+            return read_record(self._run.file_of(pass_name, self._job.path.numbers[frame]), kind)
+
+
+def analysis_of(job: Job, run: RunFolder) -> Analysis:
+    """The analysis of all frames, from the ledger.
+
+    Raises
+    ------
+    RunFolderError
+        It is not finished.
+    """
+    tables: list[Mapping[str, Any]] = []
+    for first in range(0, len(job.path), ANALYZED_FRAMES):
+        line = run.line(ANALYSIS.name, job.path.numbers[first])
+        if line is None:
+            raise RunFolderError(f"{run.folder}: the path is not analyzed yet")
+        tables += line["frames"]
+    return Analysis.from_tables(job.path, job.rendering_settings(), tables)
