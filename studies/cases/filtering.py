@@ -1,10 +1,12 @@
-"""A frame of a window after the filter of §5, with any settings and along any flow."""
+"""A frame of a window after the filter of §5, with any settings and along any motion vectors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from enfilade.methods.paper import Slice, filter_along_flow, reconstruct, spatial_support_px, temporal_limits
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import spatial_support_px, temporal_limits
+from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.records import F32, Geometry
 from enfilade.settings import AntialiasSettings
 from studies.cases.windows import Windows
@@ -13,16 +15,16 @@ __all__ = ["antialiased", "reach_of"]
 
 
 def reach_of(settings: AntialiasSettings) -> int:
-    """Frames to either side at which the filter may look."""
+    """Frames to either side that the filter may use."""
     return max(settings.frames, settings.slow_frames) // 2
 
 
 def antialiased(
     windows: Windows,
     frame: int,
-    color_of: Callable[[int], F32],
     settings: AntialiasSettings,
-    seen_in: Callable[[int], Geometry] | None = None,
+    color_of: Callable[[int], F32] | None = None,
+    geometry_of: Callable[[int], Geometry] | None = None,
 ) -> F32:
     """Filter a frame with its neighbours.
 
@@ -30,33 +32,32 @@ def antialiased(
     ----------
     windows
     frame
-    color_of
-        Colours of each frame before the filter, (H, W, 3) float32.
     settings
-        Supports; a uniform one where the settings make no difference between velocities.
-    seen_in
-        Geometry of each frame whose flow is followed, in place of the surfaces' own; where it is said not
-        to be specular, the filter has its whole length.
+        Supports; uniform ones where the settings make no difference between velocities.
+    color_of
+        Colours of each frame before the filter, (H, W, 3) float32; by default those of the traced frames.
+    geometry_of
+        Geometry of each frame whose motion is followed, in place of the visible surfaces'. Where it is not
+        specular, the filter has its full length.
 
     Returns
     -------
     (H, W, 3) float32
     """
-    viewing = windows.job.viewing
+    viewing = windows.walk.viewing
     span = windows.around(frame, reach_of(settings))
     slices: dict[int, Slice] = {}
     for at in span:
-        speed_deg_s = windows.view(at).speed_deg_s
-        support = spatial_support_px(speed_deg_s, viewing.pixels_per_degree, settings)
-        geometry = windows.geometry(at) if seen_in is None else seen_in(at)
-        flow = windows.flow(at, None if seen_in is None else geometry)
-        slices[at] = Slice(reconstruct(color_of(at), support), geometry, flow)
+        color = windows.traced(at).color if color_of is None else color_of(at)
+        support = spatial_support_px(windows.view(at).speed_deg_s, viewing.pixels_per_degree, settings)
+        geometry = windows.geometry(at) if geometry_of is None else geometry_of(at)
+        flow = windows.flow(at, None if geometry_of is None else geometry)
+        slices[at] = Slice(reconstruct(color, support), geometry, flow)
     here = slices[frame]
-    speed_deg_s = viewing.velocity_deg_s(here.flow.speed)
     return filter_along_flow(
         here,
         [slices[at] for at in reversed(range(span.start, frame))],
         [slices[at] for at in range(frame + 1, span.stop)],
-        temporal_limits(speed_deg_s, here.geometry, settings),
+        temporal_limits(viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
         settings,
     )

@@ -1,4 +1,4 @@
-"""Pictures of the case studies: ghosts as in the paper's Fig. 10, and what mirrors show."""
+"""Pictures of the case studies: ghosts as in the paper's Fig. 10, and reflections in mirrors."""
 
 from __future__ import annotations
 
@@ -7,53 +7,67 @@ from pathlib import Path
 
 import numpy as np
 
+from enfilade.files import whole_file
 from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32, U8
 from enfilade.reports.charts import INK, Figure, save
 from enfilade.reports.heatmap import overlay
 from enfilade.reports.scales import VELOCITY
 
-__all__ = ["draw_ghosts", "draw_mirrors"]
+__all__ = ["draw_ghosts", "draw_mirrors", "write_example"]
 
 DPI = 110
 CROP_PX = 200  # side of the pictures
 
 
-def draw_ghosts(example: Mapping[str, F32], file: Path) -> Path:
+def write_example(file: Path, images: Mapping[str, F32]) -> None:
+    """Write the images of an example."""
+    with whole_file(file) as beside:
+        np.savez(beside, allow_pickle=False, **images)
+
+
+def draw_ghosts(example: Path, file: Path) -> Path:
     """Fig. 10: a crop unfiltered, filtered without and with separation, maps of the metric, velocity."""
-    crop = _crop_around(example["ghost"])
-    grey = _grey(example["apart"])
+    images = _read(example)
+    crop = _crop_around(images["ghost"])
+    grey = srgb_encode(np.clip(images["apart"], 0.0, 1.0)).mean(axis=2).astype(np.float32)
     pictures = {
-        "unfiltered": _encoded(example["raw"]),
-        "without separation": _encoded(example["together"]),
-        "with separation": _encoded(example["apart"]),
-        "as it should be": _encoded(example["reference"]),
-        "ghosts, JND in motion": _bytes(overlay(example["motion"], grey)),
-        "ghosts, JND as a still": _bytes(overlay(example["still"], grey)),
-        "ghosts": _bytes(np.repeat(example["ghost"][..., None], 3, axis=2)),
-        "velocity": VELOCITY.paint(example["speed_deg_s"]),
+        "unfiltered": _encoded(images["raw"]),
+        "without separation": _encoded(images["together"]),
+        "with separation": _encoded(images["apart"]),
+        "reference": _encoded(images["reference"]),
+        "ghosts, JND in motion": _bytes(overlay(images["motion"], grey)),
+        "ghosts, JND as a still": _bytes(overlay(images["still"], grey)),
+        "ghosts": _bytes(np.repeat(images["ghost"][..., None], 3, axis=2)),
+        "velocity": VELOCITY.paint(images["speed_deg_s"]),
     }
     return _pictures({name: image[crop] for name, image in pictures.items()}, 4, file)
 
 
-def draw_mirrors(example: Mapping[str, F32], file: Path) -> Path:
-    """What a mirror shows after each temporal filter, and four times its difference to what it should."""
-    crop = _crop_around(example["mirror"])
+def draw_mirrors(example: Path, file: Path) -> Path:
+    """A mirror after each temporal filter, and four times its difference to the reference."""
+    images = _read(example)
+    crop = _crop_around(images["mirror"])
     names = {
         "none": "no temporal filter",
-        "full": "along the mirror's flow",
+        "full": "along the mirror's motion",
         "short": "the same, 3 frames",
-        "reflected": "along the reflection's flow",
-        "reference": "as it should be",
+        "reflected": "along the reflection's motion",
+        "reference": "reference",
     }
-    wanted = _encoded(example["reference"]).astype(np.float32)
-    pictures = {title: _encoded(example[name])[crop] for name, title in names.items()}
-    for name, title in names.items():
-        if name == "reference":
-            continue
-        difference = 128.0 + 4.0 * (_encoded(example[name]).astype(np.float32) - wanted)
-        pictures[f"4 x difference: {title}"] = np.clip(difference, 0.0, 255.0).astype(np.uint8)[crop]
+    encoded = {name: _encoded(images[name])[crop] for name in names}
+    pictures = {title: encoded[name] for name, title in names.items()}
+    for name in list(names)[:-1]:
+        difference = encoded[name].astype(np.float32) - encoded["reference"].astype(np.float32)
+        pictures[f"4 x difference: {names[name]}"] = np.clip(128.0 + 4.0 * difference, 0.0, 255.0).astype(
+            np.uint8
+        )
     return _pictures(pictures, len(names), file)
+
+
+def _read(file: Path) -> dict[str, F32]:
+    with np.load(file, allow_pickle=False) as held:
+        return {name: held[name] for name in held.files}
 
 
 def _pictures(pictures: Mapping[str, U8], columns: int, file: Path) -> Path:
@@ -68,22 +82,17 @@ def _pictures(pictures: Mapping[str, U8], columns: int, file: Path) -> Path:
 
 
 def _crop_around(weight: F32) -> tuple[slice, slice]:
-    """The square, of :data:`CROP_PX` or as large as there is, that holds most of a map."""
+    """The square, of :data:`CROP_PX` or as large as there is, with the largest sum of a map."""
     height, width = weight.shape
     side = min(CROP_PX, height, width)
     sums = np.pad(weight.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-    held = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-    top, left = np.unravel_index(int(np.argmax(held)), held.shape)
+    inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    top, left = np.unravel_index(int(np.argmax(inside)), inside.shape)
     return slice(int(top), int(top) + side), slice(int(left), int(left) + side)
 
 
 def _encoded(color: F32) -> U8:
     return _bytes(srgb_encode(np.clip(color, 0.0, 1.0)))
-
-
-def _grey(color: F32) -> F32:
-    mean: F32 = srgb_encode(np.clip(color, 0.0, 1.0)).mean(axis=2).astype(np.float32)
-    return mean
 
 
 def _bytes(values: F32) -> U8:

@@ -1,4 +1,4 @@
-"""§5.4: what filtering along the flow does to what mirrors show."""
+"""§5.4: effect of temporal filters on the reflections in mirrors."""
 
 from __future__ import annotations
 
@@ -8,21 +8,35 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from enfilade.records import F32, Geometry, Mask
+from enfilade.records import Geometry, Mask
+from enfilade.settings import AntialiasSettings
+from studies.cases.case import Case
 from studies.cases.filtering import antialiased
 from studies.cases.mirrored import mirror_pixels
-from studies.cases.seen import Viewer, score_in, visible_percent
+from studies.cases.pictures import write_example
+from studies.cases.seen import scores_in
 from studies.cases.windows import Example, Row, Windows
 
-__all__ = ["measure", "most_mirrors"]
+__all__ = ["compare", "measure", "most_mirrors"]
 
-FRAME_PX = 2  # of a mirror's border, which shows its frame beside it: left out
-SCANNED = 24  # frames of a path that are looked at for mirrors
+FRAME_PX = 2  # of a mirror's border, which shows its frame, too: left out
+SCANNED = 24  # frames of a path that are searched for mirrors
+
+
+def measure(case: Case) -> dict[str, Any]:
+    """Measurements of the frames with most mirrors; the images of an example are written beside."""
+    windows = case.plain_windows
+    probes = most_mirrors(windows, case.terms.windows)
+    if not probes:
+        return {"frames": []}
+    rows, example = compare(windows, probes)
+    write_example(case.folder / "reflections.npz", example)
+    return rows
 
 
 def most_mirrors(windows: Windows, count: int) -> list[int]:
     """Frames that show most of mirrors, a tenth of the path apart, in order; none without mirrors."""
-    length = len(windows.job.path)
+    length = len(windows.walk.path)
     margin = min(8, length // 4)
     step = max((length - 2 * margin) // SCANNED, 1)
     share = {f: float(_inner(windows.geometry(f)).mean()) for f in range(margin, length - margin, step)}
@@ -33,62 +47,52 @@ def most_mirrors(windows: Windows, count: int) -> list[int]:
     return sorted(chosen[:count])
 
 
-def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Example]:
-    """Compare four temporal filters on mirrors with what should be seen in them.
+def compare(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Example]:
+    """Compare four temporal filters on mirrors with the reference.
 
-    ``none``: no temporal filter. ``full``: along the flow of the mirror's surface, as everywhere.
-    ``short``: the same over few frames, the paper's heuristic. ``reflected``: full, along the flow of the
+    ``none``: no temporal filter. ``full``: along the motion of the mirror's surface, as everywhere.
+    ``short``: the same over few frames, the paper's heuristic. ``reflected``: full, along the motion of the
     virtual image.
 
     Returns
     -------
     rows : dict
-        ``frames``: of each probe its number, ``mirror_percent`` of its pixels, and by filter, in motion
-        (at the velocity of what is seen in the mirror) and as stills: score, JND, and share above 1 JND.
+        ``frames``: of each probe its number, ``mirror_percent`` of its pixels, and by filter, in motion (at
+        the velocity of the reflection) and as stills: score, JND, and share above 1 JND.
     example : dict
         Colours by filter and ``reference`` of the probe with most mirrors, and ``mirror`` 0 or 1.
     """
-    rows, examples = windows.each("mirrors", probes, _probe)
+    rows, examples = windows.each("mirrors", probes, _compare)
     most = int(np.argmax([row["mirror_percent"] for row in rows]))
     return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
 
 
-def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
-    settings = windows.job.settings.antialias
-    geometry, seen = windows.geometry(frame), windows.seen(frame)
-    mirror = _inner(geometry)
-    reference = windows.reference(frame).color
-    velocity = windows.job.viewing.velocity_deg_s(windows.flow(frame, seen).motion)
-
-    def filtered(frames: int, *, follows: bool = False) -> F32:
-        chosen = replace(settings, specular_frames=frames)
-        return antialiased(
-            windows, frame, lambda f: windows.traced(f).color, chosen, windows.seen if follows else None
-        )
-
+def _compare(windows: Windows, frame: int) -> tuple[Row, Example]:
+    walk, viewer = windows.walk, windows.viewer
+    settings = walk.settings[AntialiasSettings]
+    mirror, reference = _inner(windows.geometry(frame)), windows.reference(frame).color
+    velocity = walk.viewing.velocity_deg_s(windows.flow(frame, windows.reflected(frame)).motion)
+    full = replace(settings, specular_frames=settings.frames)
     made = {
-        "none": filtered(1),
-        "full": filtered(settings.frames),
-        "short": filtered(settings.specular_frames),
-        "reflected": filtered(settings.frames, follows=True),
+        "none": antialiased(windows, frame, replace(settings, specular_frames=1)),
+        "full": antialiased(windows, frame, full),
+        "short": antialiased(windows, frame, settings),
+        "reflected": antialiased(windows, frame, full, geometry_of=windows.reflected),
     }
-    by_filter = {}
+    filters = {}
     for name, color in made.items():
-        maps = {"motion": viewer.paper(color, reference, velocity)}
-        maps["still"] = viewer.paper(color, reference, None)
-        maps["modern"] = viewer.modern(color, reference, velocity)
-        by_filter[name] = {
-            how: {"score": score_in(jnd, mirror), "visible_percent": visible_percent(jnd, mirror)}
-            for how, jnd in maps.items()
+        maps = {
+            "motion": viewer.paper(color, reference, velocity),
+            "still": viewer.paper(color, reference, None),
+            "modern": viewer.modern(color, reference, velocity),
         }
-    speed = np.hypot(velocity[..., 0], velocity[..., 1])
-    own = windows.view(frame).speed_deg_s
+        filters[name] = {how: scores_in(jnd, mirror) for how, jnd in maps.items()}
     row = {
-        "frame": windows.job.path.numbers[frame],
+        "frame": walk.path.numbers[frame],
         "mirror_percent": 100.0 * float(mirror.mean()),
-        "surface_deg_s": float(own[mirror].mean()),
-        "reflected_deg_s": float(speed[mirror].mean()),
-        "filters": by_filter,
+        "surface_deg_s": float(windows.view(frame).speed_deg_s[mirror].mean()),
+        "reflected_deg_s": float(np.hypot(velocity[..., 0], velocity[..., 1])[mirror].mean()),
+        "filters": filters,
     }
     return row, {**made, "reference": reference, "mirror": mirror.astype(np.float32)}
 

@@ -1,4 +1,4 @@
-"""Table 1: how many pixels are traced, and why (§6)."""
+"""Table 1: share of traced pixels, by reason (§6)."""
 
 from __future__ import annotations
 
@@ -15,21 +15,20 @@ PAPER = {  # Table 1, percent
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """Shares of traced pixels from the run's ledger, beside what there was to trace.
+    """Shares of traced pixels from the run's ledger, and of those that might have been.
 
     Returns
     -------
     dict
         ``table1``: percent by reason. ``specular_seen``: mean share of pixels on glossy, mirroring or
-        transparent surfaces, traced or not; ``slow_seen``: below v_t, keyframes and copies included.
+        transparent surfaces, traced or not; ``slow_seen``: below v_t, keyframes and repeated frames included.
         ``frames``, ``keyframes``: numbers of them.
     """
-    summary = case.rendered()
-    rows = summary["per_frame"]
+    summary, frames = case.rendered("paper"), case.analysis.frames
     return {
         "table1": summary["table1"],
-        "specular_seen": sum(case.survey.specular_percent) / len(rows),
-        "slow_seen": sum(case.survey.slow_percent) / len(rows),
-        "frames": len(rows),
-        "keyframes": sum(row["keyframe"] > 0.0 for row in rows),
+        "specular_seen": sum(of.specular_percent for of in frames) / len(frames),
+        "slow_seen": sum(of.slow_percent for of in frames) / len(frames),
+        "frames": len(frames),
+        "keyframes": sum(row["keyframe"] > 0.0 for row in summary["per_frame"]),
     }

@@ -1,4 +1,4 @@
-"""How large the case studies are: frames, pixels, paths."""
+"""Extent of the case studies: frames, pixels, paths."""
 
 from __future__ import annotations
 
@@ -12,34 +12,32 @@ PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixe
 
 @dataclass(frozen=True)
 class Terms:
-    """What is rendered for the case studies, the same for both scenes.
+    """Extent of the case studies, the same for both scenes.
 
     Attributes
     ----------
     preset : str
-        Of the scenes: how long their walks are, and how fine their shapes.
+        Of the scenes: length of their walks and fineness of their shapes.
     size : (int, int)
         Width and height of whole walkthroughs, pixels.
     spp : int
-        Paths of a pixel of whole walkthroughs.
+        Of whole walkthroughs.
     sweep_step : int
-        Holes of placements other than the paper's two are counted in every so many-th frame.
+        Disocclusions of placements other than the paper's two are counted in every so many-th frame.
     window_size : (int, int)
-        Size of the short sequences that are filtered in many ways.
-    window_spp : int
-        Their paths a pixel.
-    window_reference_spp : int
-        Paths a pixel of what is taken for the truth of them.
+        Size of the path-traced short sequences that are filtered in many ways.
+    window_spp, window_reference_spp : int
+        Of these sequences, and of their references.
     windows, traced_windows : int
-        How many such sequences a scene has without noise, and path traced.
+        Number of such sequences of a scene without noise, and path traced.
     reference_spp : int
-        Paths a pixel of what is taken for the truth of whole walkthroughs.
+        Of the references of whole walkthroughs.
     crop : (int, int)
-        Part of a frame, in its middle, in which the quality of whole walkthroughs is judged.
+        Part in the middle of a frame in which the quality of whole walkthroughs is measured.
     crops : int
-        In how many frames.
+        Number of such frames.
     most_spp : int
-        Paths a pixel up to which ART is sought; a quarter of those of the reference at most.
+        Largest spp that is tried for ART; a quarter of `reference_spp` at most.
     """
 
     preset: str
@@ -63,33 +61,13 @@ class Terms:
 
 TERMS = {
     "small": Terms(
-        preset="small",
-        size=(160, 120),
-        spp=16,
-        sweep_step=2,
-        window_size=(160, 120),
-        window_spp=32,
-        window_reference_spp=512,
-        windows=3,
-        traced_windows=2,
-        reference_spp=512,
-        crop=(160, 120),
-        crops=2,
-        most_spp=128,
+        preset="small", size=(160, 120), spp=16, sweep_step=2,
+        window_size=(160, 120), window_spp=32, window_reference_spp=512, windows=3, traced_windows=2,
+        reference_spp=512, crop=(160, 120), crops=2, most_spp=128,
     ),
     "full": Terms(
-        preset="full",
-        size=(640, 480),
-        spp=8,
-        sweep_step=4,
-        window_size=(240, 180),
-        window_spp=24,
-        window_reference_spp=384,
-        windows=4,
-        traced_windows=4,
-        reference_spp=1024,
-        crop=(256, 192),
-        crops=4,
-        most_spp=256,
+        preset="full", size=(640, 480), spp=8, sweep_step=4,
+        window_size=(240, 180), window_spp=24, window_reference_spp=384, windows=4, traced_windows=4,
+        reference_spp=1024, crop=(256, 192), crops=4, most_spp=256,
     ),
-}
+}  # fmt: skip

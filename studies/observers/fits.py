@@ -17,6 +17,7 @@ from enfilade.metric import Fitted
 from enfilade.monitor import Monitor, Silence
 from studies.observers import foley, modelfest
 from studies.observers.mode import Mode
+from studies.progress import counted
 
 __all__ = ["APERTURES_DEG", "TRANSDUCERS", "Fit", "fit", "measure"]
 
@@ -128,18 +129,16 @@ def measure(mode: Mode, monitor: Monitor) -> tuple[Fit, ...]:
     -----
     About a minute and a half of CPU time.
     """
-    monitor.stage(f"fits, {mode.name}", len(TRANSDUCERS) + len(APERTURES_DEG))
 
     def with_numbers(**numbers: float) -> Mode:
-        monitor.advance()
         return replace(mode, fitted=replace(mode.fitted, **numbers))
 
     masking = [
         foley.measure(with_numbers(neighbour_share=share, semi_saturation=z), Silence()).error_db
-        for share, z in TRANSDUCERS
+        for share, z in counted(TRANSDUCERS, f"fits of the transducer, {mode.name}", monitor)
     ]
     thresholds, masked = [], []
-    for sigma_deg in APERTURES_DEG:
+    for sigma_deg in counted(APERTURES_DEG, f"fits of the aperture, {mode.name}", monitor):
         other = with_numbers(aperture_sigma_deg=sigma_deg)
         thresholds.append(-modelfest.measure(other, Silence()).error_db)
         masked.append(foley.measure(other, Silence()).error_db)

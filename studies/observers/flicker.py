@@ -18,6 +18,7 @@ from enfilade.metric import sequence_score
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
+from studies.progress import counted
 
 __all__ = ["EXAMPLES", "Pair", "measure", "sequences"]
 
@@ -135,9 +136,8 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
     monitor : Monitor
         Is told of each example.
     """
-    monitor.stage(f"flicker, {mode.name}", len(EXAMPLES))
     found = {}
-    for example, (_, pan_px) in EXAMPLES.items():
+    for example, (_, pan_px) in counted(list(EXAMPLES.items()), f"flicker, {mode.name}", monitor):
         viewing = screen(SIZE_PX, PIXELS_PER_DEGREE, fps=FPS)
         flow_px = np.zeros((SIZE_PX, SIZE_PX, 2), dtype=np.float32)
         flow_px[..., 0] = -pan_px
@@ -148,5 +148,4 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
             judged = [judge.judge(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames]
             scores.append(sequence_score(comparison.score for comparison in judged))
         found[example] = Pair(*scores)
-        monitor.advance()
     return found

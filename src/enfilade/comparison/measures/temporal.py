@@ -16,7 +16,7 @@ from enfilade.records import F32, Mask
 __all__ = ["Temporal", "seen_before"]
 
 PLANE_TOLERANCE = 0.01  # of the depth: how far from its plane a surface point counts as that surface
-ITEM, POSITION, NORMAL, DEPTH, BACKWARD = "item", "P", "N", "Z", "backward"  # layers of a delivered frame
+SHAPE, POSITION, NORMAL, DEPTH = "shape_index", "P", "N", "Z"  # AOVs of a delivered frame
 
 
 class Temporal:
@@ -59,16 +59,16 @@ def seen_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.N
     Parameters
     ----------
     layers, last
-        Layers ``item``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one before it
+        AOVs ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one before it
         in the same shot.
 
     Returns
     -------
     (H, W) bool
-        True where the flow leads to a pixel that shows the same item on the same plane (or nothing, where
+        True where the flow leads to a pixel that shows the same shape on the same plane (or nothing, where
         nothing is seen).
     """
-    backward = layers[BACKWARD].astype(np.float32)
+    backward = layers["backward"].astype(np.float32)
     height, width = backward.shape[:2]
     column = np.arange(width) + backward[..., 0]
     row = np.arange(height)[:, None] + backward[..., 1]
@@ -76,7 +76,7 @@ def seen_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.N
     at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0).astype(int)
     step = last[POSITION][at] - layers[POSITION]
     off_plane = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
-    same: Mask = inside & (last[ITEM][at] == layers[ITEM]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
+    same: Mask = inside & (last[SHAPE][at] == layers[SHAPE]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
     return same
 
 
