@@ -23,9 +23,9 @@ WAYS = {"art": "ART", "rt": "RT", "ibr_rt": "IBR+RT (`paper`)", "decoupled": "`d
 REUSING = ("ibr_rt", "decoupled")
 FILTERS = {
     "none": "none",
-    "full": "11 frames, the mirror's own motion",
-    "short": "3 frames, the mirror's own motion (the paper's)",
-    "reflected": "11 frames, the motion of the reflection",
+    "full": "11 frames, the mirror's own flow",
+    "short": "3 frames, the mirror's own flow (the paper's)",
+    "reflected": "11 frames, the flow of the reflection",
 }
 
 
@@ -65,8 +65,8 @@ def _statistics(found: Values, terms: Terms, _folder: Path, place: Path) -> Bloc
     ]
     heads = (
         "scene", "light", "before, %", "after, %", "split ones before, %", "after, %",
-        "all before, no pursuit", "after, no pursuit",
-        "initial segments", "splits", "remaining", "still above 10 %", "split, below it without pursuit",
+        "all before, eye at rest", "after, eye at rest",
+        "initial segments", "splits", "remaining", "still above 10 %", "split, below it with the eye at rest",
     )  # fmt: skip
     drawn = [charts.draw_walk(of, scene, place / f"walkthrough-{scene}.png") for scene, of in found.items()]
     return _block([_size(terms), _table(heads, rows)], drawn)

@@ -50,9 +50,9 @@ def draw_mirrors(example: Path, file: Path) -> Path:
     crop = _crop_around(images["mirror"])
     names = {
         "none": "no temporal filter",
-        "full": "along the mirror's motion",
+        "full": "along the mirror's flow",
         "short": "the same, 3 frames",
-        "reflected": "along the reflection's motion",
+        "reflected": "along the reflection's flow",
         "reference": "reference",
     }
     encoded = {name: _encoded(images[name])[crop] for name in names}

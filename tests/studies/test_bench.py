@@ -1,0 +1,183 @@
+"""The bench on a small room, from the command line to its files; and its rivals."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from enfilade.comparison.measures import SCALES, why_missing
+from enfilade.errors import SettingsError
+from enfilade.images import read_exr
+from enfilade.methods.denoise import why_no_denoiser
+from enfilade.monitor import Silence
+from enfilade.runs.render import render
+from enfilade.settings import ReferenceSettings, SampleFilter, SamplingSettings
+from printed import as_text
+from scenes_analytic import room_walk
+from small_walks import ROOM, room_job
+from studies.__main__ import main
+from studies.bench.bench import Terms, bench
+from studies.bench.configurations import Preset, chosen, lineup, read_presets
+from studies.bench.measuring import available
+from studies.bench.tables import bench_tables
+
+NAMES = ["traced-1", "traced-4", *([] if why_no_denoiser() else ["denoised-2"])]
+
+
+def frames_of(run):
+    files = sorted((run / "frames").glob("*.exr"))
+    return np.stack([read_exr(file)["RGB"].astype(float) for file in files])
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory):
+    """Arguments of a bench of four frames, 48x36; its folder is the last one."""
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "room.xml").write_text(ROOM)
+    cameras = [
+        {"camera_to_world": camera.world_from_camera.ravel().tolist(), "fov": 50, "aspect": 4 / 3}
+        for camera in room_walk(4, size=(48, 36)).cameras
+    ]
+    values = {"render_width": 48, "render_height": 36, "fps": 30, "camera_type": "perspective"}
+    (folder / "path.json").write_text(json.dumps({**values, "seconds": 4 / 30, "camera_path": cameras}))
+    files = (folder / "room.xml", "--path", folder / "path.json")
+    flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
+    only = [word for name in NAMES for word in ("--only", name)]
+    measures = ("--measure", "aqm", "--measure", "psnr", "--measure", "temporal")
+    return [str(word) for word in ("bench", *files, *flags, *only, *measures, "--out", folder / "bench")]
+
+
+@pytest.fixture(scope="module")
+def held(line, tmp_path_factory):
+    result = CliRunner().invoke(main, line)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout), tmp_path_factory.getbasetemp().joinpath(line[-1])
+
+
+def test_every_configuration_is_rendered_charged_and_measured(held):
+    found, folder = held
+    assert [row["name"] for row in found["configurations"]] == NAMES
+    for row in found["configurations"]:
+        assert set(row["cost"]["stages"]) == {"frames", "trace", "files"}
+        assert row["cost"]["cpu_s"] == pytest.approx(sum(s["cpu_s"] for s in row["cost"]["stages"].values()))
+        assert 50.0 < row["cost"]["peak_mib"] < 4000.0
+        assert len(frames_of(folder / "configurations" / row["name"])) == 4
+        scores = json.loads((folder / "scores" / f"{row['name']}.json").read_text())["measures"]
+        assert row["scores"] == {name: scores[name]["score"] for name in ("aqm", "psnr", "temporal")}
+        assert scores["temporal"]["per_frame"][0] is None
+    assert json.loads((folder / "bench.json").read_text()) == found
+    for name in ("bench.png", "crops.png", "slices.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    text = "".join(as_text(table) for table in bench_tables(found))
+    assert all(name in text for name in (*NAMES, "noise floor"))
+
+
+def test_more_paths_score_better_and_the_noise_floor_better_still(held):
+    found, folder = held
+    rows = {row["name"]: row for row in found["configurations"]}
+    for name, of in found["measures"].items():
+        few, many = rows["traced-1"]["scores"][name], rows["traced-4"]["scores"][name]
+        floor = found["reference"]["noise_floor"][name]
+        assert sorted((few, many, floor), reverse=not of["is_more_better"]) == [few, many, floor]
+    filters = {rows[name]["pixel_filter"] for name in NAMES}
+    assert filters == set(found["reference"]["filters"])
+    seeds = [
+        json.loads((folder / run / "run.json").read_text())["identity"]["settings"]["trace"]["seed"]
+        for run in ("references/gaussian", "configurations/traced-1")
+    ]
+    assert seeds[0] != seeds[1]
+
+
+def test_finished_configurations_are_not_rendered_again(held, line, run):
+    found, folder = held
+    made = {file: file.stat().st_mtime_ns for file in folder.rglob("*.exr")}
+    again = json.loads(run(*line).stdout)
+    assert again["configurations"] == found["configurations"]
+    assert {file: file.stat().st_mtime_ns for file in folder.rglob("*.exr")} == made
+    other = run(*line, "--seed", "7")
+    assert other.exit_code == 2
+    assert "holds another run" in other.stderr
+    # A run that lost a frame is finished, to the same end.
+    lost = next((folder / "configurations" / "traced-4" / "frames").glob("*.exr"))
+    lost.unlink()
+    (folder / "configurations" / "traced-4" / "summary.json").unlink()
+    again = json.loads(run(*line).stdout)
+    assert lost.is_file()
+    scores = [[row["scores"] for row in of["configurations"]] for of in (again, found)]
+    assert scores[0] == scores[1]
+
+
+@pytest.mark.parametrize("counts", ["4,x", "0", "-1", "", "4,,8", "²"])
+def test_wrong_lists_of_paths_are_refused(run, line, counts):
+    result = run(*line, "--spp", counts)
+    assert result.exit_code == 2
+    assert "write it like 4,16,64" in result.output
+
+
+def test_an_unknown_configuration_is_refused(run, line):
+    result = run(*line, "--only", "best")
+    assert result.exit_code == 2
+    assert "no configuration is called 'best'; there are: traced-1" in result.stderr
+
+
+def test_missing_rivals_and_measures_are_reported(tmp_path, monkeypatch):
+    job = room_job(tmp_path, 2, method="reference")
+    monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
+    with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
+        bench(job, lineup(job, traced=(), denoised=(1,), presets=()), Terms(4), tmp_path / "bench")
+    reasons = {name: "" if name == "psnr" else f"no {name}" for name in SCALES}
+    monkeypatch.setattr("studies.bench.measuring.why_no_measure", reasons.get)
+    assert available((), job) == (["psnr"], [why for why in reasons.values() if why])
+    with pytest.raises(SettingsError, match="no flip"):
+        available(("flip",), job)
+
+
+def test_a_single_frame_has_no_changes_to_measure(tmp_path):
+    names, left_out = available((), room_job(tmp_path, 1))
+    assert "temporal" not in names
+    assert any("temporal is left out" in text for text in left_out)
+    assert set(names) < {name for name in SCALES if not why_missing(name)}
+
+
+def test_presets_of_a_file(tmp_path):
+    file = tmp_path / "presets.toml"
+    file.write_text('[fine]\nmethod = "decoupled"\ndecoupled = { quality = 3 }\n[old]\nmethod = "paper"\n')
+    presets = read_presets(file)
+    assert presets == (Preset("fine", "decoupled", {"decoupled": {"quality": 3}}), Preset("old", "paper"))
+    job = room_job(tmp_path, 2)
+    found = lineup(job, traced=(1,), denoised=(2,), presets=presets)
+    names = ["traced-1", "denoised-2", "denoised-2-fast", "minterpolate-1", "fine", "old"]
+    assert [c.name for c in found] == names
+    assert [c.name for c in chosen(found, ["denoised-*", "old"])] == ["denoised-2", "denoised-2-fast", "old"]
+    assert found[1].job.settings[ReferenceSettings].pixel_filter is SampleFilter.BOX
+    assert found[5].job.settings == job.settings
+    wrong = {"[a]\n": "needs method", "": "no preset", '["../x"]\nmethod = "paper"\n': "folder"}
+    for text, message in wrong.items():
+        file.write_text(text)
+        with pytest.raises(SettingsError, match=message):
+            read_presets(file)
+
+
+def interpolated(folder, path=None, **tables):
+    job = room_job(folder, 5, method="studies.bench.rivals:Interpolated", **tables)
+    render(job if path is None else replace(job, path=path), folder / "run", Silence())
+    return frames_of(folder / "run")
+
+
+def test_interpolated_frames_keep_keyframes_and_highlights(tmp_path):
+    found = interpolated(tmp_path, viewing={"exposure_ev": -2.0})
+    traced = room_job(tmp_path, 5, method="reference", viewing={"exposure_ev": -2.0})
+    assert traced.settings[SamplingSettings].spp == 4
+    render(traced, tmp_path / "traced", Silence())
+    np.testing.assert_array_equal(found[[0, 4]], frames_of(tmp_path / "traced")[[0, 4]])
+    assert found[2].max() > 1.3  # in-betweens are not clipped at white before they are exposed
+
+
+def test_interpolation_rests_where_the_camera_does(tmp_path):
+    walk = room_walk(10, size=(48, 36))
+    cameras = (*walk.cameras[:4], *[walk.cameras[3]] * 6, *walk.cameras[4:])
+    found = interpolated(tmp_path, replace(walk, cameras=cameras, numbers=tuple(range(1, 17))))
+    assert all((found[frame] == found[3]).all() for frame in range(4, 10))
+    assert (found[10] != found[3]).any()
