@@ -61,7 +61,7 @@ def windows_of(
     source = PlainlyLit(renderer) if folder is None else renderer
     walk = Walkthrough(path or room_walk(count, size=(64, 48)), settings_of(), source)
     analysis = Analysis(walk.path, walk.settings, tuple(analyze(walk, f) for f in range(len(walk.path))))
-    return Windows(walk, analysis, Silence(), reference_spp=64, folder=folder)
+    return Windows(walk, analysis, Silence(), probes=2, reference_spp=64, folder=folder)
 
 
 def room_job(folder: Path, count: int, *, method: str = "paper", **tables: dict[str, Any]) -> Job:

@@ -5,19 +5,17 @@
     references/box/ gaussian/    run folders, with all AOVs
     configurations/NAME/         a run folder each
     scores/NAME.json             measures of each
-    bench.json  bench.png  crops.png  slices.png
+    bench.json  bench.png  crops.png
 """
 
 from __future__ import annotations
 
 import json
-import re
-import resource
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -51,35 +49,21 @@ from studies.bench.rivals import why_missing
 from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
 
-__all__ = ["Terms", "bench", "forecast_s"]
-
 PATHS_PER_CPU_S = 1.0e6  # of a furnished room on one core of 2026; for a rough forecast
 WARM_FRAMES = 3  # of the path, rendered and thrown away before anything is counted: kernels are compiled
-VIDEO_PASSES = (CLIPS.name, VIDEO.name)  # not charged: rivals need no video
-RIVALS_UNCHARGED = (ANALYSIS.name, "gbuffer")  # nor G-buffers
-
-
-@dataclass(frozen=True)
-class Terms:
-    """Terms of a bench.
-
-    Attributes
-    ----------
-    reference_spp : int
-        Of the references. Their own noise is the noise floor of every error.
-    measures : tuple of str
-        Names; empty: all that can be had here.
-    reference_device
-        For the kernels of references, whose cost is not measured. Configurations run on the CPU.
-    """
-
-    reference_spp: int
-    measures: tuple[str, ...] = ()
-    reference_device: Choice = "auto"
+UNCHARGED = (CLIPS.name, VIDEO.name)  # rivals need no video
+RIVALS_UNCHARGED = (*UNCHARGED, ANALYSIS.name, "gbuffer")  # nor G-buffers
 
 
 def bench(
-    job: Job, configurations: Sequence[Configuration], terms: Terms, folder: Path, *, quiet: bool = False
+    job: Job,
+    configurations: Sequence[Configuration],
+    folder: Path,
+    *,
+    reference_spp: int,
+    measures: Sequence[str] = (),
+    reference_device: Choice = "auto",
+    quiet: bool = False,
 ) -> dict[str, Any]:
     """Render and measure all configurations, or go on with it.
 
@@ -91,9 +75,15 @@ def bench(
     job
         Scene, path and settings.
     configurations
-    terms
+        They run on the CPU.
     folder
         Made if it is not there.
+    reference_spp
+        Of the references. Their own noise is the noise floor of every error.
+    measures
+        Names; empty: all that can be had here.
+    reference_device
+        For the kernels of references, whose cost is not measured.
     quiet
         Whether no progress is shown.
 
@@ -110,15 +100,16 @@ def bench(
         A measure that was asked for can't be had here, or no configuration can be rendered.
     """
     job.check()
-    names, left_out = available(terms.measures, job)
+    names, left_out = available(measures, job)
     reasons = {family: why for family in FAMILIES if (why := why_missing(family))}
     missing = reasons.keys() & {c.family for c in configurations}
     left_out += [f"{FAMILIES[family]} is left out: {reasons[family]}" for family in sorted(missing)]
     able = [c for c in configurations if c.family not in reasons]
     if not able:
         raise SettingsError(f"no configuration can be rendered: {'; '.join(left_out)}")
-    of = _Bench(job, terms, folder, names, quiet=quiet)
-    references = {kind.value: of.reference(kind) for kind in dict.fromkeys(c.pixel_filter for c in able)}
+    of = _Bench(job, folder, names, quiet=quiet)
+    filters = dict.fromkeys(c.pixel_filter for c in able)
+    references = {kind.value: of.reference(kind, reference_spp, reference_device) for kind in filters}
     rows = [of.row(configuration) for configuration in able]
     found = {
         **origin(),
@@ -131,16 +122,12 @@ def bench(
         "pixels_per_degree": job.viewing.pixels_per_degree,
         "exposure_ev": job.settings[ViewingSettings].exposure_ev,
         "reference": {
-            "spp": terms.reference_spp,
+            "spp": reference_spp,
             "filters": references,
-            "noise_floor": of.noise_floor(able),
+            "noise_floor": of.noise_floor(able, reference_spp),
         },
         "measures": {
-            name: {
-                "title": SCALES[name].title,
-                "unit": SCALES[name].unit,
-                "is_more_better": SCALES[name].is_more_better,
-            }
+            name: {key: getattr(SCALES[name], key) for key in ("title", "unit", "is_more_better")}
             for name in names
         },
         "left_out": left_out,
@@ -151,52 +138,51 @@ def bench(
     return found
 
 
-def forecast_s(job: Job, configurations: Sequence[Configuration], terms: Terms, cores: int) -> float:
+def forecast_s(job: Job, configurations: Sequence[Configuration], reference_spp: int, cores: int) -> float:
     """Rough duration of a bench from its beginning on CPUs, wall seconds: by its paths alone."""
     pixels = job.path.width * job.path.height * len(job.path)
     filters = len({c.pixel_filter for c in configurations})
-    own = (c.job.settings[SamplingSettings].spp for c in configurations if c.family in ("traced", "denoised"))
-    return pixels * (terms.reference_spp * filters + sum(own)) / PATHS_PER_CPU_S / cores
+    own = (c.spp for c in configurations if c.family in ("traced", "denoised"))
+    return pixels * (reference_spp * filters + sum(own)) / PATHS_PER_CPU_S / cores
 
 
 class _Bench:
     """References and configurations, each rendered and measured once."""
 
-    def __init__(self, job: Job, terms: Terms, folder: Path, names: Sequence[str], *, quiet: bool) -> None:
-        self._job, self._terms, self._folder, self._names, self._quiet = job, terms, folder, names, quiet
+    def __init__(self, job: Job, folder: Path, names: Sequence[str], *, quiet: bool) -> None:
+        self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
 
-    def reference(self, pixel_filter: SampleFilter) -> dict[str, Any]:
+    def reference(self, pixel_filter: SampleFilter, spp: int, device: Choice) -> dict[str, Any]:
         """Render a reference, with random numbers of its own: its cost and the renderer's variant."""
-        trace = self._job.settings[TraceSettings]
+        seed = (self._job.settings[TraceSettings].seed + 1) % 2**32
         settings = (
-            self._job.settings.replace(TraceSettings, seed=(trace.seed + 1) % 2**32)
-            .replace(SamplingSettings, spp=self._terms.reference_spp)
+            self._job.settings.replace(TraceSettings, seed=seed)
+            .replace(SamplingSettings, spp=spp)
             .replace(ReferenceSettings, pixel_filter=pixel_filter)
             .replace(OutputSettings, layers="all")
         )
-        job = replace(self._job, method="reference", settings=settings)
-        folder = self._reference(pixel_filter)
-        _render_alone(job, folder, self._terms.reference_device, is_warm=False, quiet=self._quiet)
+        folder, job = self._reference(pixel_filter), replace(self._job, method="reference", settings=settings)
+        _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
         run = RunFolder.read(folder)
-        return {**_cost(run, uncharged=VIDEO_PASSES), "variant": run.identity["renderer"]["variant"]}
+        return {**_cost(run, UNCHARGED), "variant": run.identity["renderer"]["variant"]}
 
     def row(self, one: Configuration) -> dict[str, Any]:
         """Render and measure a configuration: its row of the result."""
         folder = self._run(one)
-        peak_bytes = _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
-        uncharged = (*VIDEO_PASSES, *RIVALS_UNCHARGED) if one.is_rival else VIDEO_PASSES
-        found = self._measured(one.name, folder, self._reference(one.pixel_filter), peak_bytes=peak_bytes)
+        _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
         return {
             "name": one.name,
             "family": one.family,
-            "spp": one.job.settings[SamplingSettings].spp,
+            "spp": one.spp,
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
-            "cost": {**_cost(RunFolder.read(folder), uncharged), "peak_mib": found["peak_bytes"] / 2**20},
-            "scores": {name: found["measures"][name]["score"] for name in self._names},
+            "cost": _cost(RunFolder.read(folder), RIVALS_UNCHARGED if one.is_rival else UNCHARGED),
+            "scores": self._scores(one.name, folder, self._reference(one.pixel_filter)),
         }
 
-    def noise_floor(self, configurations: Sequence[Configuration]) -> dict[str, float | None]:
+    def noise_floor(
+        self, configurations: Sequence[Configuration], reference_spp: int
+    ) -> dict[str, float | None]:
         """Scores of a perfect configuration: all of its error is the noise of the reference.
 
         A path-traced configuration of N paths and the reference of R differ by noise whose variance is 1/N +
@@ -205,16 +191,12 @@ class _Bench:
         traced = [c for c in configurations if c.family == "traced"]
         if not traced:
             return {}
-        one = max(traced, key=lambda c: c.job.settings[SamplingSettings].spp)
-        ratio = self._terms.reference_spp / one.job.settings[SamplingSettings].spp
-        reference = self._reference(one.pixel_filter)
-        found = self._measured("noise floor", self._run(one), reference, share=(1.0 + ratio) ** -0.5)
-        return {name: found["measures"][name]["score"] for name in self._names}
+        one = max(traced, key=lambda c: c.spp)
+        share = (1.0 + reference_spp / one.spp) ** -0.5
+        return self._scores("noise floor", self._run(one), self._reference(one.pixel_filter), share)
 
-    def _measured(
-        self, name: str, test: Path, reference: Path, *, share: float = 1.0, peak_bytes: int = 0
-    ) -> dict[str, Any]:
-        """Measures of a run folder, and its peak memory, from their file as far as it holds them."""
+    def _scores(self, name: str, test: Path, reference: Path, share: float = 1.0) -> dict[str, float | None]:
+        """Scores of a run folder by measure, from their file as far as it holds them."""
         settings = self._job.settings
         of = {
             "runs": [RunFolder.read(folder).digest() for folder in (test, reference)],
@@ -225,17 +207,13 @@ class _Bench:
         file = self._folder / "scores" / f"{name}.json"
         found: dict[str, Any] = read_json(file) if file.is_file() else {}
         if found.get("of") != of:
-            found = {"of": of, "measures": {}, "peak_bytes": 0}
-        missing = [measure for measure in self._names if measure not in found["measures"]]
-        if missing:
+            found = {"of": of, "measures": {}}
+        if missing := [measure for measure in self._names if measure not in found["measures"]]:
             with watch(quiet=self._quiet) as monitor:
-                stage = f"{name}: measures"
-                found["measures"] |= measure(
-                    test, reference, self._job, missing, monitor, stage=stage, share=share
-                )
-        found["peak_bytes"] = max(found["peak_bytes"], peak_bytes)
-        write_json(file, found)
-        return found
+                shown = Prefixed(monitor, name)
+                found["measures"] |= measure(test, reference, self._job, missing, shown, share=share)
+            write_json(file, found)
+        return {measure: found["measures"][measure]["score"] for measure in self._names}
 
     def _run(self, one: Configuration) -> Path:
         return self._folder / "configurations" / one.name
@@ -252,15 +230,15 @@ def _cost(run: RunFolder, uncharged: Sequence[str]) -> dict[str, Any]:
     return {**total, "stages": charged}
 
 
-def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quiet: bool) -> int:
-    """Render in a new process, unless the run is finished; returns the process's peak memory, bytes."""
+def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quiet: bool) -> None:
+    """Render in a new process, unless the run is finished."""
     if _is_finished(job, folder):
-        return 0
+        return
     context = get_context("spawn")
     # The device is chosen before the job is unpickled: Dr.Jit's array types bind to it at import.
     with ProcessPoolExecutor(1, mp_context=context, initializer=activate, initargs=(device,)) as pool:
         try:
-            return pool.submit(_render, job, folder, is_warm=is_warm, quiet=quiet).result()
+            pool.submit(_render, job, folder, is_warm=is_warm, quiet=quiet).result()
         except BrokenProcessPool as error:
             raise EnfiladeError(
                 f"the process that rendered {folder} was killed, perhaps for lack of memory; the same "
@@ -276,16 +254,13 @@ def _is_finished(job: Job, folder: Path) -> bool:
     return bool({**wanted, "renderer": None} == {**there, "renderer": None})
 
 
-def _render(job: Job, folder: Path, *, is_warm: bool, quiet: bool) -> int:
+def _render(job: Job, folder: Path, *, is_warm: bool, quiet: bool) -> None:
     """Compile the kernels, then render; the function of the new process."""
     if is_warm:
         with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
             render(_excerpt(job), Path(place) / "run", Silence())
     with watch(quiet=quiet) as monitor:
         render(job, folder, Prefixed(monitor, folder.name))
-    # Not ru_maxrss alone: Linux hands a new process the peak of the process that started it.
-    match = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
-    return 1024 * (int(match[1]) if match else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def _excerpt(job: Job) -> Job:
@@ -294,6 +269,6 @@ def _excerpt(job: Job) -> Job:
     count = min(WARM_FRAMES, len(path))
     frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
     spp = min(job.settings[SamplingSettings].spp, PASS)  # more make no other kernel
-    settings = job.settings.replace(SamplingSettings, spp=spp)
     cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
+    settings = job.settings.replace(SamplingSettings, spp=spp)
     return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)

@@ -11,8 +11,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
 from studies.bench.ratios import OURS, Point, front
 
-__all__ = ["STYLES", "plot_bench"]
-
 DPI = 130
 PANEL_IN = (5.6, 4.1)
 STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and line as well as by colour
@@ -28,15 +26,7 @@ TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 
 
 def plot_bench(found: Mapping[str, Any], file: Path) -> Path:
-    """Draw a panel for each measure, CPU time to the right, quality upwards.
-
-    Parameters
-    ----------
-    found
-        Contents of ``bench.json``.
-    file
-        The PNG.
-    """
+    """Draw a panel for each measure of ``bench.json``, CPU time to the right, quality upwards, as PNG."""
     measures, machine = found["measures"], found["machine"]
     columns = 2 if len(measures) > 1 else 1
     rows = -(-len(measures) // columns)

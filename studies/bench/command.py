@@ -10,28 +10,15 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.options import json_option, path_options, quiet_option, settings_of, settings_options
-from enfilade.device import activate
+from enfilade.cli.options import job_of, json_option, path_options, quiet_option, settings_options
 
 
-class Counts(click.ParamType[tuple[int, ...]]):
+def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tuple[int, ...]:
     """Numbers of paths, written ``4,16,64``; ``none`` for no configuration."""
-
-    name = "N,N,..."
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, ...]:
-        """Read the numbers."""
-        if isinstance(value, tuple):
-            return value
-        text = str(value).strip()
-        if text == "none":
-            return ()
-        parts = [part.strip() for part in text.split(",")]
-        if not all(part.isascii() and part.isdigit() and 0 < int(part) < 2**20 for part in parts):
-            self.fail(f"{value!r} is no list of numbers of paths; write it like 4,16,64", param, ctx)
-        return tuple(int(part) for part in parts)
+    parts = [] if text.strip() == "none" else [part.strip() for part in text.split(",")]
+    if not all(part.isascii() and part.isdigit() and 0 < int(part) < 2**20 for part in parts):
+        raise click.BadParameter(f"{text!r} is no list of numbers of paths; write it like 4,16,64")
+    return tuple(map(int, parts))
 
 
 @click.command("bench", short_help="Our methods and their rivals: quality over CPU time.")
@@ -39,7 +26,8 @@ class Counts(click.ParamType[tuple[int, ...]]):
 @click.option(
     "--spp",
     "traced",
-    type=Counts(),
+    callback=_counts,
+    metavar="N,N,...",
     default="4,16,64,256",
     show_default=True,
     help="Paths a pixel of path tracing every frame; none leaves it out.",
@@ -47,7 +35,8 @@ class Counts(click.ParamType[tuple[int, ...]]):
 @click.option(
     "--denoised-spp",
     "denoised",
-    type=Counts(),
+    callback=_counts,
+    metavar="N,N,...",
     default="1,2,4,8,16,32",
     show_default=True,
     help="Paths a pixel of path tracing and denoising every frame; none leaves it out.",
@@ -59,19 +48,7 @@ class Counts(click.ParamType[tuple[int, ...]]):
     show_default=True,
     help="Paths a pixel of the references.",
 )
-@click.option(
-    "--presets",
-    "presets_file",
-    type=click.Path(path_type=Path),
-    help="A TOML file with a table for each configuration of ours: method, and settings that differ.  "
-    "[default: built-in presets]",
-)
-@click.option(
-    "--only",
-    metavar="NAME",
-    multiple=True,
-    help="Only these configurations, such as 'decoupled-*'; repeatable.",
-)
+@click.option("--only", metavar="NAME", multiple=True, help="Only these, such as 'decoupled-*'; repeatable.")
 @click.option("--measure", "measures", metavar="NAME", multiple=True, help="Only these measures; repeatable.")
 @click.option(
     "--out",
@@ -97,74 +74,41 @@ def command(
     /,
     *,
     scene: Path,
-    path_file: Path,
-    size: tuple[int, int] | None,
-    frames: str | None,
-    fps: float | None,
+    traced: tuple[int, ...],
+    denoised: tuple[int, ...],
+    only: tuple[str, ...],
     folder: Path,
     as_json: bool,
-    quiet: bool,
     **inputs: Any,
 ) -> None:
     """Compare our methods with their rivals on SCENE (Mitsuba 3 XML), all on one path tracer.
 
     Path tracing of every frame, the same denoised by Open Image Denoise, FFmpeg's minterpolate, the paper's
     method and ours, each at several settings, each in a process of its own, each against a reference of the
-    same pixel filter, by several measures. Written are bench.json, bench.png (quality over CPU time),
-    crops.png and slices.png.
+    same pixel filter, by several measures. Written are bench.json, bench.png (quality over CPU time) and
+    crops.png.
     """
     mark_resumable(ctx)
-    activate("cpu")
-    from enfilade.camera import load_path, parse_frames
-    from enfilade.runs.job import Job
-    from enfilade.scene.opener import Scene
-    from enfilade.settings import SECTIONS
-    from studies.bench.bench import Terms, bench, forecast_s
+    from studies.bench.bench import bench, forecast_s
+    from studies.bench.charts import plot_bench
+    from studies.bench.configurations import chosen, lineup
+    from studies.bench.pictures import plot_crops
 
-    path = load_path(path_file, size=size, frames=None if frames is None else parse_frames(frames), fps=fps)
-    job = Job(Scene(scene), path, settings_of(ctx, SECTIONS), "reference")
-    configurations = _configurations(job, **{name: inputs.pop(name) for name in LINEUP})
-    terms = Terms(**inputs)
-    if not quiet:
-        minutes = forecast_s(job, configurations, terms, len(os.sched_getaffinity(0))) / 60.0
+    path = {name: inputs.pop(name) for name in ("path_file", "size", "frames", "fps")}
+    job = job_of(ctx, scene=scene, method="reference", device="cpu", **path)
+    configurations = chosen(lineup(job, traced=traced, denoised=denoised), only)
+    if not inputs["quiet"]:
+        seconds = forecast_s(job, configurations, inputs["reference_spp"], len(os.sched_getaffinity(0)))
         many = f"{len(configurations)} configurations"
-        click.echo(f"{many}; some {minutes:.0f} minutes of path tracing from the beginning", err=True)
-    found = bench(job, configurations, terms, folder, quiet=quiet)
-    plots = _draw(found, folder)
+        click.echo(f"{many}; some {seconds / 60.0:.0f} minutes of path tracing from the beginning", err=True)
+    found = bench(job, configurations, folder, **inputs)
+    plots = [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png")]
     if as_json:
         click.echo(json.dumps(found, indent=2))
-        return
-    _show(found)
-    for file in (folder / "bench.json", *plots):
-        click.echo(file)
-
-
-LINEUP = ("traced", "denoised", "presets_file", "only")
-
-
-def _configurations(
-    job: Any,
-    *,
-    traced: tuple[int, ...],
-    denoised: tuple[int, ...],
-    presets_file: Path | None,
-    only: tuple[str, ...],
-) -> list[Any]:
-    from studies.bench.configurations import PRESETS, chosen, lineup, read_presets
-
-    presets = PRESETS if presets_file is None else read_presets(presets_file)
-    return list(chosen(lineup(job, traced=traced, denoised=denoised, presets=presets), only))
-
-
-def _draw(found: dict[str, Any], folder: Path) -> list[Path]:
-    from studies.bench.charts import plot_bench
-    from studies.bench.pictures import plot_crops, plot_slices
-
-    return [
-        plot_bench(found, folder / "bench.png"),
-        plot_crops(found, folder, folder / "crops.png"),
-        plot_slices(found, folder, folder / "slices.png"),
-    ]
+    else:
+        _show(found)
+        for file in (folder / "bench.json", *plots):
+            click.echo(file)
 
 
 def _show(found: dict[str, Any]) -> None:

@@ -4,24 +4,13 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 from enfilade.errors import SettingsError
 from enfilade.runs.job import Job
-from enfilade.settings import (
-    SECTIONS,
-    OutputSettings,
-    ReferenceSettings,
-    SampleFilter,
-    SamplingSettings,
-    Settings,
-    read_tables,
-)
+from enfilade.settings import OutputSettings, ReferenceSettings, SampleFilter, SamplingSettings, Settings
 from studies.bench.rivals import QUALITIES, DenoiserSettings
-
-__all__ = ["FAMILIES", "PRESETS", "Configuration", "Preset", "chosen", "lineup", "read_presets"]
 
 FAMILIES = {  # in the order of tables: title
     "traced": "path tracing",
@@ -30,39 +19,18 @@ FAMILIES = {  # in the order of tables: title
     "paper": "paper",
     "decoupled": "decoupled",
 }
-METHODS = ("paper", "decoupled")
 RIVALS = {
     "traced": "reference",
     "denoised": "studies.bench.rivals:Denoised",
     "interpolated": "studies.bench.rivals:Interpolated",
 }
-
-
-@dataclass(frozen=True)
-class Preset:
-    """One of our methods at one setting.
-
-    Attributes
-    ----------
-    name : str
-    method : {"paper", "decoupled"}
-    settings : mapping
-        Tables, as in a TOML file, that differ from the bench's settings.
-    """
-
-    name: str
-    method: str
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-
-
-PRESETS = (
-    Preset("paper-16", "paper", {"sampling": {"spp": 16}}),
-    Preset("paper-64", "paper", {"sampling": {"spp": 64}}),
-    *(
-        Preset(f"decoupled-{quality:g}", "decoupled", {"decoupled": {"quality": quality}})
+PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of our methods: tables that differ
+    **{f"paper-{spp}": ("paper", {"sampling": {"spp": spp}}) for spp in (16, 64)},
+    **{
+        f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
         for quality in (60.0, 30.0, 15.0, 8.0, 4.0)
-    ),
-)
+    },
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,28 +59,20 @@ class Configuration:
         return self.family in RIVALS
 
     @property
+    def spp(self) -> int:
+        """Paths traced for a pixel, where the method traces whole pixels."""
+        return self.job.settings[SamplingSettings].spp
+
+    @property
     def pixel_filter(self) -> SampleFilter:
         """That of its reference."""
         return SampleFilter.BOX if self.family == "denoised" else SampleFilter.GAUSSIAN
 
 
-def lineup(
-    job: Job, *, traced: Iterable[int], denoised: Iterable[int], presets: Sequence[Preset]
-) -> list[Configuration]:
-    """All configurations.
+def lineup(job: Job, *, traced: Iterable[int], denoised: Iterable[int]) -> list[Configuration]:
+    """All configurations: rivals at the given spp, and our presets, which differ from the job's settings.
 
-    Parameters
-    ----------
-    job
-        Scene, path, and the settings from which the presets differ.
-    traced, denoised
-        The spp of path tracing every frame. Interpolated keyframes have the largest of `traced`.
-    presets
-
-    Raises
-    ------
-    SettingsError
-        A preset has a setting that does not exist, or is out of range.
+    Interpolated keyframes have the largest spp of `traced`.
     """
     spps = sorted(set(traced))
     found = [_rival("traced", f"traced-{n}", job, n) for n in spps]
@@ -122,21 +82,14 @@ def lineup(
             found.append(_rival("denoised", name, job, n, quality))
     if spps:
         found.append(_rival("interpolated", f"minterpolate-{spps[-1]}", job, spps[-1]))
-    for preset in presets:
-        settings = _overridden(job.settings, preset.settings)
-        ours = replace(job, method=preset.method, settings=settings)
-        found.append(Configuration(preset.name, preset.method, ours))
+    for name, (method, tables) in PRESETS.items():
+        ours = replace(job, method=method, settings=_overridden(job.settings, tables))
+        found.append(Configuration(name, method, ours))
     return found
 
 
 def chosen(configurations: Sequence[Configuration], patterns: Sequence[str]) -> list[Configuration]:
-    """Those whose names match a pattern, such as ``decoupled-*``; all without patterns.
-
-    Raises
-    ------
-    SettingsError
-        A pattern matches none.
-    """
+    """Those whose names match a pattern, such as ``decoupled-*``; all without patterns."""
     for pattern in patterns:
         if not any(fnmatch.fnmatchcase(c.name, pattern) for c in configurations):
             names = ", ".join(c.name for c in configurations)
@@ -144,26 +97,6 @@ def chosen(configurations: Sequence[Configuration], patterns: Sequence[str]) -> 
     return [
         c for c in configurations if not patterns or any(fnmatch.fnmatchcase(c.name, p) for p in patterns)
     ]
-
-
-def read_presets(file: Path) -> tuple[Preset, ...]:
-    """Presets of a TOML file: a table for each, with ``method`` and tables of settings.
-
-    Raises
-    ------
-    SettingsError
-        It can't be read, or holds something else.
-    """
-    found = []
-    for name, table in read_tables(file).items():
-        if not isinstance(table, dict) or table.get("method") not in METHODS:
-            raise SettingsError(f"{file}: [{name}] needs method = one of {', '.join(METHODS)}")
-        if not name.replace("-", "").replace("_", "").isalnum():
-            raise SettingsError(f"{file}: {name!r} can't name a folder; take letters, digits, - and _")
-        found.append(Preset(name, table.pop("method"), table))
-    if not found:
-        raise SettingsError(f"{file} holds no preset")
-    return tuple(found)
 
 
 def _rival(family: str, name: str, job: Job, spp: int, quality: str = "") -> Configuration:
@@ -175,5 +108,5 @@ def _rival(family: str, name: str, job: Job, spp: int, quality: str = "") -> Con
 
 
 def _overridden(settings: Settings, tables: Mapping[str, Mapping[str, Any]]) -> Settings:
-    whole: dict[str, Any] = settings.to_tables(SECTIONS)
-    return Settings.from_tables(whole | {name: whole.get(name, {}) | table for name, table in tables.items()})
+    whole: dict[str, Any] = settings.to_tables()
+    return Settings.from_tables(whole | {name: whole[name] | dict(table) for name, table in tables.items()})

@@ -21,17 +21,9 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.settings import MetricSettings, ViewingSettings
 
-__all__ = ["available", "measure", "pairs"]
-
 
 def available(asked: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
     """Names of the measures that can be had for a path, and the reasons why others are left out.
-
-    Parameters
-    ----------
-    asked
-        Empty: all.
-    job
 
     Raises
     ------
@@ -60,7 +52,6 @@ def measure(
     names: Sequence[str],
     monitor: Monitor,
     *,
-    stage: str,
     share: float = 1.0,
 ) -> dict[str, Any]:
     """Measure the frames of a run folder against those of another, each frame read once.
@@ -74,8 +65,6 @@ def measure(
     names
         Of measures.
     monitor
-    stage
-        Name of the stage for the monitor.
     share
         Of the test's difference to the reference that is measured: 1 is the test itself.
 
@@ -90,7 +79,7 @@ def measure(
     for done, pair in enumerate(pairs(test, reference, job, share=share), 1):
         for name, one in measures.items():
             values[name].append(one.judge(pair))
-        monitor.progress(stage, done, len(job.path))
+        monitor.progress("measures", done, len(job.path))
     return {
         name: {
             "score": _finite(measures[name].pooled(values[name])),

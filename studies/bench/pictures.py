@@ -1,4 +1,4 @@
-"""Crops, and slices through time, of the configurations of a bench and their references."""
+"""Crops of the configurations of a bench and their references."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.images import read_exr
 from enfilade.kernels.tone import srgb_encode
@@ -17,8 +16,7 @@ from enfilade.reports.charts import INK, Figure, save
 from enfilade.runs.folder import RunFolder
 from studies.bench.charts import STYLES
 from studies.bench.tables import score_text
-
-__all__ = ["Frames", "plot_crops", "plot_slices"]
+from studies.crops import crop_around
 
 DPI = 130
 AMPLIFICATION = 4.0  # of differences
@@ -29,15 +27,7 @@ SHOWN_OF_FAMILY = 3  # configurations: cheapest, middle, dearest
 
 
 class Frames:
-    """Frames of a bench as the screen shows them: after exposure and clipping, encoded.
-
-    Parameters
-    ----------
-    found
-        Contents of ``bench.json``.
-    folder
-        Of the bench.
-    """
+    """Frames of a bench as the screen shows them: after exposure and clipping, encoded."""
 
     def __init__(self, found: Mapping[str, Any], folder: Path) -> None:
         self._scale = np.float32(2.0 ** found["exposure_ev"])
@@ -72,16 +62,7 @@ class Frames:
 def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
     """Draw crops of some configurations and of the reference, where they differ most.
 
-    Parameters
-    ----------
-    found
-        Contents of ``bench.json``.
-    folder
-        Of the bench.
-    file
-        The PNG.
-
-    Notes ----- Two rows for each of up to three frames: the crop, and four times its difference to the
+    Two rows for each of up to three frames: the crop, and four times its difference to the
     reference around grey.
     """
     frames = Frames(found, folder)
@@ -97,7 +78,7 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
     for row, number in enumerate(chosen):
         images = {name: (frames.of(name, number), frames.reference(name, number)) for name in names}
         errors = [np.square(test - reference).sum(axis=-1) for test, reference in images.values()]
-        crop = _largest_square(sum(error / max(float(error.mean()), 1e-12) for error in errors))
+        crop = crop_around(sum(error / max(float(error.mean()), 1e-12) for error in errors), CROP_PX)
         above, below = axes[2 * row], axes[2 * row + 1]
         above[0].imshow(images[names[0]][1][crop], interpolation="nearest")
         below[0].text(0.5, 0.9, f"↑ frame {number}", fontsize=8, color=INK, **CENTRED)
@@ -111,55 +92,3 @@ def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
         score = score_text(frames.configurations[name]["scores"][measure])
         ax.set_title(f"{name}\n{score}", fontsize=7, color=INK)
     return save(figure, file)
-
-
-def plot_slices(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
-    """Draw slices through time: one line of pixels of all frames, for references and some configurations.
-
-    Parameters
-    ----------
-    found
-        Contents of ``bench.json``.
-    folder
-        Of the bench.
-    file
-        The PNG.
-
-    Notes ----- Time goes down. Static surfaces draw vertical lines, moving ones slanted lines. Flicker shows
-    as horizontal streaks, popping as a step at one height. The line is the one where flicker differs most.
-    """
-    frames, numbers = Frames(found, folder), found["frames"]
-    line = _most_flickering(frames, found["size"][1], numbers)
-    places = {f"reference, {name}": f"references/{name}" for name in found["reference"]["filters"]}
-    places |= {name: f"configurations/{name}" for name in frames.selected()}
-    figure = Figure(figsize=(9.0, 0.75 * len(places) + 0.3), dpi=DPI, layout="constrained")
-    axes = figure.subplots(len(places), 1, squeeze=False)[:, 0]
-    for ax, (name, place) in zip(axes, places.items(), strict=True):
-        strip = np.stack([frames.shown(place, number)[line] for number in numbers])
-        ax.imshow(strip, interpolation="nearest", aspect="auto")
-        ax.set_xticks([])
-        ax.set_yticks([])
-        ax.set_ylabel(name, fontsize=7, color=INK, rotation=0, ha="right", va="center")
-    title = f"line {line} of frames {numbers[0]} to {numbers[-1]}, time downwards"
-    axes[0].set_title(title, fontsize=8, color=INK)
-    return save(figure, file)
-
-
-def _most_flickering(frames: Frames, height: int, numbers: list[int]) -> int:
-    """The line of pixels whose errors change most from frame to frame; each configuration counts the same."""
-    total = np.zeros(height)
-    for name in frames.selected():
-        errors = np.stack([frames.of(name, number) - frames.reference(name, number) for number in numbers])
-        changes = np.square(np.diff(errors, axis=0)).sum(axis=(0, 2, 3))
-        total += changes / max(float(changes.mean()), 1e-12)
-    return int(total.argmax())
-
-
-def _largest_square(total: Any) -> tuple[slice, slice]:
-    """The square of :data:`CROP_PX` with the largest sum of a map."""
-    height, width = total.shape
-    y, x = min(CROP_PX, height), min(CROP_PX, width)
-    sums = np.pad(total.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-    inside: npt.NDArray[np.float64] = sums[y:, x:] - sums[:-y, x:] - sums[y:, :-x] + sums[:-y, :-x]
-    top, left = np.unravel_index(int(inside.argmax()), inside.shape)
-    return slice(int(top), int(top) + y), slice(int(left), int(left) + x)

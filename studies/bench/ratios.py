@@ -11,8 +11,6 @@ import numpy as np
 
 from enfilade.comparison.measures import SCALES
 
-__all__ = ["Point", "Ratio", "cost_at", "front", "ratio_at", "ratio_over", "ratios"]
-
 OURS = "decoupled"  # the family that is compared with the others
 AQM_MARGIN_JND = 0.1  # by which ours may be worse than path tracing: no visible difference
 LEVELS = 16  # of quality, evenly spaced on a logarithmic axis, over which a ratio is averaged
@@ -49,14 +47,7 @@ class Ratio:
 
 
 def ratios(configurations: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[str, Any]:
-    """Compare our curve with those of the rivals.
-
-    Parameters
-    ----------
-    configurations
-        As in ``bench.json``.
-    measures
-        Names.
+    """Compare our curve with those of the rivals, by configurations as in ``bench.json``.
 
     Returns
     -------
@@ -151,17 +142,7 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
 
 
 def ratio_at(theirs: Point, ours: Sequence[Point], *, margin: float = 0.0) -> Ratio:
-    """The ratio at the quality of one rival.
-
-    Parameters
-    ----------
-    theirs
-        The rival.
-    ours
-        A curve.
-    margin
-        By which ours may be worse, in units of the error.
-    """
+    """The ratio at the quality of one rival; ours may be worse by a margin, in units of the error."""
     cost, kind = cost_at(ours, theirs.error + margin)
     times = theirs.cpu_s / cost
     return Ratio(times, times, {"equal": "equal", "at most": "at least", "at least": "at most"}[kind])

@@ -18,8 +18,6 @@ from enfilade.records import Frame, Provenance
 from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
 from studies.bench.guides import guides
 
-__all__ = ["QUALITIES", "Denoised", "DenoiserSettings", "Interpolated", "why_missing"]
-
 QUALITIES = ("high", "fast")  # of Open Image Denoise: its best, and five times cheaper
 
 

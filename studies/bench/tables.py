@@ -9,36 +9,28 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-__all__ = ["bench_tables", "ratio_text", "score_text"]
-
 SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "bounds both ways, "}
 
 
 def bench_tables(found: Mapping[str, Any]) -> list[Table]:
-    """Configurations with cost and scores; then the ratios, where there are any.
-
-    Parameters
-    ----------
-    found
-        Contents of ``bench.json``.
-    """
+    """Configurations of ``bench.json`` with cost and scores; then the ratios, where there are any."""
     return [_configurations(found), *_ratios(found)]
 
 
 def _configurations(found: Mapping[str, Any]) -> Table:
     size, measures = "x".join(map(str, found["size"])), found["measures"]
-    headings = ("CPU\ns", "wall\ns", "MiB", *(f"{of['title']}\n{of['unit']}" for of in measures.values()))
+    headings = ("CPU\ns", "wall\ns", *(f"{of['title']}\n{of['unit']}" for of in measures.values()))
     table = _table(f"{found['scene']}, {len(found['frames'])} frames of {size}", "configuration", *headings)
     family = None
     for row in found["configurations"]:
         if family not in (None, row["family"]):
             table.add_section()
         family = row["family"]
-        cells = [_number_text(row["cost"][key]) for key in ("cpu_s", "wall_s", "peak_mib")]
+        cells = [_number_text(row["cost"][key]) for key in ("cpu_s", "wall_s")]
         table.add_row(row["name"], *cells, *(score_text(row["scores"][name]) for name in measures))
     if floor := found["reference"]["noise_floor"]:
         table.add_section()
-        table.add_row("noise floor", "", "", "", *(score_text(floor[name]) for name in measures))
+        table.add_row("noise floor", "", "", *(score_text(floor[name]) for name in measures))
     filters = " and ".join(found["reference"]["filters"])
     table.caption = f"references of {found['reference']['spp']} paths a pixel, filter {filters}"
     return table

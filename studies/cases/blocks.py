@@ -10,11 +10,9 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from studies.cases import charts, pictures, placement, separation, shares, times
+from studies.cases import charts, pictures, placement, separation, statistics, times
 from studies.cases.charts import velocity_class
 from studies.cases.terms import Terms
-
-__all__ = ["BLOCKS", "FIGURES"]
 
 Values = Mapping[str, Any]  # of one item, by scene
 Block = tuple[str, list[Path]]
@@ -77,7 +75,7 @@ def _shares(found: Values, terms: Terms, _folder: Path, _place: Path) -> Block:
     rows = [
         (scene, whose, *(f"{table[key]:.1f}" for key in keys))
         for scene, of in found.items()
-        for whose, table in (("paper", shares.PAPER[scene]), ("ours", of["table1"]))
+        for whose, table in (("paper", statistics.PAPER_SHARES[scene]), ("ours", of["table1"]))
     ]
     notes = [
         f"**{scene.upper()}:** {of['frames']} frames, {of['keyframes']} keyframes; {of['slow_seen']:.1f} % "
@@ -88,7 +86,7 @@ def _shares(found: Values, terms: Terms, _folder: Path, _place: Path) -> Block:
     return _block([_size(terms), _table(("scene", "", *keys), rows), *notes], [])
 
 
-def _times(found: Values, terms: Terms, _folder: Path, place: Path) -> Block:
+def _times(found: Values, terms: Terms, _folder: Path, _place: Path) -> Block:
     heads = (
         "scene", "way", "paths", "paper, min", "CPU, s", "worth, paths", "over IBR+RT", "paper", "JND",
         "above 1 JND, %",
@@ -118,8 +116,7 @@ def _times(found: Values, terms: Terms, _folder: Path, place: Path) -> Block:
         _table(("scene", "way", "stage", "CPU, s"), stages),
         _table(("scene", "ART, paths", "JND", "above 1 JND, %"), series),
     )
-    file = charts.draw_times(found, place / "times.png")
-    return _block([_size(terms), _table(heads, rows), *notes, *tables], [file])
+    return _block([_size(terms), _table(heads, rows), *notes, *tables], [])
 
 
 def _time_row(scene: str, way: str, of: Values) -> tuple[Any, ...]:
@@ -180,7 +177,7 @@ def _threshold(found: Values, terms: Terms, _folder: Path, place: Path) -> Block
     return _block([_windows(terms), _table(heads, rows), by_velocity], [file])
 
 
-def _supports(found: Values, terms: Terms, _folder: Path, place: Path) -> Block:
+def _supports(found: Values, terms: Terms, _folder: Path, _place: Path) -> Block:
     lights = {"plain": "no noise", "traced": "path traced"}
     named = {f"{scene}, {lights[kind]}": of[kind] for scene, of in found.items() for kind in lights}
     rows = []
@@ -198,8 +195,7 @@ def _supports(found: Values, terms: Terms, _folder: Path, place: Path) -> Block:
     heads = (
         "scene and light", "deg/s", "§5.2", "JND", "best by the paper's AQM", "JND", "by the modern mode",
     )  # fmt: skip
-    file = charts.draw_supports(named, place / "supports.png")
-    return _block([_windows(terms), _table(heads, rows)], [file])
+    return _block([_windows(terms), _table(heads, rows)], [])
 
 
 def _separation(found: Values, terms: Terms, folder: Path, place: Path) -> Block:
@@ -226,7 +222,7 @@ def _separation(found: Values, terms: Terms, folder: Path, place: Path) -> Block
     return _block([_plain_size(terms), _table(heads, rows), few], drawn)
 
 
-def _reflections(found: Values, terms: Terms, folder: Path, place: Path) -> Block:
+def _reflections(found: Values, terms: Terms, _folder: Path, _place: Path) -> Block:
     rows = [
         (
             scene,
@@ -243,14 +239,9 @@ def _reflections(found: Values, terms: Terms, folder: Path, place: Path) -> Bloc
         "scene", "frame", "mirror / reflection, deg/s", "temporal filter", "JND in motion", "as a still",
         "modern mode",
     )  # fmt: skip
-    with_mirrors = [scene for scene, of in found.items() if of["frames"]]
-    without = [scene.upper() for scene in found if scene not in with_mirrors]
-    drawn = [
-        pictures.draw_mirrors(folder / scene / "reflections.npz", place / f"mirrors-{scene}.png")
-        for scene in with_mirrors
-    ]
+    without = [scene.upper() for scene, of in found.items() if not of["frames"]]
     note = f"{' and '.join(without)} has no mirrors." if without else ""
-    return _block([_plain_size(terms), _table(heads, rows), note], drawn)
+    return _block([_plain_size(terms), _table(heads, rows), note], [])
 
 
 BLOCKS: dict[str, Callable[[Values, Terms, Path, Path], Block]] = {

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.options import check_png, job_of, output_options, path_options, settings_options
-
-if TYPE_CHECKING:
-    from studies.cases.threshold import Calibration
 
 
 @click.group("calibrate", short_help="Settings that depend on the scene, found by the metric.")
@@ -80,24 +77,28 @@ def threshold(
         mark_resumable(ctx)
     job = job_of(ctx, method="paper", **inputs)
     from enfilade.cli.progress import watch
-    from studies.cases.threshold import Calibration, calibrate_job
+    from studies.cases.threshold import calibrate_job
 
-    terms = Calibration(visible_percent=visible_percent)
     with watch(quiet=quiet) as monitor:
         found = calibrate_job(
-            job, terms, probes=probes, is_plain=light == "plain", folder=folder, monitor=monitor
+            job,
+            probes=probes,
+            tolerated_percent=visible_percent,
+            is_plain=light == "plain",
+            folder=folder,
+            monitor=monitor,
         )
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:
-        _show(found, terms)
+        _show(found)
     if plot is not None:
         from studies.cases.charts import draw_threshold
 
         draw_threshold({job.scene.file.resolve().parent.name: found}, plot)
 
 
-def _show(found: dict[str, Any], terms: Calibration) -> None:
+def _show(found: dict[str, Any]) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -106,11 +107,9 @@ def _show(found: dict[str, Any], terms: Calibration) -> None:
     for heading in ("v_t, deg/s", "traced, %", "reused and visible, %", "removed below, deg/s"):
         table.add_column(heading, justify="right")
     for row in found["curve"]:
-        values = (row["reused_visible_percent"], row["removed_below_deg_s"])
-        cells = ("" if value is None else f"{value:.2f}" for value in values)
-        table.add_row(f"{row['threshold_deg_s']:g}", f"{row['traced_percent']:.1f}", *cells)
+        table.add_row(*("" if value is None else f"{value:.3g}" for value in row.values()))
     Console().print(table)
-    chosen, share = found["threshold_deg_s"], f"{terms.visible_percent:g} % of the reused pixels"
+    chosen, share = found["threshold_deg_s"], f"{found['tolerated_percent']:g} % of the reused pixels"
     if chosen is None:
         last = found["curve"][-1]["threshold_deg_s"]
         click.echo(f"No threshold up to {last:g} deg/s leaves less than {share} visibly different.")

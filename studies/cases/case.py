@@ -24,12 +24,10 @@ from enfilade.settings import SamplingSettings, Settings, ViewingSettings
 from studies.cases.plain import PlainlyLit
 from studies.cases.speed import mean_cost, path_costs
 from studies.cases.terms import PIXEL_M, Terms
-from studies.cases.windows import Windows, probes_of
+from studies.cases.windows import Windows
 from studies.progress import Prefixed, counted
 from studies.scenes import write_scene
 from studies.versions import origin
-
-__all__ = ["Case", "Result", "begin", "read_result"]
 
 PLAIN_SPP = 64  # rays a pixel of a reference without noise
 TERMS_FILE = "terms.json"
@@ -87,17 +85,11 @@ class Case:
         Of this scene: ``scene/``, a run folder for each walkthrough, traced frames in ``windows/``, results
         as JSON.
     monitor
-
-    Attributes
-    ----------
-    name, terms, folder, monitor
     """
 
     def __init__(self, name: str, terms: Terms, folder: Path, monitor: Monitor) -> None:
-        self.name = name
-        self.terms = terms
-        self.folder = folder
-        self.monitor = monitor
+        self.name, self.terms, self.folder = name, terms, folder
+        self.monitor = Prefixed(monitor, name)
 
     @cached_property
     def whole(self) -> Job:
@@ -117,27 +109,19 @@ class Case:
     @cached_property
     def windows(self) -> Windows:
         """Short sequences, path traced."""
-        job = self._job(self.terms.window_size, self.terms.window_spp)
+        terms, job = self.terms, self._job(self.terms.window_size, self.terms.window_spp)
         walk = Walkthrough(job.path, job.settings, self._renderer)
-        analysis = self._analyzed("analysis-windows", walk)
-        spp, folder = self.terms.window_reference_spp, self.folder / "windows"
-        return Windows(walk, analysis, self.monitor, reference_spp=spp, folder=folder)
+        return Windows(
+            walk, self._analyzed("analysis-windows", walk), self.monitor, probes=terms.traced_windows,
+            reference_spp=terms.window_reference_spp, folder=self.folder / "windows",
+        )  # fmt: skip
 
     @cached_property
     def plain_windows(self) -> Windows:
         """Short sequences without noise, at the size of the whole walk."""
         walk = Walkthrough(self.whole.path, self.whole.settings, PlainlyLit(self._renderer))
-        return Windows(walk, self.analysis, self.monitor, reference_spp=PLAIN_SPP)
-
-    @property
-    def probes(self) -> list[int]:
-        """Frames whose surroundings are filtered without noise."""
-        return probes_of(self.analysis, self.terms.windows)
-
-    @property
-    def traced_probes(self) -> list[int]:
-        """Frames whose surroundings are path traced and filtered."""
-        return probes_of(self.windows.analysis, self.terms.traced_windows)
+        probes = self.terms.windows
+        return Windows(walk, self.analysis, self.monitor, probes=probes, reference_spp=PLAIN_SPP)
 
     def rendered(self, method: str) -> dict[str, Any]:
         """Render the whole walk by a method, or go on with it.
@@ -155,7 +139,7 @@ class Case:
         """
         file, job = self.folder / f"{method}-speed.json", replace(self.whole, method=method)
         before = None if file.is_file() else path_costs(self.walk)
-        summary = render(job, self.folder / method, Prefixed(self.monitor, f"{self.name}, {method}"))
+        summary = render(job, self.folder / method, Prefixed(self.monitor, method))
         if before is not None:
             write_json(file, mean_cost([before, path_costs(self.walk)]))
         return {**summary, "path_s": read_json(file)}
@@ -168,14 +152,9 @@ class Case:
         return read_result(file)
 
     def _analyzed(self, name: str, walk: Walkthrough) -> Analysis:
-        frames = range(len(walk.path))
-
-        def measure() -> list[dict[str, float]]:
-            return [
-                to_table(analyze(walk, f)) for f in counted(frames, f"{self.name}: analysis", self.monitor)
-            ]
-
-        return Analysis.from_tables(walk.path, walk.settings, self.result(name, measure).value)
+        frames = counted(range(len(walk.path)), "analysis", self.monitor)
+        tables = self.result(name, lambda: [to_table(analyze(walk, frame)) for frame in frames]).value
+        return Analysis.from_tables(walk.path, walk.settings, tables)
 
     def _job(self, size: tuple[int, int], spp: int) -> Job:
         viewing = ViewingSettings(diagonal_m=math.hypot(*size) * PIXEL_M)

@@ -1,12 +1,10 @@
-"""Figures of the case studies: the paper's Figs. 9 and 11 to 13, its Table 2, and the supports of its §5."""
+"""Figures of the case studies: the paper's Figs. 9 and 11 to 13."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from enfilade.reports.charts import (
     BLUE,
@@ -22,10 +20,6 @@ from enfilade.reports.charts import (
     save,
     stack,
 )
-
-__all__ = [
-    "draw_placement", "draw_supports", "draw_threshold", "draw_times", "draw_walk", "velocity_class",
-]  # fmt: skip
 
 DPI = 110
 COLORS = (BLUE, VERMILION, GREEN, ORANGE, "#56B4E9", "#CC79A7", "#000000", "#999999")
@@ -95,36 +89,10 @@ def _predictions(ax: Any, segments: Sequence[Values], limit: float) -> None:
     ax.set_ylabel("visible, % of pixels")
 
 
-def draw_times(found: Values, file: Path) -> Path:
-    """Table 2: error of each way over its CPU time, as a number of ART's paths in the same hour."""
-    figure, axes = _grid(1, len(found), (5.4, 3.0))
-    for ax, (scene, of) in zip(axes[0], found.items(), strict=True):
-        cost = [row["spp"] for row in of["art_series"]]
-        ax.plot(cost, [_mean_score(row) for row in of["art_series"]], "o--", color="#7A7A7A", label="ART")
-        for way, color, mark in (("ibr_rt", GREEN, "^"), ("decoupled", BLUE, "D")):
-            one = of["ways"][way]
-            ax.plot([one["worth_paths"]], [_mean_score(one)], mark, color=color, markersize=8, label=way)
-        ax.set_xscale("log")
-        ax.set_yscale("log")
-        ax.set_yticks([5, 10, 20, 50], ["5", "10", "20", "50"])
-        ax.minorticks_off()
-        ax.legend(fontsize=7.5, frameon=False)
-        _titled(ax, f"{scene}: error against the reference", "CPU time of a frame, paths a pixel", "JND")
-    return save(figure, file)
-
-
-def _mean_score(row: Values) -> float:
-    return float(np.mean([of["score"] for of in row["frames"]]))
-
-
 def draw_threshold(found: Values, file: Path) -> Path:
     """Fig. 9: visible differences of reused pixels by threshold, and by their velocity.
 
-    Parameters
-    ----------
-    found
-        By a name for the legend: results of ``threshold.calibrate``.
-    file
+    Results of ``threshold.calibrate`` come by a name for the legend.
     """
     figure, axes = _grid(1, 2, (5.4, 3.4))
     left, right = axes[0]
@@ -154,34 +122,6 @@ def draw_threshold(found: Values, file: Path) -> Path:
     figure.legend(loc="outside lower center", fontsize=8.5, frameon=False, ncols=4)
     _titled(left, "I_c against I_rt, pixels that are reused", "v_t, deg/s", "above 1 JND, %")
     _titled(right, "I_ibr against I_rt, by velocity", "velocity, deg/s", "above 1 JND, %")
-    return save(figure, file)
-
-
-def draw_supports(found: Values, file: Path) -> Path:
-    """Scores by spatial support, at the paper's 11 frames, and by temporal support, at 3 pixels, by velocity.
-
-    Parameters
-    ----------
-    found
-        By a name for the title: results of ``supports.compare``.
-    file
-    """
-    figure, axes = _grid(len(found), 2, (5.4, 2.9))
-    for row, (name, of) in zip(axes, found.items(), strict=True):
-        widths, counts = of["spatial_px"], of["temporal"]
-        for k, velocity in enumerate(of["classes"]):
-            scores = np.array(velocity["scores"]["paper"])
-            style = {"color": COLORS[k % 8], "marker": MARKS[k % 8], "markersize": 4, "linewidth": 1.1}
-            row[0].plot(widths, scores[:, counts.index(11)], label=velocity_class(velocity), **style)
-            row[1].plot(counts, scores[widths.index(3.0)], **style)
-        _titled(row[0], f"{name}: 11 frames", "spatial support, pixels", "score, JND")
-        _titled(row[1], f"{name}: 3 pixels", "temporal support, frames", "score, JND")
-        for ax, ticks in zip(row, (widths, counts), strict=True):
-            ax.set_yscale("log")
-            ax.set_xticks(ticks)
-            ax.set_yticks([2, 3, 5, 10, 20, 30], ["2", "3", "5", "10", "20", "30"])
-            ax.minorticks_off()
-        row[0].legend(fontsize=7, frameon=False, ncols=2, title="deg/s", title_fontsize=7)
     return save(figure, file)
 
 

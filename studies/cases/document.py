@@ -17,8 +17,6 @@ from studies.cases.case import Result
 from studies.cases.runner import Results
 from studies.cases.terms import Terms
 
-__all__ = ["check_blocks", "replaced", "write_document"]
-
 
 def write_document(results: Results, terms: Terms, folder: Path, template: Path, target: Path) -> list[Path]:
     """Draw the figures and fill the blocks of which there are results.
@@ -26,7 +24,6 @@ def write_document(results: Results, terms: Terms, folder: Path, template: Path,
     Parameters
     ----------
     results
-        By item and scene.
     terms
         Stated in each block.
     folder
@@ -40,11 +37,6 @@ def write_document(results: Results, terms: Terms, folder: Path, template: Path,
     -------
     list of Path
         The document and the figures.
-
-    Raises
-    ------
-    InputError
-        The template lacks a block.
     """
     text = template.read_text(encoding="utf-8")
     files: list[Path] = []
@@ -82,13 +74,7 @@ def _origins(by_scene: Mapping[str, Result]) -> str:
 
 
 def replaced(text: str, name: str, body: str) -> str:
-    """The text with another body in one of its blocks.
-
-    Raises
-    ------
-    InputError
-        It has no such block.
-    """
+    """The text with another body in one of its blocks."""
     block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
     if not block.search(text):
         raise InputError(f"the document has no block <!-- {name} --> ... <!-- /{name} -->; restore it")

@@ -16,8 +16,6 @@ from enfilade.kernels.rays import pinhole_directions
 from enfilade.records import Geometry, Mask, SurfaceClass
 from enfilade.renderer import Rays, Renderer
 
-__all__ = ["mirror_pixels", "mirrored"]
-
 OFFSET = 1e-4  # of the distance: start of reflected rays
 VIRTUAL = np.uint32(1 << 30)  # added to the index of a shape that is seen in a mirror
 

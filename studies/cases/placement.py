@@ -18,8 +18,6 @@ from enfilade.settings import KeyframeSettings, Placement, WarpSettings
 from studies.cases.case import Case
 from studies.progress import counted
 
-__all__ = ["PAPER_A", "PAPER_PERCENT", "disoccluded_percent", "disocclusions", "measure"]
-
 ADAPTATIONS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9)  # A of Eq. 6
 PAPER_A = 0.5  # §6
 PAPER_PERCENT = {0.0: 4.04, PAPER_A: 2.00}  # by A, §6, ROOM
@@ -51,14 +49,7 @@ def disocclusions(
 ) -> dict[str, Any]:
     """Disoccluded pixels of one placement.
 
-    Parameters
-    ----------
-    walk, analysis
-    placed
-        Placement of the keyframes.
-    step
-        Every so many-th in-between of a segment is measured, and stands for those around it.
-    monitor
+    Every so many-th in-between of a segment is measured, by `step`, and stands for those around it.
     """
     path, numbers = walk.path, walk.path.numbers
     shots = Analysis(

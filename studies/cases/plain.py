@@ -18,8 +18,6 @@ from enfilade.kernels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneFacts, Surfaces
 
-__all__ = ["PlainlyLit"]
-
 SUN = (0.36, 0.48, 0.8)  # direction of the light, world space
 AMBIENT = 0.3  # share of the light that is the same from all directions
 OFFSET = 1e-4  # of the distance: start of reflected and transmitted rays

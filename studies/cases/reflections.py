@@ -8,30 +8,24 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
+from enfilade.gbuffer import image_flow
 from enfilade.records import Geometry, Mask
 from enfilade.settings import AntialiasSettings
 from studies.cases.case import Case
-from studies.cases.filtering import antialiased
 from studies.cases.mirrored import mirror_pixels
-from studies.cases.pictures import write_example
 from studies.cases.seen import scores_in
-from studies.cases.windows import Example, Row, Windows
-
-__all__ = ["compare", "measure", "most_mirrors"]
+from studies.cases.windows import Windows
+from studies.progress import counted
 
 FRAME_PX = 2  # of a mirror's border, which shows its frame, too: left out
 SCANNED = 24  # frames of a path that are searched for mirrors
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """Measurements of the frames with most mirrors; the images of an example are written beside."""
+    """``frames``: measurements of those that show most of mirrors, without noise; see :func:`compare`."""
     windows = case.plain_windows
-    probes = most_mirrors(windows, case.terms.windows)
-    if not probes:
-        return {"frames": []}
-    rows, example = compare(windows, probes)
-    write_example(case.folder / "reflections.npz", example)
-    return rows
+    probes = counted(most_mirrors(windows, case.terms.windows), "mirrors", case.monitor)
+    return {"frames": [compare(windows, frame) for frame in probes]}
 
 
 def most_mirrors(windows: Windows, count: int) -> list[int]:
@@ -47,8 +41,8 @@ def most_mirrors(windows: Windows, count: int) -> list[int]:
     return sorted(chosen[:count])
 
 
-def compare(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Example]:
-    """Compare four temporal filters on mirrors with the reference.
+def compare(windows: Windows, frame: int) -> dict[str, Any]:
+    """Compare four temporal filters on the mirrors of a frame with the reference.
 
     ``none``: no temporal filter. ``full``: along the motion of the mirror's surface, as everywhere.
     ``short``: the same over few frames, the paper's heuristic. ``reflected``: full, along the motion of the
@@ -56,28 +50,22 @@ def compare(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
 
     Returns
     -------
-    rows : dict
-        ``frames``: of each probe its number, ``mirror_percent`` of its pixels, and by filter, in motion (at
-        the velocity of the reflection) and as stills: score, JND, and share above 1 JND.
-    example : dict
-        Colours by filter and ``reference`` of the probe with most mirrors, and ``mirror`` 0 or 1.
+    dict
+        ``frame``: its number; ``mirror_percent`` of its pixels; ``surface_deg_s``, ``reflected_deg_s``: mean
+        velocities; ``filters``: by filter, in motion (at the velocity of the reflection), as a still, and by
+        the modern mode: score, JND, and share above 1 JND.
     """
-    rows, examples = windows.each("mirrors", probes, _compare)
-    most = int(np.argmax([row["mirror_percent"] for row in rows]))
-    return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
-
-
-def _compare(windows: Windows, frame: int) -> tuple[Row, Example]:
     walk, viewer = windows.walk, windows.viewer
     settings = walk.settings[AntialiasSettings]
     mirror, reference = _inner(windows.geometry(frame)), windows.reference(frame).color
-    velocity = walk.viewing.velocity_deg_s(windows.flow(frame, windows.reflected(frame)).motion)
+    flow = image_flow(windows.reflected(frame), *walk.path.neighbours(frame))
+    velocity = walk.viewing.velocity_deg_s(flow.motion)
     full = replace(settings, specular_frames=settings.frames)
     made = {
-        "none": antialiased(windows, frame, replace(settings, specular_frames=1)),
-        "full": antialiased(windows, frame, full),
-        "short": antialiased(windows, frame, settings),
-        "reflected": antialiased(windows, frame, full, geometry_of=windows.reflected),
+        "none": windows.antialiased(frame, replace(settings, specular_frames=1)),
+        "full": windows.antialiased(frame, full),
+        "short": windows.antialiased(frame, settings),
+        "reflected": windows.antialiased(frame, full, geometry_of=windows.reflected),
     }
     filters = {}
     for name, color in made.items():
@@ -87,14 +75,13 @@ def _compare(windows: Windows, frame: int) -> tuple[Row, Example]:
             "modern": viewer.modern(color, reference, velocity),
         }
         filters[name] = {how: scores_in(jnd, mirror) for how, jnd in maps.items()}
-    row = {
+    return {
         "frame": walk.path.numbers[frame],
         "mirror_percent": 100.0 * float(mirror.mean()),
         "surface_deg_s": float(windows.view(frame).speed_deg_s[mirror].mean()),
         "reflected_deg_s": float(np.hypot(velocity[..., 0], velocity[..., 1])[mirror].mean()),
         "filters": filters,
     }
-    return row, {**made, "reference": reference, "mirror": mirror.astype(np.float32)}
 
 
 def _inner(geometry: Geometry) -> Mask:

@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.monitor import Monitor
-from studies.cases import placement, reflections, separation, shares, statistics, supports, threshold, times
+from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
 from studies.cases.case import Case, Result, begin, read_result
 from studies.cases.terms import Terms
 from studies.scenes import SCENES
-
-__all__ = ["ITEMS", "Results", "measure"]
 
 Results = Mapping[str, Mapping[str, Result]]  # by item and scene
 
 ITEMS: dict[str, Callable[[Case], Any]] = {  # in the order of the paper's figures and tables
     "placement": placement.measure,
     "statistics": statistics.measure,
-    "shares": shares.measure,
+    "shares": statistics.shares,
     "times": times.measure,
     "threshold": threshold.measure,
     "supports": supports.measure,

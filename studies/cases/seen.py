@@ -14,8 +14,6 @@ from enfilade.records import F32, Mask
 from enfilade.settings import MetricSettings, Settings, ViewingSettings
 from enfilade.viewing import Viewing
 
-__all__ = ["Scores", "Viewer", "score_in", "scores_in", "visible_percent"]
-
 Scores = dict[str, float | None]
 
 VISIBLE_JND = 1.0  # seen by 75 % of observers who look for it (§6)

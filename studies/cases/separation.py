@@ -16,12 +16,12 @@ from enfilade.gbuffer import View
 from enfilade.records import F32, U32, Mask
 from enfilade.settings import AntialiasSettings
 from studies.cases.case import Case
-from studies.cases.filtering import antialiased
 from studies.cases.pictures import write_example
 from studies.cases.seen import Viewer, scores_in
-from studies.cases.windows import Example, Row, Windows
+from studies.cases.windows import Windows
+from studies.progress import counted
 
-__all__ = ["FEWEST", "changed_pixels", "compare", "measure", "outlines"]
+Example = dict[str, F32]  # images of a frame
 
 GHOST_CD_M2 = 1.0  # difference on the screen, of 100, made by separation: smaller ones are invisible
 FEWEST = 200  # pixels: fewer are not reported
@@ -30,7 +30,7 @@ OUTLINE_PX = 2  # from an outline: differences nearer to it are a matter of anti
 
 def measure(case: Case) -> dict[str, Any]:
     """Measurements of all probes; the images of an example are written beside. See :func:`compare`."""
-    rows, example = compare(case.plain_windows, case.probes)
+    rows, example = compare(case.plain_windows, case.plain_windows.probes)
     write_example(case.folder / "separation.npz", example)
     return rows
 
@@ -52,9 +52,10 @@ def compare(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
         ``reference`` colours, ``ghost``, ``motion`` and ``still`` JND of together against apart,
         ``speed_deg_s``.
     """
-    rows, examples = windows.each("flow separation", probes, _compare)
+    frames = counted(probes, "flow separation", windows.monitor)
+    rows, examples = zip(*(_compare(windows, frame) for frame in frames), strict=True)
     most = int(np.argmax([row["ghosts"]["pixels"] for row in rows]))
-    return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
+    return {"frames": list(rows), "example": rows[most]["frame"]}, examples[most]
 
 
 def outlines(shape_index: U32) -> Mask:
@@ -75,12 +76,12 @@ def changed_pixels(viewer: Viewer, together: F32, apart: F32) -> Mask:
     return changed
 
 
-def _compare(windows: Windows, frame: int) -> tuple[Row, Example]:
+def _compare(windows: Windows, frame: int) -> tuple[dict[str, Any], Example]:
     view, viewer = windows.view(frame), windows.viewer
     settings = windows.walk.settings[AntialiasSettings]
     raw, reference = windows.traced(frame).color, windows.reference(frame).color
     together, apart = (
-        antialiased(windows, frame, replace(settings, separate_items=separate)) for separate in (False, True)
+        windows.antialiased(frame, replace(settings, separate_items=separate)) for separate in (False, True)
     )
     changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.shape_index)
     errors = [np.abs(viewer.shown(image) - viewer.shown(reference)) for image in (together, apart)]
@@ -94,7 +95,7 @@ def _compare(windows: Windows, frame: int) -> tuple[Row, Example]:
             "raw together": (together, raw),
         }.items()
     }
-    row: Row = {"frame": windows.walk.path.numbers[frame]}
+    row: dict[str, Any] = {"frame": windows.walk.path.numbers[frame]}
     for place, where in places.items():
         row[place] = {
             "count": int(where.sum()),

@@ -10,8 +10,6 @@ import numpy as np
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.renderer import PixelFilter, Purpose
 
-__all__ = ["PathCost", "mean_cost", "path_costs", "spread_over"]
-
 PathCost = dict[str, dict[str, float]]  # by pixel filter: wall and CPU seconds of a path
 
 FILTERS = (PixelFilter.CENTRE, PixelFilter.GAUSSIAN)

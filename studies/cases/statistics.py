@@ -1,4 +1,4 @@
-"""Figs. 12 and 13: velocity, predictions of the metric, and traced pixels, over the frames (§6)."""
+"""Figs. 12 and 13, Table 1: velocity, predictions of the metric, and traced pixels (§6)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from enfilade.settings import MaskSettings
 from studies.cases.case import Case
 from studies.progress import counted
 
-__all__ = ["measure", "predictions", "without_noise"]
+PAPER_SHARES = {  # Table 1, percent
+    "atrium": {"slow": 2.4, "specular": 40.8, "occlusion": 0.3, "keyframes": 6.0, "total": 49.5},
+    "room": {"slow": 28.1, "specular": 0.0, "occlusion": 1.9, "keyframes": 5.1, "total": 35.1},
+}
 
 
 def measure(case: Case) -> dict[str, Any]:
@@ -33,6 +36,26 @@ def measure(case: Case) -> dict[str, Any]:
         "predictions": predictions(summary["segments"], limit),
         "plain": predictions(plain, limit),
         "split_percent": limit,
+    }
+
+
+def shares(case: Case) -> dict[str, Any]:
+    """Shares of traced pixels from the run's ledger, and of those that might have been.
+
+    Returns
+    -------
+    dict
+        ``table1``: percent by reason. ``specular_seen``: mean share of pixels on glossy, mirroring or
+        transparent surfaces, traced or not; ``slow_seen``: below v_t, keyframes and repeated frames included.
+        ``frames``, ``keyframes``: numbers of them.
+    """
+    summary, frames = case.rendered("paper"), case.analysis.frames
+    return {
+        "table1": summary["table1"],
+        "specular_seen": sum(of.specular_percent for of in frames) / len(frames),
+        "slow_seen": sum(of.slow_percent for of in frames) / len(frames),
+        "frames": len(frames),
+        "keyframes": sum(row["keyframe"] > 0.0 for row in summary["per_frame"]),
     }
 
 
@@ -91,6 +114,6 @@ def without_noise(case: Case) -> list[dict[str, Any]]:
     refinement, numbers = Refinement(windows.walk), windows.walk.path.numbers
     initial = [s for shot in case.analysis.segments() for s in shot]
     rows = []
-    for segment in counted(initial, f"{case.name}: segments without noise", case.monitor):
+    for segment in counted(initial, "segments without noise", case.monitor):
         rows += [result.to_table(numbers) for result in refinement.refine(segment, windows.keyframe)]
     return rows

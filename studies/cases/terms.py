@@ -5,54 +5,26 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-__all__ = ["PIXEL_M", "TERMS", "Terms"]
-
 PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels a degree from half a metre
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Extent of the case studies, the same for both scenes.
+    """Extent of the case studies, the same for both scenes. Sizes are width and height in pixels."""
 
-    Attributes
-    ----------
-    preset : str
-        Of the scenes: length of their walks and fineness of their shapes.
-    size : (int, int)
-        Width and height of whole walkthroughs, pixels.
-    spp : int
-        Of whole walkthroughs.
-    sweep_step : int
-        Disocclusions of placements other than the paper's two are counted in every so many-th frame.
-    window_size : (int, int)
-        Size of the path-traced short sequences that are filtered in many ways.
-    window_spp, window_reference_spp : int
-        Of these sequences, and of their references.
-    windows, traced_windows : int
-        Number of such sequences of a scene without noise, and path traced.
-    reference_spp : int
-        Of the references of whole walkthroughs.
-    crop : (int, int)
-        Part in the middle of a frame in which the quality of whole walkthroughs is measured.
-    crops : int
-        Number of such frames.
-    most_spp : int
-        Largest spp that is tried for ART; a quarter of `reference_spp` at most.
-    """
-
-    preset: str
-    size: tuple[int, int]
-    spp: int
-    sweep_step: int
-    window_size: tuple[int, int]
-    window_spp: int
-    window_reference_spp: int
-    windows: int
-    traced_windows: int
-    reference_spp: int
-    crop: tuple[int, int]
-    crops: int
-    most_spp: int
+    preset: str  # of the scenes: length of their walks and fineness of their shapes
+    size: tuple[int, int]  # of whole walkthroughs
+    spp: int  # of these
+    sweep_step: int  # between frames in which disocclusions of placements beside the paper's two are counted
+    window_size: tuple[int, int]  # of path-traced short sequences
+    window_spp: int  # of these
+    window_reference_spp: int  # of their references
+    windows: int  # number of short sequences of a scene without noise
+    traced_windows: int  # ... and path traced
+    reference_spp: int  # of the references of whole walkthroughs
+    crop: tuple[int, int]  # part in the middle of a frame in which their quality is measured
+    crops: int  # number of such frames
+    most_spp: int  # that is tried for ART; a quarter of `reference_spp` at most
 
     def to_dict(self) -> dict[str, Any]:
         """As a plain table, fit for JSON."""

@@ -13,24 +13,23 @@ from typing import Any
 import numpy as np
 
 from enfilade.images import read_exr
+from enfilade.methods.base import FRAMES
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, Shading
 from enfilade.renderer import PixelFilter, Purpose
+from enfilade.runs.folder import RunFolder
 from studies.cases.case import Case
 from studies.cases.seen import Scores, Viewer, scores_in
 from studies.cases.speed import spread_over
 from studies.cases.windows import other_seed, stored
+from studies.crops import Crop
 from studies.progress import counted
-
-__all__ = ["PAPER_MINUTES", "art_spp", "equal_spp", "measure", "middle"]
 
 PAPER_MINUTES = {  # Table 2, for a frame
     "atrium": {"art": 170.0, "rt": 40.0, "ibr_rt": 20.5},
     "room": {"art": 6.9, "rt": 1.5, "ibr_rt": 1.1},
 }
 UNSEEN_PERCENT = 1.0  # of the pixels may lie above 1 JND where the metric is said to see nothing
-
-Crop = tuple[slice, slice]  # rows, columns
 
 
 def measure(case: Case) -> dict[str, Any]:
@@ -51,16 +50,18 @@ def measure(case: Case) -> dict[str, Any]:
     frames = spread_over(len(case.whole.path), case.terms.crops)
     quality = _Quality(case)
     series: dict[int, list[Scores]] = {}
-    for spp in counted(_series(case.terms.most_spp), f"{case.name}: ART", case.monitor):
+    powers = range(2, case.terms.most_spp.bit_length())
+    for spp in counted([2**k for k in powers], "ART", case.monitor):
         series[spp] = [quality.of_art(frame, spp) for frame in frames]
+    scores = {name: [quality.of_run(name, f) for f in frames] for name in ("paper", "decoupled")}
     spp, is_bound = art_spp(series)
     pixels = case.whole.path.width * case.whole.path.height
     own, path_s = case.terms.spp, summary["path_s"]
     ways: dict[str, dict[str, Any]] = {
         "art": {"spp": spp, "frames": series[spp], **_scaled(path_s["gaussian"], spp * pixels)},
         "rt": {"spp": own, "frames": None, **_scaled(path_s["centre"], own * pixels)},
-        "ibr_rt": {"spp": own, "frames": quality.of_run("paper", frames), **_per_frame(summary)},
-        "decoupled": {"spp": None, "frames": quality.of_run("decoupled", frames), **_per_frame(decoupled)},
+        "ibr_rt": {"spp": own, "frames": scores["paper"], **_per_frame(summary)},
+        "decoupled": {"spp": None, "frames": scores["decoupled"], **_per_frame(decoupled)},
     }
     for name, way in ways.items():
         hour = decoupled if name == "decoupled" else summary
@@ -71,21 +72,14 @@ def measure(case: Case) -> dict[str, Any]:
         "reference_spp": case.terms.reference_spp,
         "crop": [columns.stop - columns.start, rows.stop - rows.start],
         "art_is_bound": is_bound,
-        "art_series": [{"spp": n, "frames": scores} for n, scores in series.items()],
+        "art_series": [{"spp": n, "frames": of} for n, of in series.items()],
         "path_us": {name: {kind: 1e6 * s for kind, s in of.items()} for name, of in path_s.items()},
         "ways": ways,
     }
 
 
 def art_spp(series: dict[int, list[Scores]]) -> tuple[int, bool]:
-    """The least spp at which the metric sees nothing in any of the frames, or the largest.
-
-    Returns
-    -------
-    spp : int
-    is_bound : bool
-        Whether it is only a lower bound.
-    """
+    """The least spp at which the metric sees nothing in any frame; or the largest, and True: a bound."""
     for spp in sorted(series):
         if all((of["visible_percent"] or 0.0) <= UNSEEN_PERCENT for of in series[spp]):
             return spp, False
@@ -95,16 +89,7 @@ def art_spp(series: dict[int, list[Scores]]) -> tuple[int, bool]:
 def equal_spp(series: list[dict[str, Any]], score: float) -> float | None:
     """The spp at which ART has a score, JND, interpolated linearly on logarithmic axes.
 
-    Parameters
-    ----------
-    series
-        ``art_series`` of :func:`measure`.
-    score
-
-    Returns
-    -------
-    float or None
-        None where the score lies beyond the series.
+    None where the score lies beyond the series.
     """
     spp = [float(row["spp"]) for row in series]
     scores = [float(np.mean([of["score"] for of in row["frames"]])) for row in series]
@@ -122,54 +107,42 @@ def middle(size: tuple[int, int], width: int, height: int) -> Crop:
     return slice(top, top + height), slice(left, left + width)
 
 
-def _series(most_spp: int) -> list[int]:
-    return [2**k for k in range(2, int(np.log2(most_spp)) + 1)]
-
-
 class _Quality:
     """Scores of the middle of frames of the whole walk against their references."""
 
     def __init__(self, case: Case) -> None:
-        self._case, self._walk = case, case.walk
+        self._case, self._walk, self._reference_walk = case, case.walk, other_seed(case.walk)
         path = case.walk.path
         self.crop = middle((path.width, path.height), *case.terms.crop)
-        self._size = path.height, path.width
-        rows, columns = self.crop
-        viewing = case.walk.viewing.cropped(columns.stop - columns.start, rows.stop - rows.start)
-        self._viewer = Viewer(viewing, case.walk.settings)
-        self._reference_walk = other_seed(case.walk)
+        self._where = np.zeros((path.height, path.width), np.bool_)
+        self._where[self.crop] = True
+        height, width = self._where[self.crop].shape
+        self._viewer = Viewer(case.walk.viewing.cropped(width, height), case.walk.settings)
 
     def of_art(self, frame: int, spp: int) -> Scores:
         """Scores of a frame that is path traced by itself."""
         return self._scores(frame, self._traced(self._walk, frame, spp).color)
 
-    def of_run(self, name: str, frames: list[int]) -> list[Scores]:
-        """Scores of frames of a run folder."""
-        found = []
-        for frame in frames:
-            number = self._walk.path.numbers[frame]
-            color = read_exr(self._case.folder / name / "frames" / f"{number:04d}.exr")["RGB"]
-            found.append(self._scores(frame, self._cut(color.astype(np.float32))))
-        return found
+    def of_run(self, name: str, frame: int) -> Scores:
+        """Scores of a frame of a run folder."""
+        file = RunFolder.read(self._case.folder / name).file_of(FRAMES, self._walk.path.numbers[frame])
+        return self._scores(frame, self._cut(read_exr(file)["RGB"].astype(np.float32)))
 
     def _scores(self, frame: int, color: F32) -> Scores:
-        reference = self._reference(frame)
+        stem = self._case.folder / "crops" / f"{self._walk.path.numbers[frame]:04d}"
+        spp = self._case.terms.reference_spp
+        reference = stored(stem, lambda: self._traced(self._reference_walk, frame, spp))
         velocity = self._cut(self._walk.view(frame).velocity_deg_s)
         # The reference's own noise is not an error of the test.
         jnd = self._viewer.paper(color, reference.color, velocity, noise=reference.variance)
         return scores_in(jnd, np.ones(jnd.shape, np.bool_))
 
-    def _reference(self, frame: int) -> Shading:
-        stem = self._case.folder / "crops" / f"{self._walk.path.numbers[frame]:04d}"
-        spp = self._case.terms.reference_spp
-        return stored(stem, lambda: self._traced(self._reference_walk, frame, spp))
-
     def _traced(self, walk: Walkthrough, frame: int, spp: int) -> Shading:
-        where = np.zeros(self._size, np.bool_)
-        where[self.crop] = True
-        traced = walk.trace(frame, where, Purpose.REFERENCE, spp=spp, pixel_filter=PixelFilter.GAUSSIAN)
-        image = traced.spread(where)
-        return Shading(self._cut(image.color), self._cut(image.variance), traced.dropped)
+        purpose, pixel_filter = Purpose.REFERENCE, PixelFilter.GAUSSIAN
+        image = walk.trace(frame, self._where, purpose, spp=spp, pixel_filter=pixel_filter).spread(
+            self._where
+        )
+        return Shading(self._cut(image.color), self._cut(image.variance), image.dropped)
 
     def _cut(self, image: F32) -> F32:
         return np.ascontiguousarray(image[self.crop])

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,19 +18,16 @@ from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis
 from enfilade.methods.paper.composite import composite
 from enfilade.methods.paper.refine import warped_pair
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import spatial_support_px, temporal_limits
+from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.records import F32, Flow, Geometry, Keyframe, Shading, Warped
+from enfilade.records import F32, Geometry, Keyframe, Shading, Warped
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import SamplingSettings, TraceSettings, WarpSettings
+from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
 from studies.cases.mirrored import mirrored
 from studies.cases.seen import Viewer
-from studies.progress import counted
-
-__all__ = ["Example", "Row", "Windows", "other_seed", "probes_of"]
-
-Row = dict[str, Any]  # measurements of a frame
-Example = dict[str, F32]  # its images
 
 CACHED_IMAGES, CACHED_VIEWS = 64, 24  # some 600 MiB at 640x480
 END_FRAMES = 10  # of a path, where a temporal filter lacks half its support
@@ -45,10 +41,12 @@ class Windows:
     walk
     analysis
     monitor
+    probes
+        Number of frames whose surroundings are used.
     reference_spp
     folder
-        Holds one file a frame and kind. They depend on walkthrough and spp: the caller keeps to one folder
-        for each. None: frames are cached in memory only.
+        Holds one file a frame and kind. The caller keeps to one folder for each walkthrough and spp. None:
+        frames are cached in memory only.
     """
 
     def __init__(
@@ -57,10 +55,12 @@ class Windows:
         analysis: Analysis,
         monitor: Monitor,
         *,
+        probes: int,
         reference_spp: int,
         folder: Path | None = None,
     ) -> None:
         self.walk, self.analysis, self.monitor = walk, analysis, monitor
+        self.probes = probes_of(analysis, probes)
         self.viewer = Viewer(walk.viewing, walk.settings)
         self._reference_walk = other_seed(walk)
         self._reference_spp = reference_spp
@@ -68,15 +68,9 @@ class Windows:
         self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
         self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
 
-    def each(
-        self, stage: str, probes: list[int], measure: Callable[[Windows, int], tuple[Row, Example]]
-    ) -> tuple[list[Row], list[Example]]:
-        """Measure frames one by one, with progress: measurements and images of each."""
-        found = [measure(self, frame) for frame in counted(probes, stage, self.monitor)]
-        return [row for row, _ in found], [example for _, example in found]
-
-    def around(self, frame: int, reach: int) -> range:
-        """Frames of the same shot at most `reach` away."""
+    def around(self, frame: int, settings: AntialiasSettings) -> range:
+        """Frames of the same shot that the filter may use."""
+        reach = max(settings.frames, settings.slow_frames) // 2
         shot = next(s for s in self.walk.path.shots() if frame in s)
         return range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
 
@@ -91,12 +85,6 @@ class Windows:
     def reflected(self, frame: int) -> Geometry:
         """The same, with virtual images in place of the mirrors."""
         return mirrored(self.walk.renderer, self.geometry(frame))
-
-    def flow(self, frame: int, geometry: Geometry | None = None) -> Flow:
-        """Motion vectors of a frame's surfaces, or of another geometry in their place."""
-        if geometry is None:
-            return self.view(frame).flow
-        return image_flow(geometry, *self.walk.path.neighbours(frame))
 
     def traced(self, frame: int) -> Shading:
         """A frame with every pixel traced: I_rt of Fig. 9."""
@@ -128,6 +116,44 @@ class Windows:
         """A traced frame as a keyframe."""
         return Keyframe(frame, self.geometry(frame), self.traced(frame))
 
+    def antialiased(
+        self,
+        frame: int,
+        settings: AntialiasSettings,
+        color_of: Callable[[int], F32] | None = None,
+        geometry_of: Callable[[int], Geometry] | None = None,
+    ) -> F32:
+        """Filter a frame with its neighbours (§5), (H, W, 3) float32.
+
+        Parameters
+        ----------
+        frame
+        settings
+        color_of
+            Colours of each frame before the filter; by default those of the traced frames.
+        geometry_of
+            Geometry of each frame whose motion is followed, in place of the visible surfaces'. Where it is
+            not specular, the filter has its full length.
+        """
+        viewing, path = self.walk.viewing, self.walk.path
+        span = self.around(frame, settings)
+        slices: dict[int, Slice] = {}
+        for at in span:
+            color = self.traced(at).color if color_of is None else color_of(at)
+            view = self.view(at)
+            support = spatial_support_px(view.speed_deg_s, viewing.pixels_per_degree, settings)
+            geometry = view.geometry if geometry_of is None else geometry_of(at)
+            flow = view.flow if geometry_of is None else image_flow(geometry, *path.neighbours(at))
+            slices[at] = Slice(reconstruct(color, support), geometry, flow)
+        here = slices[frame]
+        return filter_along_flow(
+            here,
+            [slices[at] for at in reversed(range(span.start, frame))],
+            [slices[at] for at in range(frame + 1, span.stop)],
+            temporal_limits(viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
+            settings,
+        )
+
     def _composited(self, segment: Segment, frame: int) -> Shading:
         geometry, progress = self.geometry(frame), self.walk.path.progress(segment, frame)
         settings = self.walk.settings[WarpSettings]
@@ -135,11 +161,9 @@ class Windows:
         color, is_disoccluded = composite(*warped, geometry, progress=progress, settings=settings)
         before, after = map(_with_variance_as_color, warped)
         density, _ = composite(before, after, geometry, progress=progress, settings=settings)
-        variance = np.ascontiguousarray(density[..., 0])
-        traced = self.traced(frame)
-        color[is_disoccluded], variance[is_disoccluded] = (
-            values[is_disoccluded] for values in (traced.color, traced.variance)
-        )
+        variance, traced = np.ascontiguousarray(density[..., 0]), self.traced(frame)
+        color[is_disoccluded] = traced.color[is_disoccluded]
+        variance[is_disoccluded] = traced.variance[is_disoccluded]
         return Shading(color, variance)
 
     def _cached(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
@@ -167,8 +191,7 @@ def probes_of(analysis: Analysis, count: int) -> list[int]:
     """Frames at even quantiles of the mean velocity, slowest first, each once, not at the path's ends."""
     length = len(analysis.path)
     margin = min(END_FRAMES, length // 4)
-    inner = range(margin, length - margin)
-    by_speed = sorted(inner, key=lambda frame: analysis.frames[frame].speed_deg_s)
+    by_speed = sorted(range(margin, length - margin), key=lambda frame: analysis.frames[frame].speed_deg_s)
     at = [round((len(by_speed) - 1) * k / max(count - 1, 1)) for k in range(count)]
     return list(dict.fromkeys(by_speed[i] for i in at))
 
@@ -179,5 +202,4 @@ def _trace(walk: Walkthrough, frame: int, spp: int, purpose: Purpose, pixel_filt
 
 
 def _with_variance_as_color(warped: Warped) -> Warped:
-    density: F32 = np.repeat(warped.variance[..., None], 3, axis=2)
-    return replace(warped, color=density)
+    return replace(warped, color=np.repeat(warped.variance[..., None], 3, axis=2))

@@ -13,13 +13,13 @@ from enfilade.images import read_exr
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Silence
 from enfilade.runs.render import render
-from enfilade.settings import ReferenceSettings, SampleFilter, SamplingSettings
+from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
 from printed import as_text
 from scenes_analytic import room_walk
 from small_walks import ROOM, room_job
 from studies.__main__ import main
-from studies.bench.bench import Terms, bench
-from studies.bench.configurations import Preset, chosen, lineup, read_presets
+from studies.bench.bench import bench
+from studies.bench.configurations import chosen, lineup
 from studies.bench.measuring import available
 from studies.bench.tables import bench_tables
 
@@ -62,13 +62,12 @@ def test_every_configuration_is_rendered_charged_and_measured(held):
     for row in found["configurations"]:
         assert set(row["cost"]["stages"]) == {"frames", "trace", "files"}
         assert row["cost"]["cpu_s"] == pytest.approx(sum(s["cpu_s"] for s in row["cost"]["stages"].values()))
-        assert 50.0 < row["cost"]["peak_mib"] < 4000.0
         assert len(frames_of(folder / "configurations" / row["name"])) == 4
         scores = json.loads((folder / "scores" / f"{row['name']}.json").read_text())["measures"]
         assert row["scores"] == {name: scores[name]["score"] for name in ("aqm", "psnr", "temporal")}
         assert scores["temporal"]["per_frame"][0] is None
     assert json.loads((folder / "bench.json").read_text()) == found
-    for name in ("bench.png", "crops.png", "slices.png"):
+    for name in ("bench.png", "crops.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     text = "".join(as_text(table) for table in bench_tables(found))
     assert all(name in text for name in (*NAMES, "noise floor"))
@@ -126,7 +125,7 @@ def test_missing_rivals_and_measures_are_reported(tmp_path, monkeypatch):
     job = room_job(tmp_path, 2, method="reference")
     monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
     with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
-        bench(job, lineup(job, traced=(), denoised=(1,), presets=()), Terms(4), tmp_path / "bench")
+        bench(job, lineup(job, traced=(), denoised=(1,)), tmp_path / "bench", reference_spp=4)
     reasons = {name: "" if name == "psnr" else f"no {name}" for name in SCALES}
     monkeypatch.setattr("studies.bench.measuring.why_no_measure", reasons.get)
     assert available((), job) == (["psnr"], [why for why in reasons.values() if why])
@@ -141,23 +140,20 @@ def test_a_single_frame_has_no_changes_to_measure(tmp_path):
     assert set(names) < {name for name in SCALES if not why_missing(name)}
 
 
-def test_presets_of_a_file(tmp_path):
-    file = tmp_path / "presets.toml"
-    file.write_text('[fine]\nmethod = "decoupled"\ndecoupled = { quality = 3 }\n[old]\nmethod = "paper"\n')
-    presets = read_presets(file)
-    assert presets == (Preset("fine", "decoupled", {"decoupled": {"quality": 3}}), Preset("old", "paper"))
-    job = room_job(tmp_path, 2)
-    found = lineup(job, traced=(1,), denoised=(2,), presets=presets)
-    names = ["traced-1", "denoised-2", "denoised-2-fast", "minterpolate-1", "fine", "old"]
-    assert [c.name for c in found] == names
-    assert [c.name for c in chosen(found, ["denoised-*", "old"])] == ["denoised-2", "denoised-2-fast", "old"]
-    assert found[1].job.settings[ReferenceSettings].pixel_filter is SampleFilter.BOX
-    assert found[5].job.settings == job.settings
-    wrong = {"[a]\n": "needs method", "": "no preset", '["../x"]\nmethod = "paper"\n': "folder"}
-    for text, message in wrong.items():
-        file.write_text(text)
-        with pytest.raises(SettingsError, match=message):
-            read_presets(file)
+def test_the_lineup(tmp_path):
+    found = lineup(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
+    names = [c.name for c in found]
+    assert names[:5] == ["traced-1", "traced-4", "denoised-2", "denoised-2-fast", "minterpolate-4"]
+    assert [c.name for c in chosen(found, ["denoised-*", "paper-16"])] == [
+        "denoised-2",
+        "denoised-2-fast",
+        "paper-16",
+    ]
+    denoised, paper, ours = (found[names.index(name)] for name in ("denoised-2", "paper-16", "decoupled-30"))
+    assert denoised.job.settings[ReferenceSettings].pixel_filter is denoised.pixel_filter is SampleFilter.BOX
+    assert (denoised.spp, paper.spp) == (2, 16)
+    assert ours.job.settings[DecoupledSettings].quality == 30.0
+    assert not ours.is_rival
 
 
 def interpolated(folder, path=None, **tables):
@@ -172,7 +168,7 @@ def test_interpolated_frames_keep_keyframes_and_highlights(tmp_path):
     assert traced.settings[SamplingSettings].spp == 4
     render(traced, tmp_path / "traced", Silence())
     np.testing.assert_array_equal(found[[0, 4]], frames_of(tmp_path / "traced")[[0, 4]])
-    assert found[2].max() > 1.3  # in-betweens are not clipped at white before they are exposed
+    assert found[2].max() > 1.05  # in-betweens are not clipped at white before they are exposed
 
 
 def test_interpolation_rests_where_the_camera_does(tmp_path):

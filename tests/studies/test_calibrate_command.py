@@ -36,9 +36,7 @@ def test_table_json_plot_and_kept_frames(run, line, tmp_path):
     again = run(*line, "--out", folder, "--json")
     found = json.loads(again.stdout)
     assert found["spp"] == 4
-    assert [row["threshold_deg_s"] for row in found["curve"]] == list(
-        threshold.Calibration().thresholds_deg_s
-    )
+    assert tuple(row["threshold_deg_s"] for row in found["curve"]) == threshold.THRESHOLDS_DEG_S
     assert {file: file.stat().st_mtime_ns for file in folder.rglob("*.exr")} == files
     other = run(*line, "--out", folder, "--seed", "7")
     assert other.exit_code == 2

@@ -14,7 +14,6 @@ from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 from enfilade.settings import MetricSettings
 from scenes_analytic import room
 from small_walks import windows_of
-from studies.cases.filtering import antialiased
 from studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from studies.cases.seen import Viewer, score_in, visible_percent
 from studies.cases.supports import uniform
@@ -119,6 +118,6 @@ def test_declared_noise_does_not_count_and_the_slope_of_masking_does():
 
 def test_uniform_supports():
     traced = plain().traced(8).color
-    np.testing.assert_allclose(antialiased(plain(), 8, uniform(1.0, 1)), traced, atol=1e-6)
-    wide = antialiased(plain(), 8, uniform(11.0, 1))
+    np.testing.assert_allclose(plain().antialiased(8, uniform(1.0, 1)), traced, atol=1e-6)
+    wide = plain().antialiased(8, uniform(11.0, 1))
     assert np.abs(np.diff(wide, axis=1)).mean() < 0.7 * np.abs(np.diff(traced, axis=1)).mean()
