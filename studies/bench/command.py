@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.options import job_of, json_option, path_options, quiet_option, settings_options
+from enfilade.cli.options import json_option, path_options, quiet_option, settings_of, settings_options
+from enfilade.device import activate
+
+if TYPE_CHECKING:
+    from enfilade.runs.job import Job
 
 
 def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tuple[int, ...]:
@@ -89,13 +93,14 @@ def command(
     crops.png.
     """
     mark_resumable(ctx)
+    activate("cpu")
     from studies.bench.bench import bench, forecast_s
     from studies.bench.charts import plot_bench
     from studies.bench.configurations import chosen, lineup
     from studies.bench.pictures import plot_crops
 
     path = {name: inputs.pop(name) for name in ("path_file", "size", "frames", "fps")}
-    job = job_of(ctx, scene=scene, method="reference", device="cpu", **path)
+    job = _job(ctx, scene, **path)
     configurations = chosen(lineup(job, traced=traced, denoised=denoised), only)
     if not inputs["quiet"]:
         seconds = forecast_s(job, configurations, inputs["reference_spp"], len(os.sched_getaffinity(0)))
@@ -109,6 +114,18 @@ def command(
         _show(found)
         for file in (folder / "bench.json", *plots):
             click.echo(file)
+
+
+def _job(ctx: click.Context, scene: Path, *, path_file: Path, size: Any, frames: str | None, fps: Any) -> Job:
+    """Scene, path, and settings of all sections: each configuration reads some of them."""
+    from enfilade.camera import load_path, parse_frames
+    from enfilade.runs.job import Job
+    from enfilade.scene.opener import Scene
+    from enfilade.settings import SECTIONS
+
+    settings = settings_of(ctx, SECTIONS)
+    path = load_path(path_file, size=size, frames=None if frames is None else parse_frames(frames), fps=fps)
+    return Job(Scene(scene), path, settings, "reference")
 
 
 def _show(found: dict[str, Any]) -> None:

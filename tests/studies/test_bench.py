@@ -44,6 +44,7 @@ def line(tmp_path_factory):
     (folder / "path.json").write_text(json.dumps({**values, "seconds": 4 / 30, "camera_path": cameras}))
     files = (folder / "room.xml", "--path", folder / "path.json")
     flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
+    flags += ("--set", "masks.slow_deg_s=0.4")  # of a section that some configurations read
     only = [word for name in NAMES for word in ("--only", name)]
     measures = ("--measure", "aqm", "--measure", "psnr", "--measure", "temporal")
     return [str(word) for word in ("bench", *files, *flags, *only, *measures, "--out", folder / "bench")]
