@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -71,3 +72,16 @@ def room_job(folder: Path, count: int, *, method: str = "paper", **tables: dict[
     diagonal_m = math.hypot(48, 36) * 0.25 / 800.0
     settings = settings_of(**{"viewing": {"diagonal_m": diagonal_m}, **tables})
     return Job(Scene(file), room_walk(count, size=(48, 36)), settings, method)
+
+
+def room_files(folder: Path, count: int) -> tuple[Path | str, ...]:
+    """Arguments of a command for the same walk: the scene, and its path."""
+    (folder / "room.xml").write_text(ROOM)
+    cameras = [
+        {"camera_to_world": camera.world_from_camera.ravel().tolist(), "fov": 50, "aspect": 4 / 3}
+        for camera in room_walk(count, size=(48, 36)).cameras
+    ]
+    values = {"render_width": 48, "render_height": 36, "fps": 30, "camera_type": "perspective"}
+    path = {**values, "seconds": count / 30, "camera_path": cameras}
+    (folder / "camera_path.json").write_text(json.dumps(path))
+    return folder / "room.xml", "--path", folder / "camera_path.json"

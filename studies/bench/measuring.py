@@ -37,8 +37,8 @@ def available(asked: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
         changes = (name for name, scale in SCALES.items() if scale.is_of_changes)
         reasons |= {name: f"{name} is left out: it needs consecutive frames" for name in changes}
     for name in asked:
-        if reasons[name]:
-            raise SettingsError(reasons[name])
+        if why := reasons.get(name, f"there is no measure {name!r}; known are: {', '.join(SCALES)}"):
+            raise SettingsError(why)
     names = list(dict.fromkeys(asked)) or [name for name, why in reasons.items() if not why]
     if not names:
         raise SettingsError(f"no measure can be had: {'; '.join(reasons.values())}")

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from enfilade.runs.render import render
 from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
 from printed import as_text
 from scenes_analytic import room_walk
-from small_walks import ROOM, room_job
+from small_walks import room_files, room_job
 from studies.__main__ import main
 from studies.bench.bench import bench
 from studies.bench.configurations import chosen, lineup
@@ -35,26 +36,19 @@ def frames_of(run):
 def line(tmp_path_factory):
     """Arguments of a bench of four frames, 48x36; its folder is the last one."""
     folder = tmp_path_factory.mktemp("bench")
-    (folder / "room.xml").write_text(ROOM)
-    cameras = [
-        {"camera_to_world": camera.world_from_camera.ravel().tolist(), "fov": 50, "aspect": 4 / 3}
-        for camera in room_walk(4, size=(48, 36)).cameras
-    ]
-    values = {"render_width": 48, "render_height": 36, "fps": 30, "camera_type": "perspective"}
-    (folder / "path.json").write_text(json.dumps({**values, "seconds": 4 / 30, "camera_path": cameras}))
-    files = (folder / "room.xml", "--path", folder / "path.json")
     flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
     flags += ("--set", "masks.slow_deg_s=0.4")  # of a section that some configurations read
     only = [word for name in NAMES for word in ("--only", name)]
     measures = ("--measure", "aqm", "--measure", "psnr", "--measure", "temporal")
-    return [str(word) for word in ("bench", *files, *flags, *only, *measures, "--out", folder / "bench")]
+    words = ("bench", *room_files(folder, 4), *flags, *only, *measures, "--out", folder / "bench")
+    return [str(word) for word in words]
 
 
 @pytest.fixture(scope="module")
-def held(line, tmp_path_factory):
+def held(line):
     result = CliRunner().invoke(main, line)
     assert result.exit_code == 0, result.output
-    return json.loads(result.stdout), tmp_path_factory.getbasetemp().joinpath(line[-1])
+    return json.loads(result.stdout), Path(line[-1])
 
 
 def test_every_configuration_is_rendered_charged_and_measured(held):
@@ -130,6 +124,8 @@ def test_missing_rivals_and_measures_are_reported(tmp_path, monkeypatch):
     reasons = {name: "" if name == "psnr" else f"no {name}" for name in SCALES}
     monkeypatch.setattr("studies.bench.measuring.why_no_measure", reasons.get)
     assert available((), job) == (["psnr"], [why for why in reasons.values() if why])
+    with pytest.raises(SettingsError, match=r"no measure 'ssim'; known are: aqm"):
+        available(("ssim",), job)
     with pytest.raises(SettingsError, match="no flip"):
         available(("flip",), job)
 

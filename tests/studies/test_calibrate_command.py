@@ -4,24 +4,15 @@ import json
 
 import pytest
 
-from small_walks import ROOM
+from small_walks import room_files
 from studies.cases import threshold
 
 
 @pytest.fixture
 def line(tmp_path):
     """A path of ten frames along the front of a room."""
-    (tmp_path / "room.xml").write_text(ROOM)
-
-    def pose(x):
-        return [1, 0, 0, x, 0, 1, 0, 1.4, 0, 0, 1, 3.5, 0, 0, 0, 1]
-
-    cameras = [{"camera_to_world": pose(0.05 * k), "fov": 50, "aspect": 4 / 3} for k in range(10)]
-    values = {"render_width": 48, "render_height": 36, "fps": 30, "camera_type": "perspective"}
-    path = tmp_path / "camera_path.json"
-    path.write_text(json.dumps({**values, "seconds": 1 / 3, "camera_path": cameras}))
     flags = ("--probes", 1, "--spp", 4, "--set", "viewing.diagonal_m=0.01875", "--quiet", "--device", "cpu")
-    return ("calibrate", "threshold", tmp_path / "room.xml", "--path", path, *flags)
+    return ("calibrate", "threshold", *room_files(tmp_path, 10), *flags)
 
 
 def test_table_json_plot_and_kept_frames(run, line, tmp_path):
