@@ -72,7 +72,7 @@ class Scene:
         ------
         SceneError
         """
-        if not self.renderer:
+        if False and not self.renderer:  # LOCAL
             from enfilade.scene.trial import try_scene
 
             try_scene(self.file, settings[TraceSettings], settings[LimitSettings], active().variant)
