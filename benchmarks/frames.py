@@ -1,10 +1,10 @@
-"""What a frame costs by itself, by its size: rays, and all that is none.
+"""Cost of a frame of the default method by itself, by image size.
 
     python benchmarks/frames.py [--scene atrium] [--sizes 320x180 640x480] [--frames 31-46] [--quality 10]
 
-Renders some frames of ROOM or ATRIUM with the default method, one process for each size, and adds up what
-the ledger says of the units that make frames: what keyframes cost is left out, and so is the video. Prints
-seconds a frame as the median over frames, wall time beside CPU time, and the peak memory of the process.
+Renders some frames of ROOM or ATRIUM, one process for each size, and adds up the cost of the tasks that make
+frames: keyframes and the video are left out. Prints seconds a frame as the median over frames, wall (CPU)
+time, and the peak memory of the process.
 """
 
 import argparse
@@ -16,9 +16,11 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-RAYS = ("gather", "scatter")  # stages that send rays and look up light; all others are overhead
-STAGES = (*RAYS, "pool", "geometry", "over time", "files")
-UNITS = ("raw ", "frame ")  # a frame shaded by itself, and the one that is delivered
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.statistics import add_costs
+
+PASSES = ("shading", "frames")
+STAGES = (*PASSES, "gbuffer", "files")
 
 
 def main() -> None:
@@ -30,61 +32,49 @@ def main() -> None:
     )
     parser.add_argument("--frames", default="31-46")
     parser.add_argument("--quality", default="10")
-    parser.add_argument(
-        "--layers", default="forward,backward,source", help="of the delivered frames, or 'all'"
-    )
+    parser.add_argument("--layers", default="forward,backward,provenance", help="of the frames, or 'all'")
     arguments = parser.parse_args()
-    print(
-        "seconds a frame, wall (CPU)   "
-        + "".join(f"{name:>16}" for name in (*STAGES, "overhead", "all"))
-        + "      MiB"
-    )
+    headings = "".join(f"{name:>16}" for name in (*STAGES, "all"))
+    print(f"seconds a frame, wall (CPU)   {headings}      MiB")
     with tempfile.TemporaryDirectory() as name:
         for size in arguments.sizes:
             scene, run = Path(name) / f"scene-{size}", Path(name) / size
-            enfilade("scene", arguments.scene, "--out", scene, "--preset", "small", "--size", size)
+            command("studies", "scene", arguments.scene, "--out", scene, "--preset", "small", "--size", size)
+            flags = [
+                "--frames",
+                arguments.frames,
+                "--quality",
+                arguments.quality,
+                "--layers",
+                arguments.layers,
+            ]
             files = [scene / "scene.xml", "--path", scene / "camera_path.json", "--out", run]
-            flags = ["--frames", arguments.frames, "--quality", arguments.quality]
-            enfilade("render", *files, *flags, "--output-layers", arguments.layers, "--quiet")
+            command("enfilade", "render", *files, *flags, "--quiet")
             show(size, run)
 
 
 def show(size: str, run: Path) -> None:
-    """Print what the frames of a run have cost."""
-    costs = spent(run)
-    kinds = {stage: (stage,) for stage in STAGES}
-    kinds["overhead"] = tuple({stage for frame in costs for stage in frame} - set(RAYS))
-    kinds["all"] = (*RAYS, *kinds["overhead"])
+    """Print the cost of the frames of a run."""
+    by_frame = defaultdict(list)
+    for line in RunFolder.read(run).lines():
+        if line["pass"] in PASSES:
+            by_frame[line["frame"]].append(line["cost"])
+    costs = [add_costs(tasks) for tasks in by_frame.values()]
     row = ""
-    for stages in kinds.values():
+    for stages in (*((stage,) for stage in STAGES), STAGES):
         wall, cpu = (
-            statistics.median(sum(frame[stage][kind] for stage in stages) for frame in costs)
-            for kind in (0, 1)
+            statistics.median(sum(cost[stage][kind] for stage in stages if stage in cost) for cost in costs)
+            for kind in ("wall_s", "cpu_s")
         )
         row += f"{f'{wall:.3f} ({cpu:.3f})':>16}"
     peak = json.loads((run / "summary.json").read_text())["peak_memory_bytes"] / 2**20
     print(f"{size:<30}{row}{peak:9.0f}", flush=True)
 
 
-def spent(run: Path) -> list[dict[str, tuple[float, float]]]:
-    """Wall and CPU time of each stage, for each frame of a run."""
-    frames: dict[int, dict[str, tuple[float, float]]] = defaultdict(lambda: defaultdict(lambda: (0.0, 0.0)))
-    for text in (run / "ledger.jsonl").read_text().splitlines():
-        line = json.loads(text)
-        if not line.get("unit", "").startswith(UNITS):
-            continue
-        costs = frames[line["frame"]]
-        for stage, cost in line["cost"].items():
-            wall, cpu = costs[stage]
-            costs[stage] = wall + cost["wall_s"], cpu + cost["cpu_s"]
-    return list(frames.values())
-
-
-def enfilade(*words: str | Path) -> None:
+def command(module: str, *words: str | Path) -> None:
     """Run a command of ours in a process of its own."""
-    subprocess.run(
-        [sys.executable, "-m", "enfilade", *map(str, words)], check=True, stdout=subprocess.DEVNULL
-    )
+    line = [sys.executable, "-m", module, *map(str, words)]
+    subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,19 @@
-"""How many camera rays a second look up light: visibility, albedo and lookup.
+"""Camera rays a second that look up cached irradiance: visibility, albedo and lookup.
 
     python benchmarks/lookups.py [--scene room] [--size 640x480] [--spp 4] [--repeats 20]
 
-Prepares the light around one segment of ROOM or ATRIUM, then sends rays through the middle frame of it, a few
-a pixel, and prints millions a second: at best, and in the median. What pages don't know is looked up in cells
-or traced, as it is in a run. Making the rays is not counted.
+Renders one segment of ROOM or ATRIUM by the method `decoupled`, then sends rays through its middle frame, a
+few a pixel, and prints millions a second: the best, and the median. Misses are looked up in the hash grid or
+path traced, as in a run. The generation of the rays is not counted.
 """
 
 import argparse
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
+
+from enfilade.device import activate
 
 FIRST, SPACING = 31, 8  # frames of the short walks, in which the camera moves
 WARM_UP = 3  # repeats in which kernels are recorded
@@ -27,81 +27,96 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=4, help="rays a pixel, sent at once")
     parser.add_argument("--repeats", type=int, default=20)
     arguments = parser.parse_args()
+    activate("cpu")  # before the modules that bind Dr.Jit's types
     with tempfile.TemporaryDirectory() as name:
         times, count, known = measured(Path(name), arguments)
     best, middle = (count / seconds / 1e6 for seconds in (min(times), statistics.median(times)))
     print(
-        f"{arguments.scene} {arguments.size}: {count} rays, {known:.1%} of the lit pixels known to pages; "
+        f"{arguments.scene} {arguments.size}: {count} rays, {known:.1%} of the diffuse pixels in images; "
         f"best {best:.1f}, median {middle:.1f} million a second"
     )
 
 
 def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], int, float]:
-    """Seconds of each repeat, rays of one, and which share of lit pixels the pages know."""
-    line = [sys.executable, "-m", "enfilade", "scene", arguments.scene, "--out", str(folder / "scene")]
-    subprocess.run(
-        [*line, "--preset", "small", "--size", arguments.size], check=True, stdout=subprocess.DEVNULL
-    )
-    from enfilade.device import activate
-
-    activate("cpu")  # before what binds Dr.Jit's types
+    """Seconds of each repeat, rays of one, and the share of diffuse pixels that irradiance images know."""
     import drjit as dr
     import numpy as np
 
     from enfilade.camera import load_path
     from enfilade.kernels.estimate import Estimate
+    from enfilade.methods.decoupled.integrator import Integrator
+    from enfilade.methods.decoupled.shot import Shot
+    from enfilade.methods.decoupled.virtual_images import VirtualImages
+    from enfilade.methods.walkthrough import Walkthrough
     from enfilade.monitor import Silence
-    from enfilade.pipeline.job import Job
-    from enfilade.pipeline.light import LightTable
-    from enfilade.pipeline.survey import survey_path
-    from enfilade.pipeline.units import segments_of
-    from enfilade.pipeline.workshop import Workshop
     from enfilade.renderer import PixelFilter, Purpose
-    from enfilade.settings import Settings
-    from enfilade.store import Run
+    from enfilade.runs.folder import RunFolder
+    from enfilade.runs.job import Job
+    from enfilade.runs.render import render
+    from enfilade.scene.opener import Scene
+    from enfilade.settings import DecoupledSettings, Settings
+    from studies.scenes import write_scene
 
     width, height = map(int, arguments.size.split("x"))
-    frames = tuple(range(FIRST, FIRST + SPACING + 1))
-    path = load_path(folder / "scene" / "camera_path.json", size=(width, height), frames=frames)
-    settings = Settings.from_tables({"light": {"spacing": SPACING, "paths": 4}})
-    job = Job(folder / "scene" / "scene.xml", path, settings, "decoupled")
-    renderer = job.open_renderer()
+    files = write_scene(arguments.scene, folder / "scene", preset="small")
+    path = load_path(files.path, size=(width, height), frames=tuple(range(FIRST, FIRST + SPACING + 1)))
+    job = Job(Scene(files.scene), path, Settings(DecoupledSettings(spacing=SPACING)))
+    render(job, folder / "run", Silence())
+    renderer, frame = job.open_renderer(), SPACING // 2
+    walk = Walkthrough(path, job.rendering_settings(), renderer)
+    inputs = Results(job, RunFolder.read(folder / "run"))
+    segments = inputs.analysis.segments(SPACING)[0]
+    integrator = Integrator(renderer)
+    view, cache = Shot(0, segments, inputs, walk, integrator, VirtualImages(renderer)).caches(frame)
     times: list[float] = []
-    with Run.open(folder / "run", job.identity(renderer)) as run:
-        workshop = Workshop(job, renderer, run, Silence())
-        table = LightTable(
-            workshop, segments_of(job, survey_path(workshop.views, path, settings, Silence()))[0]
-        )
-        for segment in table.segments:
-            table.prepare(segment)
-        frame = SPACING // 2
-        camera = path.cameras[frame]
-        near, cache = table.around(frame)
 
-        def seen(rays, rng):
-            dr.eval(rays, rng)
-            dr.sync_thread()
-            begin = time.perf_counter()
-            found = workshop.shader.seen(near, cache, rays, rng, pixel_angle=camera.pixel_angle)
-            dr.eval(found)
-            dr.sync_thread()
-            times.append(time.perf_counter() - begin)
-            return found
-
-        pixels = np.arange(width * height, dtype=np.uint32)
-        rays = Estimate(
-            camera,
-            pixels,
-            seen,
-            chunk=len(pixels) * arguments.spp,
-            pixel_filter=PixelFilter.GAUSSIAN,
-            random=workshop.random(frame, Purpose.DIFFUSE),
+    def radiance(rays, rng):
+        dr.eval(rays, rng)
+        dr.sync_thread()
+        begin = time.perf_counter()
+        found = integrator.diffuse_radiance(
+            view, cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle
         )
-        for _ in range(WARM_UP + arguments.repeats):
-            rays.add(arguments.spp)
-        is_known = np.array(near.pages[0].shape_indices) > 0
-        has_diffuse = workshop.views[frame].geometry.has_diffuse.ravel()
+        dr.eval(found)
+        dr.sync_thread()
+        times.append(time.perf_counter() - begin)
+        return found
+
+    pixels = np.arange(width * height, dtype=np.uint32)
+    rays = Estimate(
+        path.cameras[frame],
+        pixels,
+        radiance,
+        chunk=len(pixels) * arguments.spp,
+        pixel_filter=PixelFilter.GAUSSIAN,
+        random=walk.random(frame, Purpose.DIFFUSE),
+    )
+    for _ in range(WARM_UP + arguments.repeats):
+        rays.add(arguments.spp)
+    is_known = np.array(view.images[0].shape_indices) > 0
+    has_diffuse = walk.view(frame).geometry.has_diffuse.ravel()
     return times[WARM_UP:], len(pixels) * arguments.spp, float(is_known[has_diffuse].mean())
+
+
+class Results:
+    """Results of a finished run, as :class:`enfilade.methods.base.Inputs`."""
+
+    def __init__(self, job, run) -> None:
+        from enfilade.runs.worker import analysis_of
+
+        self._run, self._numbers = run, job.path.numbers
+        self._records = {of.name: of.record for of in job.opened_method().passes}
+        self.analysis = analysis_of(job, run)
+
+    def record(self, pass_name, frame):
+        """The record of a pass for a frame."""
+        from enfilade.images.records import read_record
+
+        return read_record(self._run.file_of(pass_name, self._numbers[frame]), self._records[pass_name])
+
+    def facts(self, pass_name, frame):
+        """The facts of a task."""
+        return self._run.line(pass_name, self._numbers[frame])
 
 
 if __name__ == "__main__":

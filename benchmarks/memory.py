@@ -1,9 +1,9 @@
-"""Measure whether the memory of a run depends on the number of its frames.
+"""Whether the memory of a run depends on the number of its frames.
 
     python benchmarks/memory.py [--size 1920x1080] [--frames 30 100]
 
-Renders a textured wall and a ball, which cost next to nothing to trace, with the whole method of the
-paper; one process for each number of frames; prints the peak memory of each.
+Renders a textured wall and a ball with all passes of the paper's method, one process for each number of
+frames, and prints the peak memory of each.
 """
 
 import argparse
@@ -15,6 +15,19 @@ import time
 from pathlib import Path
 
 FPS = 30
+SCENE = """<scene version="3.0.0">
+<shape type="rectangle" id="wall">
+  <transform name="to_world"><scale value="9"/></transform>
+  <bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
+    <transform name="to_uv"><scale value="16"/></transform>
+  </texture></bsdf>
+</shape>
+<shape type="sphere" id="ball">
+  <point name="center" x="0.5" y="0" z="1"/><float name="radius" value="0.5"/>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.2, 0.15"/></bsdf>
+</shape>
+<emitter type="constant"/>
+</scene>"""
 
 
 def main() -> None:
@@ -38,17 +51,14 @@ def main() -> None:
 
 def render(folder: Path, size: str, count: int) -> dict:
     """Render `count` frames in a process of its own; returns the run's summary."""
-    from analytic import BALL, RENDERER, WALL, AnalyticScene, write_scene
-
-    scene = write_scene(folder / "wall.analytic", AnalyticScene((WALL, BALL)))
-    path = folder / "path.json"
-    width, height = size.split("x")
+    scene, path = folder / "scene.xml", folder / "path.json"
+    scene.write_text(SCENE)
     eyes = {at / FPS: [0.02 * at, 0.0, 4.0] for at in (0, count - 1)}
     keys = [{"time": t, "eye": e, "target": [e[0], 0, 0], "fov": 50} for t, e in eyes.items()]
-    walk = {"format": "enfilade-path", "fps": FPS, "size": [int(width), int(height)], "keys": keys}
+    walk = {"format": "enfilade-path", "fps": FPS, "size": [int(n) for n in size.split("x")], "keys": keys}
     path.write_text(json.dumps(walk))
     command = [sys.executable, "-m", "enfilade", "render", scene, "--path", path, "--out", folder / "run"]
-    flags = [*RENDERER, "--method", "paper", "--spp", "4", "--quiet"]
+    flags = ["--method", "paper", "--spp", "4", "--quiet"]
     subprocess.run([*map(str, command), *flags], check=True, stdout=subprocess.DEVNULL)
     return json.loads((folder / "run" / "summary.json").read_text())
 

@@ -1,4 +1,4 @@
-"""Measure whether tracing a list of pixels costs in proportion to the list.
+"""Whether tracing a list of pixels costs in proportion to the list.
 
     python benchmarks/pixels.py [--size 640x480] [--spp 64] [--percent 5]
 
@@ -28,15 +28,15 @@ def main() -> None:
     activate("auto")
     from enfilade.camera import load_path
     from enfilade.renderer import Purpose, RandomKey
-    from enfilade.scene.opener import open_renderer
-    from enfilade.settings import TraceSettings
+    from enfilade.scene.opener import Scene
+    from enfilade.settings import Settings
     from studies.scenes import write_scene
 
     width, height = map(int, arguments.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         files = write_scene("room", Path(folder), preset="small")
         camera = load_path(files.path, size=(width, height)).cameras[30]
-        renderer = open_renderer(files.scene, TraceSettings())
+        renderer = Scene(files.scene).open(Settings())
 
     everything = np.arange(width * height, dtype=np.uint32)
     count = round(len(everything) * arguments.percent / 100.0)

@@ -1,11 +1,11 @@
-"""How much of the detail of the reference stands in what each contestant of a bench made.
+"""Detail of the reference that each configuration of a bench preserves.
 
     python benchmarks/sharpness.py BENCH [--every 3]
 
-BENCH is the folder of an `enfilade bench`. By spatial frequency: the cross-spectrum of the encoded luminance
-with that of the reference, by that of the contestant that was path traced with most paths. Noise does not
-count, since it is not correlated; 1 is as sharp as path tracing.
-Contestants with another pixel filter than the traced one are left out.
+BENCH is the folder of a `python -m studies bench`. By spatial frequency: the cross-spectrum of the encoded
+luminance with that of the reference, over that of the configuration that was path traced with most paths.
+Noise does not count, since it is not correlated; 1 is as sharp as path tracing. Configurations with another
+pixel filter than the traced one are left out.
 """
 
 import argparse
@@ -22,37 +22,31 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("bench", type=Path)
-    parser.add_argument("--every", type=int, default=3, help="frames from one that is looked at to the next")
+    parser.add_argument("--every", type=int, default=3, help="step between the frames that are measured")
     arguments = parser.parse_args()
     found = json.loads((arguments.bench / "bench.json").read_text())
-    contestants = {c["name"]: c for c in found["contestants"]}
-    traced = max((c for c in contestants.values() if c["family"] == "traced"), key=lambda c: c["spp"])
-    bench, every = arguments.bench, arguments.every
-    exposure_ev = exposure_of(found)
-    reference = spectra(bench / "references" / f"reference-{traced['pixel_filter']}", every, exposure_ev)
+    configurations = {c["name"]: c for c in found["configurations"]}
+    traced = max((c for c in configurations.values() if c["family"] == "traced"), key=lambda c: c["spp"])
+    bench, every, exposure_ev = arguments.bench, arguments.every, found["exposure_ev"]
+    reference = spectra(bench / "references" / traced["pixel_filter"], every, exposure_ev)
     whole = shared(spectra(folder_of(bench, traced), every, exposure_ev), reference)
     edges = "".join(f"{low:>8.3f}-{high:.3f}" for low, high in itertools.pairwise(BANDS))
     print(f"{'cycles per pixel':<18}{edges}")
-    for name, contestant in contestants.items():
-        if contestant["pixel_filter"] != traced["pixel_filter"]:
+    for name, configuration in configurations.items():
+        if configuration["pixel_filter"] != traced["pixel_filter"]:
             continue
-        share = shared(spectra(folder_of(bench, contestant), every, exposure_ev), reference) / whole
+        share = shared(spectra(folder_of(bench, configuration), every, exposure_ev), reference) / whole
         print(f"{name:<18}" + "".join(f"{value:>14.3f}" for value in share))
 
 
-def exposure_of(found: dict) -> float:
-    """Stops with which a bench is judged; 0 where an older one does not say."""
-    return found.get("exposure_ev", 0.0)
+def folder_of(bench: Path, configuration: dict) -> Path:
+    """Run folder of a configuration."""
+    return bench / "configurations" / configuration["name"]
 
 
-def folder_of(bench: Path, contestant: dict) -> Path:
-    """What a contestant has made."""
-    return bench / "contestants" / contestant["name"]
-
-
-def frames_of(folder: Path) -> list[Path]:
-    """The frames of a reference or of a contestant, in order."""
-    return sorted((folder / "frames" if (folder / "frames").is_dir() else folder).glob("*.exr"))
+def frames_of(run: Path) -> list[Path]:
+    """The frames of a run, in order."""
+    return sorted((run / "frames").glob("*.exr"))
 
 
 def radiance(file: Path) -> np.ndarray:
@@ -63,7 +57,7 @@ def radiance(file: Path) -> np.ndarray:
 
 
 def encoded(color: np.ndarray, exposure_ev: float) -> np.ndarray:
-    """Colours as a display is sent them."""
+    """Colours as they are sent to a display."""
     from enfilade.kernels.tone import srgb_encode
 
     return srgb_encode(np.clip(color * np.float32(2.0**exposure_ev), 0.0, 1.0))
@@ -82,7 +76,7 @@ def spectra(folder: Path, every: int, exposure_ev: float) -> list[np.ndarray]:
 
 
 def shared(one: list[np.ndarray], other: list[np.ndarray]) -> np.ndarray:
-    """What two sequences have in common, by band of frequency."""
+    """Cross-spectrum of two sequences, by band of frequency."""
     cross = sum((a * np.conj(b)).real for a, b in zip(one, other, strict=True))
     rows, columns = (np.fft.fftfreq(size) for size in cross.shape)
     radius = np.hypot(rows[:, None], columns)

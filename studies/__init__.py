@@ -1,1 +1,1 @@
-"""Studies: how well the parts of this package do what they claim; nothing else depends on them."""
+"""Studies of enfilade on its public functions; the product does not depend on them."""

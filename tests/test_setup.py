@@ -22,7 +22,7 @@ def sh(*arguments, **environment):
 def wanted():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     extras = project["project"]["optional-dependencies"].values()
-    lists = [project["project"]["dependencies"], project["dependency-groups"]["dev"], *extras]
+    lists = [project["project"]["dependencies"], *project["dependency-groups"].values(), *extras]
     return [Requirement(line) for lines in lists for line in lines]
 
 

@@ -1,1 +1,1 @@
-"""The bench: our methods and their rivals on one tracer, each against a reference, quality over CPU time."""
+"""The bench: our methods against their rivals on one path tracer, quality over CPU time."""

@@ -1,371 +1,274 @@
-"""The bench: references, contestants, judges, in one folder that can be gone on with.
+"""A bench in one folder: references and configurations rendered, measured, and compared.
 
 ::
 
-    run.json  ledger.jsonl       what is compared; what is finished
-    references/reference-gaussian/  reference-box/   run folders, with layers
-    contestants/NAME/            a run folder each
-    spent/NAME/0000.json         what each session of a contestant has spent
+    references/box/ gaussian/    run folders, with all AOVs
+    configurations/NAME/         a run folder each
+    scores/NAME.json             measures of each
     bench.json  bench.png  crops.png
 """
 
 from __future__ import annotations
 
-import hashlib
-import shutil
+import json
+import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from enfilade.comparison.measures import JUDGES, SCALES, why_missing
-from enfilade.device import Choice
-from enfilade.errors import RunFolderError, SceneError, SettingsError
-from enfilade.methods.denoise import why_no_denoiser
-from enfilade.monitor import Monitor
-from enfilade.pipeline.job import ANALYTIC_SUFFIX, Job, path_identity
-from enfilade.renderer import PixelFilter
-from enfilade.scene.scenefile import fingerprint
-from enfilade.settings import Settings
-from enfilade.store import Run
-from studies.bench.contestants import FAMILIES, Contestant
-from studies.bench.interpolate import why_no_interpolation
-from studies.bench.judging import judge, without_silent
-from studies.bench.machine import machine, versions
-from studies.bench.race import race
-from studies.bench.verdict import verdict
-
-__all__ = ["Terms", "bench", "forecast_s"]
-
-FORMAT = 1  # of bench.json
-PATHS_PER_CPU_S = (
-    1.0e6  # a path of a furnished room on one core of 2026; for a rough forecast and nothing else
+from enfilade.camera.path import CameraPath
+from enfilade.cli.progress import watch
+from enfilade.comparison.measures import SCALES
+from enfilade.device import Choice, activate
+from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.files import read_json, write_json
+from enfilade.kernels.estimate import PASS
+from enfilade.monitor import Silence
+from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
+from enfilade.runs.render import render
+from enfilade.runs.statistics import add_costs
+from enfilade.settings import (
+    MetricSettings,
+    OutputSettings,
+    ReferenceSettings,
+    SampleFilter,
+    SamplingSettings,
+    TraceSettings,
+    ViewingSettings,
 )
+from studies.bench.configurations import FAMILIES, Configuration
+from studies.bench.measuring import available, measure
+from studies.bench.ratios import ratios
+from studies.bench.rivals import why_missing
+from studies.progress import Prefixed
+from studies.versions import machine, origin, package_versions
 
-
-@dataclass(frozen=True)
-class Terms:
-    """How the bench is held.
-
-    Attributes
-    ----------
-    reference_spp : int
-        Paths a pixel of the references. Their own noise is a floor under every error.
-    judges : tuple of str
-        Names; empty: all that can be had here.
-    redo : tuple of str
-        Names of contestants to begin anew.
-    reference_device
-        For the kernels of references, whose cost is nobody's concern. Contestants run on the CPU.
-    """
-
-    reference_spp: int
-    judges: tuple[str, ...] = ()
-    redo: tuple[str, ...] = ()
-    reference_device: Choice = "auto"
+PATHS_PER_CPU_S = 1.0e6  # of a furnished room on one core of 2026; for a rough forecast
+WARM_FRAMES = 3  # of the path, rendered and thrown away before anything is counted: kernels are compiled
+UNCHARGED = (CLIPS.name, VIDEO.name)  # rivals need no video
+RIVALS_UNCHARGED = (*UNCHARGED, ANALYSIS.name, "gbuffer")  # nor G-buffers
 
 
 def bench(
-    job: Job, contestants: Sequence[Contestant], terms: Terms, folder: Path, monitor: Monitor
+    job: Job,
+    configurations: Sequence[Configuration],
+    folder: Path,
+    *,
+    reference_spp: int,
+    measures: Sequence[str] = (),
+    reference_device: Choice = "auto",
+    quiet: bool = False,
 ) -> dict[str, Any]:
-    """Hold the bench, or go on with it.
+    """Render and measure all configurations, or go on with it.
 
-    Finished contestants and finished verdicts are not done again; an unfinished contestant goes on at its
-    first missing frame. One process works at a time, so that the times are those of a machine that does
-    nothing else.
+    Finished frames and measures are not made again. One process works at a time, so that the times are those
+    of a machine that does nothing else.
 
     Parameters
     ----------
     job
-        Scene, path and settings; its method is not looked at.
-    contestants
-    terms
+        Scene, path and settings.
+    configurations
+        They run on the CPU.
     folder
         Made if it is not there.
-    monitor
+    reference_spp
+        Of the references. Their own noise is the noise floor of every error.
+    measures
+        Names; empty: all that can be had here.
+    reference_device
+        For the kernels of references, whose cost is not measured.
+    quiet
+        Whether no progress is shown.
 
     Returns
     -------
     dict
-        What ``bench.json`` holds too; `docs/bench.md` describes it.
+        The contents of ``bench.json``; `docs/bench.md` describes it.
 
     Raises
     ------
     InputError
         The scene, the settings, or a folder that holds another bench.
     SettingsError
-        A judge that was asked for by name can't be had here; none has anything to say of these frames; no
-        contestant can render the scene.
+        A measure that was asked for can't be had here, or no configuration can be rendered.
     """
-    judges, left_out = _judges(terms.judges)
-    first = {c.family: c for c in reversed(contestants)}
-    reasons = {family: why for family in FAMILIES if family in first and (why := _why_unable(first[family]))}
-    left_out += [f"{FAMILIES[family]} does not take part: {why}" for family, why in reasons.items()]
-    able = [c for c in contestants if c.family not in reasons]
-    for text in left_out:
-        monitor.say(text)
+    job.check()
+    names, left_out = available(measures, job)
+    reasons = {family: why for family in FAMILIES if (why := why_missing(family))}
+    missing = reasons.keys() & {c.family for c in configurations}
+    left_out += [f"{FAMILIES[family]} is left out: {reasons[family]}" for family in sorted(missing)]
+    able = [c for c in configurations if c.family not in reasons]
     if not able:
-        raise SettingsError(f"nobody can take part: {'; '.join(left_out)}")
-    with Run.open(folder, _identity(job, terms)) as run:
-        for note in run.notes:
-            monitor.say(note)
-        race_of = _Race(job, terms, run, monitor)
-        for name in terms.redo:
-            race_of.forget(name)
-        references = {
-            f.name.lower(): race_of.reference(f)
-            for f in PixelFilter
-            if any(c.pixel_filter is f for c in able)
-        }
-        rows, judges, silent = without_silent([race_of.contestant(c, judges) for c in able], judges)
-        for text in silent:
-            monitor.say(text)
-        if not judges:
-            raise SettingsError(f"nobody can judge: {'; '.join(silent)}, or let others judge")
-        floor = race_of.floor(able, judges)
-        found = {
-            "format": FORMAT,
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "machine": machine(),
-            "versions": versions(),
-            "scene": f"{job.scene.resolve().parent.name}/{job.scene.name}",
-            "size": [job.path.width, job.path.height],
-            "fps": job.path.fps,
-            "frames": list(job.path.numbers),
-            "pixels_per_degree": job.viewing.pixels_per_degree,
-            "exposure_ev": job.settings.viewing.exposure_ev,
-            "reference": {"spp": terms.reference_spp, "filters": references, "floor": floor},
-            "judges": {
-                j: {
-                    "title": SCALES[j].title,
-                    "unit": SCALES[j].unit,
-                    "is_more_better": SCALES[j].is_more_better,
-                }
-                for j in judges
-            },
-            "left_out": left_out + silent,
-            "contestants": rows,
-            "verdict": verdict(rows, judges),
-        }
-        run.write_json("bench.json", found)
+        raise SettingsError(f"no configuration can be rendered: {'; '.join(left_out)}")
+    of = _Bench(job, folder, names, quiet=quiet)
+    filters = dict.fromkeys(c.pixel_filter for c in able)
+    references = {kind.value: of.reference(kind, reference_spp, reference_device) for kind in filters}
+    rows = [of.row(configuration) for configuration in able]
+    found = {
+        **origin(),
+        "machine": machine(),
+        "versions": package_versions(),
+        "scene": f"{job.scene.file.resolve().parent.name}/{job.scene.file.name}",
+        "size": [job.path.width, job.path.height],
+        "fps": job.path.fps,
+        "frames": list(job.path.numbers),
+        "pixels_per_degree": job.viewing.pixels_per_degree,
+        "exposure_ev": job.settings[ViewingSettings].exposure_ev,
+        "reference": {
+            "spp": reference_spp,
+            "filters": references,
+            "noise_floor": of.noise_floor(able, reference_spp),
+        },
+        "measures": {
+            name: {key: getattr(SCALES[name], key) for key in ("title", "unit", "is_more_better")}
+            for name in names
+        },
+        "left_out": left_out,
+        "configurations": rows,
+        "ratios": ratios(rows, names),
+    }
+    write_json(folder / "bench.json", found)
     return found
 
 
-def forecast_s(job: Job, contestants: Sequence[Contestant], terms: Terms, cores: int) -> float:
-    """Roughly how long a bench takes that begins anew on CPUs, wall seconds: by its paths alone."""
+def forecast_s(job: Job, configurations: Sequence[Configuration], reference_spp: int, cores: int) -> float:
+    """Rough duration of a bench from its beginning on CPUs, wall seconds: by its paths alone."""
     pixels = job.path.width * job.path.height * len(job.path)
-    filters = len({c.pixel_filter for c in contestants})
-    spp = terms.reference_spp * filters + sum(
-        c.job.settings.trace.spp for c in contestants if c.family in ("traced", "denoised")
-    )
-    return pixels * spp / PATHS_PER_CPU_S / max(cores, 1)
+    filters = len({c.pixel_filter for c in configurations})
+    own = (c.spp for c in configurations if c.family in ("traced", "denoised"))
+    return pixels * (reference_spp * filters + sum(own)) / PATHS_PER_CPU_S / cores
 
 
-class _Race:
-    """References and contestants, each rendered and judged once."""
+class _Bench:
+    """References and configurations, each rendered and measured once."""
 
-    def __init__(self, job: Job, terms: Terms, run: Run, monitor: Monitor) -> None:
-        self._job, self._terms, self._run, self._monitor = job, terms, run, monitor
+    def __init__(self, job: Job, folder: Path, names: Sequence[str], *, quiet: bool) -> None:
+        self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
 
-    def reference(self, pixel_filter: PixelFilter) -> dict[str, Any]:
-        """Render a reference: its cost, and Mitsuba's name of what it ran on.
+    def reference(self, pixel_filter: SampleFilter, spp: int, device: Choice) -> dict[str, Any]:
+        """Render a reference, with random numbers of its own: its cost and the renderer's variant."""
+        seed = (self._job.settings[TraceSettings].seed + 1) % 2**32
+        settings = (
+            self._job.settings.replace(TraceSettings, seed=seed)
+            .replace(SamplingSettings, spp=spp)
+            .replace(ReferenceSettings, pixel_filter=pixel_filter)
+            .replace(OutputSettings, layers="all")
+        )
+        folder, job = self._reference(pixel_filter), replace(self._job, method="reference", settings=settings)
+        _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
+        run = RunFolder.read(folder)
+        return {**_cost(run, UNCHARGED), "variant": run.identity["renderer"]["variant"]}
 
-        Its random numbers are not those of any contestant.
-        """
-        from studies.bench.tasks import EveryFrame
-
-        trace = self._job.settings.trace
-        seed = (trace.seed + 1) % 2**32
-        settings = replace(self._job.settings, trace=replace(trace, spp=self._terms.reference_spp, seed=seed))
-        job = replace(self._job, method="reference", settings=settings)
-        task = EveryFrame(job, pixel_filter, has_layers=True)
-        folder = self._reference_folder(pixel_filter)
-        cost = self._rendered(folder.name, task, folder, {}, self._terms.reference_device)
-        return cost | {"variant": Run.existing(folder).identity["versions"]["variant"]}
-
-    def _reference_folder(self, pixel_filter: PixelFilter) -> Path:
-        return self._run.folder / "references" / f"reference-{pixel_filter.name.lower()}"
-
-    def contestant(self, one: Contestant, judges: Sequence[str]) -> dict[str, Any]:
-        """Render and judge a contestant: its row of the result."""
-        folder = self._run.folder / "contestants" / one.name
-        unit = f"contestant {one.name}"
-        line = self._finished(unit, folder) or {}
-        if changed := _changed(line.get("setting", {}), one.setting()):
-            raise RunFolderError(
-                f"{folder} was made with other settings ({', '.join(changed)}): begin it anew with "
-                f"--redo {one.name}, or give the preset another name"
-            )
-        cost = self._rendered(unit, one.task(), folder, one.setting(), "cpu")
-        verdicts = self._judged(one, folder, judges)
+    def row(self, one: Configuration) -> dict[str, Any]:
+        """Render and measure a configuration: its row of the result."""
+        folder = self._run(one)
+        _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
         return {
             "name": one.name,
             "family": one.family,
-            "spp": one.job.settings.trace.spp,
+            "spp": one.spp,
             "variant": one.variant,
-            "pixel_filter": one.pixel_filter.name.lower(),
-            "cost": cost,
-            "scores": {name: verdicts[name]["score"] for name in judges},
-            "per_frame": {name: verdicts[name]["per_frame"] for name in judges},
+            "pixel_filter": one.pixel_filter.value,
+            "cost": _cost(RunFolder.read(folder), RIVALS_UNCHARGED if one.is_rival else UNCHARGED),
+            "scores": self._scores(one.name, folder, self._reference(one.pixel_filter)),
         }
 
-    def floor(self, contestants: Sequence[Contestant], judges: Sequence[str]) -> dict[str, float | None]:
-        """What the judges would say of a perfect contestant: all of it the noise of the reference.
+    def noise_floor(
+        self, configurations: Sequence[Configuration], reference_spp: int
+    ) -> dict[str, float | None]:
+        """Scores of a perfect configuration: all of its error is the noise of the reference.
 
-        A path traced contestant of N paths and the reference of R differ by noise whose variance is
-        1/N + 1/R of a path's; a perfect contestant differs from the reference by 1/R of it.
+        A path-traced configuration of N paths and the reference of R differ by noise whose variance is 1/N +
+        1/R of a path's; a perfect configuration differs from the reference by 1/R of it.
         """
-        traced = [c for c in contestants if c.family == "traced"]
+        traced = [c for c in configurations if c.family == "traced"]
         if not traced:
             return {}
-        one = max(traced, key=lambda c: c.job.settings.trace.spp)
-        ratio = self._terms.reference_spp / one.job.settings.trace.spp
-        unit = f"floor by {one.name}"
-        made = _ledger_digest(self._run.folder / "contestants" / one.name)
-        line = self._run.done(unit)
-        found = dict(line["scores"]) if line is not None and line["made"] == made else {}
-        missing = [name for name in judges if name not in found]
-        if missing:
-            self._monitor.stage("noise of the reference: judges", len(self._job.path))
-            test = self._run.folder / "contestants" / one.name
-            reference = self._reference_folder(one.pixel_filter)
-            share = (1.0 + ratio) ** -0.5
-            said = judge(test, reference, self._job, missing, self._monitor, share=share)
-            found |= {name: of["score"] for name, of in said.items()}
-            self._run.finish(unit, files=[], facts={"scores": found, "made": made})
-        return {name: found[name] for name in judges}
+        one = max(traced, key=lambda c: c.spp)
+        share = (1.0 + reference_spp / one.spp) ** -0.5
+        return self._scores("noise floor", self._run(one), self._reference(one.pixel_filter), share)
 
-    def forget(self, name: str) -> None:
-        """Begin a contestant anew: its frames, its costs and what was said of it go."""
-        folder = self._run.folder / "contestants" / name
-        if folder.exists() and not (folder / "run.json").is_file():
-            raise RunFolderError(f"{folder} is no run folder; it is not removed")
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.rmtree(self._run.folder / "spent" / name, ignore_errors=True)
+    def _scores(self, name: str, test: Path, reference: Path, share: float = 1.0) -> dict[str, float | None]:
+        """Scores of a run folder by measure, from their file as far as it holds them."""
+        settings = self._job.settings
+        of = {
+            "runs": [RunFolder.read(folder).digest() for folder in (test, reference)],
+            "share": share,
+            **settings.to_tables([ViewingSettings]),
+            "metering": settings[MetricSettings].metering.value,
+        }
+        file = self._folder / "scores" / f"{name}.json"
+        found: dict[str, Any] = read_json(file) if file.is_file() else {}
+        if found.get("of") != of:
+            found = {"of": of, "measures": {}}
+        if missing := [measure for measure in self._names if measure not in found["measures"]]:
+            with watch(quiet=self._quiet) as monitor:
+                shown = Prefixed(monitor, name)
+                found["measures"] |= measure(test, reference, self._job, missing, shown, share=share)
+            write_json(file, found)
+        return {measure: found["measures"][measure]["score"] for measure in self._names}
 
-    def _rendered(
-        self, unit: str, task: Any, folder: Path, setting: dict[str, Any], device: Choice
-    ) -> dict[str, Any]:
-        if line := self._finished(unit, folder):
-            cost: dict[str, Any] = line["cost"]
-            return cost
-        notes = self._run.folder / "spent" / folder.name
+    def _run(self, one: Configuration) -> Path:
+        return self._folder / "configurations" / one.name
+
+    def _reference(self, pixel_filter: SampleFilter) -> Path:
+        return self._folder / "references" / pixel_filter.value
+
+
+def _cost(run: RunFolder, uncharged: Sequence[str]) -> dict[str, Any]:
+    """CPU and wall seconds of a run, by stage and in total, over all sessions."""
+    stages = add_costs(line["cost"] for line in run.lines() if line["pass"] not in uncharged)
+    charged = {name: spent for name, spent in stages.items() if name not in uncharged}
+    total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
+    return {**total, "stages": charged}
+
+
+def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quiet: bool) -> None:
+    """Render in a new process, unless the run is finished."""
+    if _is_finished(job, folder):
+        return
+    context = get_context("spawn")
+    # The device is chosen before the job is unpickled: Dr.Jit's array types bind to it at import.
+    with ProcessPoolExecutor(1, mp_context=context, initializer=activate, initargs=(device,)) as pool:
         try:
-            spent = race(task, folder, notes, _Named(self._monitor, folder.name), device=device)
-        except RunFolderError as error:
-            remedy = f"\nOr begin it anew: --redo {folder.name}" if setting else ""
-            raise RunFolderError(f"{error}{remedy}") from error
-        made = _ledger_digest(folder)
-        self._run.finish(unit, files=[], facts={"cost": spent.to_dict(), "setting": setting, "made": made})
-        return spent.to_dict()
-
-    def _finished(self, unit: str, folder: Path) -> dict[str, Any] | None:
-        """The line of a contestant whose frames stand there still; it may have been begun anew since."""
-        line, made = self._run.done(unit), _ledger_digest(folder)
-        return line if line is not None and made and line.get("made") == made else None
-
-    def _judged(self, one: Contestant, folder: Path, judges: Sequence[str]) -> dict[str, Any]:
-        made = _ledger_digest(folder)
-        lines = {name: self._run.done(f"verdict {one.name} {name}") for name in judges}
-        found = {n: line["verdict"] for n, line in lines.items() if line is not None and line["made"] == made}
-        missing = [name for name in judges if name not in found]
-        if missing:
-            self._monitor.stage(f"{one.name}: judges", len(self._job.path))
-            reference = self._reference_folder(one.pixel_filter)
-            for name, said in judge(folder, reference, self._job, missing, self._monitor).items():
-                self._run.finish(
-                    f"verdict {one.name} {name}", files=[], facts={"verdict": said, "made": made}
-                )
-                found[name] = said
-        return found
+            pool.submit(_render, job, folder, is_warm=is_warm, quiet=quiet).result()
+        except BrokenProcessPool as error:
+            raise EnfiladeError(
+                f"the process that rendered {folder} was killed, perhaps for lack of memory; the same "
+                "command continues"
+            ) from error
 
 
-class _Named:
-    """A monitor that puts the contestant's name before its stages."""
-
-    def __init__(self, monitor: Monitor, name: str) -> None:
-        self._monitor, self._name = monitor, name
-
-    def stage(self, name: str, total: int) -> None:
-        """Pass it on."""
-        self._monitor.stage(f"{self._name}: {name}", total)
-
-    def advance(self, count: int = 1) -> None:
-        """Pass it on."""
-        self._monitor.advance(count)
-
-    def extend(self, count: int) -> None:
-        """Pass it on."""
-        self._monitor.extend(count)
-
-    def say(self, text: str) -> None:
-        """Pass it on."""
-        self._monitor.say(f"{self._name}: {text}")
+def _is_finished(job: Job, folder: Path) -> bool:
+    """Whether a run folder holds the finished run of a job, on whatever device."""
+    if not (folder / "summary.json").is_file():
+        return False
+    wanted, there = json.loads(json.dumps(job.identity())), RunFolder.read(folder).identity
+    return bool({**wanted, "renderer": None} == {**there, "renderer": None})
 
 
-def _judges(asked: tuple[str, ...]) -> tuple[list[str], list[str]]:
-    """Who judges, and what is said of those who can't."""
-    for name in asked:
-        if name not in JUDGES:
-            raise SettingsError(f"there is no judge {name!r}; known are: {', '.join(JUDGES)}")
-        if why := why_missing(name):
-            raise SettingsError(why)
-    missing = {name: why_missing(name) for name in JUDGES}
-    judges = list(dict.fromkeys(asked)) or [name for name in JUDGES if not missing[name]]
-    return judges, [] if asked else [why for why in missing.values() if why]
+def _render(job: Job, folder: Path, *, is_warm: bool, quiet: bool) -> None:
+    """Compile the kernels, then render; the function of the new process."""
+    if is_warm:
+        with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
+            render(_excerpt(job), Path(place) / "run", Silence())
+    with watch(quiet=quiet) as monitor:
+        render(job, folder, Prefixed(monitor, folder.name))
 
 
-def _why_unable(one: Contestant) -> str:
-    match one.family:
-        case "denoised":
-            return why_no_denoiser()
-        case "interpolated":
-            return why_no_interpolation()
-        case "decoupled":
-            try:
-                one.job.check_scene(is_tried=True)
-            except SettingsError as error:
-                return str(error)
-    return ""
-
-
-def _identity(job: Job, terms: Terms) -> dict[str, Any]:
-    settings: Settings = job.settings
-    trace = settings.trace
-    viewing = settings.to_tables()["viewing"]
-    return {
-        "method": "bench",
-        "scene": _scene_digest(job.scene),
-        "path": path_identity(job.path),
-        "reference_spp": terms.reference_spp,
-        "seed": trace.seed,
-        "max_depth": trace.max_depth,
-        "viewing": viewing,
-        "metering": settings.metric.metering.value,
-    }
-
-
-def _scene_digest(scene: Path) -> str:
-    if not scene.is_file():
-        raise SceneError(f"there is no scene file {scene}")
-    if scene.name.endswith(ANALYTIC_SUFFIX):
-        return hashlib.sha256(scene.read_bytes()).hexdigest()
-    return fingerprint(scene)
-
-
-def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
-    """Settings that differ; those that one side does not know are new to the program."""
-    found = []
-    for key in before.keys() & now.keys():
-        if isinstance(before[key], dict) and isinstance(now[key], dict):
-            found += [f"{key}.{name}" for name in _changed(before[key], now[key])]
-        elif before[key] != now[key]:
-            found.append(key)
-    return sorted(found)
-
-
-def _ledger_digest(folder: Path) -> str:
-    """What a run folder's frames are: they change with their ledger."""
-    file = folder / "ledger.jsonl"
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+def _excerpt(job: Job) -> Job:
+    """A few frames of a job, spread over the path, as one shot."""
+    path = job.path
+    count = min(WARM_FRAMES, len(path))
+    frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
+    spp = min(job.settings[SamplingSettings].spp, PASS)  # more make no other kernel
+    cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
+    settings = job.settings.replace(SamplingSettings, spp=spp)
+    return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)

@@ -1,4 +1,4 @@
-"""Noise-free guides of a denoiser: albedo and normal of each pixel, seen in mirrors and through glass."""
+"""Guides of a denoiser without noise: albedo and normal of each pixel, followed through mirrors and glass."""
 
 from __future__ import annotations
 
@@ -17,30 +17,31 @@ from enfilade.records import F32, SPECULAR, SurfaceClass
 from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
 SIDE = 4  # strata along each side of a pixel: 16 rays
-BOUNCES = 6  # off mirrors and through glass, before the chain counts as it is
+BOUNCES = 6  # off mirrors and through glass, before a path ends
 SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
 
 def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: int) -> tuple[F32, F32]:
-    """Find what guides a denoiser, filtered by a box as its colours are.
+    """Find the guides of an image, with a box filter.
 
     Parameters
     ----------
     renderer
-        One that can be asked for lobes (:class:`LobeRenderer`) is followed through mirrors and glass, as
-        Open Image Denoise recommends; of another, the first surface counts.
-    camera, seed, frame
-        Of the image; what the random numbers depend on.
+        A :class:`LobeRenderer` is followed through mirrors and glass, as Open Image Denoise recommends; of
+        another renderer, the first surface counts.
+    camera
+    seed, frame
+        Of the random numbers.
     chunk
-        Rays in flight at once; changes no result.
+        Rays in flight; it changes no result.
 
     Returns
     -------
     albedo : (H, W, 3) float32
-        Diffuse reflectance plus, where a surface shines, that of its lobe; times what mirrors and glass
-        before it leave. 0..1; 0 where nothing is seen.
+        Diffuse reflectance plus, on glossy surfaces, that of the lobe, times the throughput of mirrors and
+        glass in front. 0..1; 0 where nothing is hit.
     normal : (H, W, 3) float32
-        Of the surface where the chain ends, in the world, not of unit length where several meet.
+        Of the surface where the path ends, in the world, not of unit length where several meet.
     """
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     step = max(chunk // SIDE**2, 1)
@@ -54,7 +55,7 @@ def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: 
 def _of_pixels(
     renderer: Renderer, camera: Camera, pixels: npt.NDArray[np.uint32], random: RandomKey
 ) -> npt.NDArray[np.float32]:
-    # One ray in each of the strata of each pixel, neighbouring lanes.
+    # Send one ray in each of the strata of each pixel, neighbouring lanes.
     count = SIDE * SIDE
     lane = dr.arange(UInt, len(pixels) * count)
     slot = lane // count
@@ -65,25 +66,22 @@ def _of_pixels(
     inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
     at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE
     direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    rays = Rays(origin=vector3(camera.eye), direction=direction)
+    albedo, normal = _followed(renderer, Rays(vector3(camera.eye), direction), rng)
 
-    albedo, normal = _followed(renderer, rays, rng)
+    # Average them.
     dr.eval(albedo, normal)
     sums = [np.array(dr.block_sum(v, count)) for v in (*albedo, *normal)]
     return np.asarray(np.stack(sums) / count, np.float32)
 
 
-def _first(seen: Surfaces) -> tuple[Any, Any]:
-    return Array3f(dr.select(seen.is_hit, seen.albedo, 0)), Array3f(dr.select(seen.is_hit, seen.normal, 0))
-
-
 def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
-    # What the pixel itself shows.
-    seen = renderer.surfaces(rays)
-    albedo, normal = _first(seen)
-    shines = _is_one_of(seen, SPECULAR)
-    dr.eval(albedo, normal, shines, rng)
-    lane: Any = dr.compress(shines)
+    """Albedo and normal at the end of each path."""
+    # Find the first surface.
+    hit = renderer.surfaces(rays)
+    albedo, normal = _guides_of(hit)
+    is_specular = _is_one_of(hit, SPECULAR)
+    dr.eval(albedo, normal, is_specular, rng)
+    lane: Any = dr.compress(is_specular)
     if not isinstance(renderer, LobeRenderer) or len(lane) == 0:
         return albedo, normal
     rays, rng = dr.gather(Rays, rays, lane), dr.gather(PCG32, rng, lane)
@@ -93,7 +91,7 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
         sample = renderer.sample_specular(point, rng)
         throughput = dr.select(sample.is_alive, throughput * sample.throughput, 0)
 
-        # A lobe that is not sharp adds its reflectance and ends the chain.
+        # Add the reflectance of lobes that are not sharp, which end their paths.
         is_sharp = sample.is_alive & _is_one_of(point.surfaces, SHARP) & (bounce < BOUNCES - 1)
         _add(albedo, lane, dr.select(is_sharp, 0, throughput))
         dr.eval(sample.rays, throughput, is_sharp, rng)
@@ -103,15 +101,19 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
         lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
         rays, throughput = dr.gather(Rays, sample.rays, going), dr.gather(Array3f, throughput, going)
 
-        # A sharp one shows what is behind.
-        seen = _surfaces(renderer, rays, len(lane))
-        behind, turned = _first(seen)
-        shines = _is_one_of(seen, SPECULAR)
+        # Find the surface behind sharp ones, in a number of lanes that suits recorded kernels.
+        every = dr.arange(UInt, len(lane))
+        more, _ = padded(every)
+        hit = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, more)), every)
+        behind, turned = _guides_of(hit)
+        is_specular = _is_one_of(hit, SPECULAR)
         _add(albedo, lane, throughput * behind)
         for target, value in zip(normal, turned, strict=True):
             dr.scatter(target, value, lane)
-        dr.eval(normal, shines, rays, throughput, rng)
-        going = dr.compress(shines)
+
+        # Continue paths at specular surfaces.
+        dr.eval(normal, is_specular, rays, throughput, rng)
+        going = dr.compress(is_specular)
         if len(going) == 0:
             break
         lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
@@ -119,19 +121,15 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
     return albedo, normal
 
 
-def _surfaces(renderer: Renderer, rays: Rays, count: int) -> Surfaces:
-    """What so many rays meet, asked in a number of lanes that suits recorded kernels."""
-    every = dr.arange(UInt, count)
-    more, _ = padded(every)
-    found: Surfaces = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, more)), every)
-    return found
+def _guides_of(hit: Surfaces) -> tuple[Any, Any]:
+    return Array3f(dr.select(hit.is_hit, hit.albedo, 0)), Array3f(dr.select(hit.is_hit, hit.normal, 0))
 
 
-def _is_one_of(seen: Surfaces, classes: tuple[SurfaceClass, ...]) -> Any:
+def _is_one_of(hit: Surfaces, classes: tuple[SurfaceClass, ...]) -> Any:
     found = Bool(False)
     for one in classes:
-        found |= seen.surface == int(one)
-    return found & seen.is_hit
+        found |= hit.surface == int(one)
+    return found & hit.is_hit
 
 
 def _add(total: Any, lane: Any, value: Any) -> None:

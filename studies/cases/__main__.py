@@ -2,49 +2,45 @@
 
     python -m studies.cases [--preset full|small] [--scenes room atrium] [--items placement ...]
 
-Renders and measures what is not measured yet (interrupted, the same command goes on), and writes the figures
-and tables into studies/cases/README.md, with the preset `small` into a copy of it beside the results.
+Renders and measures everything that is not measured yet, and writes figures and tables into
+studies/cases/README.md, with the preset `small` into a copy of it beside the results. Interrupted, the same
+command continues.
 """
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
 from enfilade.cli.progress import watch
 from enfilade.device import activate
 from enfilade.errors import EnfiladeError, InputError
+from studies.scenes import SCENES
 
-HERE = Path(__file__).resolve().parent
-DOCUMENT = HERE / "README.md"
+DOCUMENT = Path(__file__).resolve().parent / "README.md"
 
 
 def main() -> int:
     """Measure, draw, write."""
     activate("cpu")
     from studies.cases.document import check_blocks, write_document
-    from studies.cases.runner import ITEMS, SCENES, forecast_s, measure
+    from studies.cases.runner import ITEMS, measure
     from studies.cases.terms import TERMS
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--preset", default="full", choices=list(TERMS))
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
     parser.add_argument("--items", nargs="+", default=list(ITEMS), choices=list(ITEMS))
-    parser.add_argument("--out", type=Path, help="where results are kept; runs/case-studies/PRESET")
-    parser.add_argument("--document", type=Path, help="where to write the document")
+    parser.add_argument("--out", type=Path, help="folder of the results; runs/case-studies/PRESET")
+    parser.add_argument("--document", type=Path, help="the document to write")
     arguments = parser.parse_args()
     folder = arguments.out or Path("runs/case-studies") / arguments.preset
     target = arguments.document or (DOCUMENT if arguments.preset == "full" else folder / DOCUMENT.name)
-
-    cores = len(os.sched_getaffinity(0))
-    minutes = forecast_s(arguments.scenes, arguments.items, TERMS[arguments.preset], cores) / 60.0
-    print(f"{' and '.join(arguments.scenes)}: about {minutes:.0f} minutes on {cores} cores when begun anew;")
-    print("interrupted, the same command goes on.", flush=True)
+    terms = TERMS[arguments.preset]
     try:
         check_blocks(DOCUMENT)
         with watch(quiet=False) as monitor:
-            found = measure(arguments.scenes, arguments.items, TERMS[arguments.preset], folder, monitor)
-        files = write_document(found, TERMS[arguments.preset], folder, DOCUMENT, target)
+            results = measure(arguments.scenes, arguments.items, terms, folder, monitor)
+        files = write_document(results, terms, folder, DOCUMENT, target)
     except EnfiladeError as error:
         print(error, file=sys.stderr)
         return 2 if isinstance(error, InputError) else 1

@@ -1,65 +1,57 @@
-"""``enfilade calibrate``: settings that depend on the scene, found by the metric."""
+"""``python -m studies calibrate``: settings that depend on the scene, found by the metric."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from enfilade.cli.flags import SettingsCommand, settings_options
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.inputs import job_of, output_options, path_options
-from enfilade.cli.outcome import check_png
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from studies.cases.threshold import Calibration
-
-SECTIONS = ("trace", "viewing", "keyframes", "warp", "metric.mask_slope", "antialias", "limits")
+from enfilade.cli.options import check_png, job_of, output_options, path_options, settings_options
 
 
 @click.group("calibrate", short_help="Settings that depend on the scene, found by the metric.")
 @debug_option
 def command() -> None:
-    """Find settings for a scene by asking the metric."""
+    """Find settings for a scene by the metric."""
 
 
-@command.command("threshold", cls=SettingsCommand, short_help="Velocity below which pixels must be traced.")
+@command.command("threshold", short_help="Velocity below which pixels must be traced.")
 @path_options
 @click.option(
     "--probes",
     type=click.IntRange(min=1),
     default=4,
     show_default=True,
-    help="Frames to judge, at even quantiles of the path's velocities.",
+    help="Number of frames to compare, at even quantiles of the path's velocities.",
 )
 @click.option(
     "--visible-percent",
     type=click.FloatRange(0.0, 100.0),
-    default=None,
-    help="Share of the reused pixels that may differ visibly, percent.  [default: 1]",
+    default=1.0,
+    show_default=True,
+    help="Share of the reused pixels that may differ visibly, percent.",
 )
 @click.option(
     "--light",
     type=click.Choice(("traced", "plain")),
     default="traced",
     show_default=True,
-    help="The scene's own light, path traced, or a lamp without shadows and so without noise.",
+    help="The scene's own light, path traced, or a light without shadows and thus without noise.",
 )
 @click.option(
     "--out",
     "folder",
     type=click.Path(path_type=Path),
-    help="Keep the traced frames in this folder; the same command goes on with them.",
+    help="Keep the traced frames in this folder, with which the same command continues.",
 )
 @click.option(
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw the curve into this PNG file."
 )
+@settings_options("--spp", "--seed", "--max-depth", "--exposure-ev", "--allow")
 @output_options
-@settings_options(*SECTIONS)
 @debug_option
 @click.pass_context
 def threshold(
@@ -67,7 +59,7 @@ def threshold(
     /,
     *,
     probes: int,
-    visible_percent: float | None,
+    visible_percent: float,
     light: str,
     folder: Path | None,
     plot: Path | None,
@@ -75,59 +67,52 @@ def threshold(
     quiet: bool,
     **inputs: Any,
 ) -> None:
-    """Find the velocity v_t below which reused pixels of SCENE would be seen, as in §5.2 and Fig. 9.
+    """Find the velocity v_t below which reused pixels of SCENE would be visible, as in §5.2 and Fig. 9.
 
-    A few frames are rendered with every pixel traced, and from keyframes; the metric says up to which
-    velocity the one must replace the other. The result is for --masks-slow-deg-s.
+    A few frames are rendered with every pixel traced, and from keyframes. The metric gives the velocity up to
+    which the former must replace the latter. The result is for --set masks.slow_deg_s.
     """
     check_png("--plot", plot)
     if folder is not None:
         mark_resumable(ctx)
     job = job_of(ctx, method="paper", **inputs)
     from enfilade.cli.progress import watch
-    from studies.cases.threshold import Calibration, calibrate_job
+    from studies.cases.threshold import calibrate_job
 
-    terms = Calibration() if visible_percent is None else Calibration(visible_percent=visible_percent)
-    job.check_scene(is_tried=True)
     with watch(quiet=quiet) as monitor:
         found = calibrate_job(
-            job, terms, probes=probes, is_plain=light == "plain", folder=folder, monitor=monitor
+            job,
+            probes=probes,
+            tolerated_percent=visible_percent,
+            is_plain=light == "plain",
+            folder=folder,
+            monitor=monitor,
         )
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:
-        _show(found, terms)
+        _show(found)
     if plot is not None:
         from studies.cases.charts import draw_threshold
 
-        draw_threshold({job.scene.resolve().parent.name: found}, plot)
-        if not as_json:
-            click.echo(f"plot    {plot}")
+        draw_threshold({job.scene.file.resolve().parent.name: found}, plot)
 
 
-def _show(found: dict[str, Any], terms: Calibration) -> None:
-    from rich.console import Console
-
-    Console().print(_table(found))
-    chosen = found["threshold_deg_s"]
-    share = f"{terms.visible_percent:g} % of the reused pixels"
-    if chosen is None:
-        last = found["curve"][-1]["threshold_deg_s"]
-        click.echo(f"No threshold up to {last:g} deg/s leaves less than {share} visibly different.")
-    else:
-        click.echo(f"v_t     {chosen:g} deg/s: from there on, no more than {share} differ visibly")
-        click.echo(f"        (enfilade render ... --masks-slow-deg-s {chosen:g})")
-
-
-def _table(found: dict[str, Any]) -> Table:
+def _show(found: dict[str, Any]) -> None:
     from rich import box
+    from rich.console import Console
     from rich.table import Table
 
     table = Table(title="Velocity threshold (§5.2, Fig. 9)", title_justify="left", box=box.SIMPLE_HEAD)
     for heading in ("v_t, deg/s", "traced, %", "reused and visible, %", "removed below, deg/s"):
         table.add_column(heading, justify="right")
     for row in found["curve"]:
-        values = (row["reused_visible_percent"], row["removed_below_deg_s"])
-        cells = ("" if value is None else f"{value:.2f}" for value in values)
-        table.add_row(f"{row['threshold_deg_s']:g}", f"{row['traced_percent']:.1f}", *cells)
-    return table
+        table.add_row(*("" if value is None else f"{value:.3g}" for value in row.values()))
+    Console().print(table)
+    chosen, share = found["threshold_deg_s"], f"{found['tolerated_percent']:g} % of the reused pixels"
+    if chosen is None:
+        last = found["curve"][-1]["threshold_deg_s"]
+        click.echo(f"No threshold up to {last:g} deg/s leaves less than {share} visibly different.")
+    else:
+        click.echo(f"v_t     {chosen:g} deg/s: from there on, no more than {share} differ visibly")
+        click.echo(f"        (enfilade render ... --set masks.slow_deg_s={chosen:g})")

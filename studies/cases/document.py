@@ -1,6 +1,7 @@
-"""The document of the case studies: tables and figures put into blocks of a text that is written by hand.
+"""The document of the case studies: tables and figures, put into blocks of a text that is written by hand.
 
-A block stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``; what is between is replaced, the rest stays.
+A block stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``. Its content is replaced, everything else
+stays.
 """
 
 from __future__ import annotations
@@ -12,57 +13,46 @@ from pathlib import Path
 from enfilade.errors import InputError
 from enfilade.files import whole_file
 from studies.cases.blocks import BLOCKS, FIGURES
-from studies.cases.case import Measured
+from studies.cases.case import Result
+from studies.cases.runner import Results
 from studies.cases.terms import Terms
 
-__all__ = ["check_blocks", "replaced", "write_document"]
 
-Results = Mapping[str, Mapping[str, Measured]]  # by scene and item
-
-
-def write_document(found: Results, terms: Terms, folder: Path, template: Path, target: Path) -> list[Path]:
+def write_document(results: Results, terms: Terms, folder: Path, template: Path, target: Path) -> list[Path]:
     """Draw the figures and fill the blocks of which there are results.
 
     Parameters
     ----------
-    found
-        By scene and item, as ``runner.measure`` returns it.
+    results
     terms
-        On which they were measured; said in each block.
+        Stated in each block.
     folder
         Of the results, with the images of the examples.
     template
         The document whose text is taken.
     target
-        The document that is written; the figures come to lie beside it. May be the template.
+        The document that is written, with the figures beside it. May be the template.
 
     Returns
     -------
     list of Path
         The document and the figures.
-
-    Raises
-    ------
-    InputError
-        The template lacks a block.
     """
     text = template.read_text(encoding="utf-8")
-    place = target.parent / FIGURES
     files: list[Path] = []
     for name, write in BLOCKS.items():
-        measured = {scene: items[name] for scene, items in found.items() if name in items}
-        if measured:
-            results = {scene: one.result for scene, one in measured.items()}
-            body, drawn = write(results, terms, folder, place)
+        if by_scene := results.get(name):
+            values = {scene: result.value for scene, result in by_scene.items()}
+            body, drawn = write(values, terms, folder, target.parent / FIGURES)
             files += drawn
-            text = replaced(text, name, f"{body}\n\n{_when(measured)}")
+            text = replaced(text, name, f"{body}\n\n{_origins(by_scene)}")
     with whole_file(target) as beside:
         beside.write_text(text, encoding="utf-8")
     return [target, *files]
 
 
 def check_blocks(template: Path) -> None:
-    """See that a document has all blocks, before hours are spent on what goes into them.
+    """Check that a document has all blocks, before hours are spent on their content.
 
     Raises
     ------
@@ -74,22 +64,17 @@ def check_blocks(template: Path) -> None:
         replaced(text, name, "")
 
 
-def _when(measured: Mapping[str, Measured]) -> str:
-    said = (
-        f"{scene.upper()} {one.date}{'' if one.is_current else ', by older code'}"
-        for scene, one in measured.items()
-    )
-    return f"*Measured: {'; '.join(said)}.*"
+def _origins(by_scene: Mapping[str, Result]) -> str:
+    origins = []
+    for scene, result in by_scene.items():
+        version = f"enfilade {result.made['enfilade']}"
+        commit = f", {result.made['commit']}" if result.made["commit"] else ""
+        origins.append(f"{scene.upper()} {result.made['date']} ({version}{commit})")
+    return f"*Measured: {'; '.join(origins)}.*"
 
 
 def replaced(text: str, name: str, body: str) -> str:
-    """The text with another body in one of its blocks.
-
-    Raises
-    ------
-    InputError
-        It has no such block.
-    """
+    """The text with another body in one of its blocks."""
     block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
     if not block.search(text):
         raise InputError(f"the document has no block <!-- {name} --> ... <!-- /{name} -->; restore it")

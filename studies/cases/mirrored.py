@@ -1,7 +1,7 @@
-"""What mirrors show, in the place where it is seen: the virtual image behind the mirror.
+"""Virtual images of plane mirrors (§5.4, the paper's future work).
 
-A plane mirror shows a point as far behind it as the point lies before it. That virtual image stands
-still in the world, like any surface, so that its depth gives the flow of the reflection.
+A plane mirror shows a point as far behind it as the point lies before it. This virtual image is static in the
+world, like any surface, so that its depth gives the motion of the reflection.
 """
 
 from __future__ import annotations
@@ -16,24 +16,22 @@ from enfilade.kernels.rays import pinhole_directions
 from enfilade.records import Geometry, Mask, SurfaceClass
 from enfilade.renderer import Rays, Renderer
 
-__all__ = ["mirror_pixels", "mirrored"]
-
-OFFSET = 1e-4  # of the distance: how far from the mirror a reflected ray begins
-VIRTUAL = np.uint32(1 << 30)  # added to the number of a shape that is seen in a mirror
+OFFSET = 1e-4  # of the distance: start of reflected rays
+VIRTUAL = np.uint32(1 << 30)  # added to the index of a shape that is seen in a mirror
 
 
 def mirror_pixels(geometry: Geometry) -> Mask:
-    """Pixels that see a mirror, (H, W)."""
+    """Pixels that show a mirror, (H, W)."""
     is_mirror: Mask = geometry.surface == SurfaceClass.MIRROR
     return is_mirror
 
 
 def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
-    """Geometry in which pixels on a mirror have what is seen in it, one reflection deep.
+    """Geometry in which the pixels of mirrors contain the reflected surface, one reflection deep.
 
-    Exact for plane mirrors. Depth is that of the virtual image along the camera's axis (0 where the mirror
-    shows nothing), shape, albedo, normal and class are those of the surface that is seen; the shape's
-    number is made another by :data:`VIRTUAL`, and its class is its own, so that it need not be specular.
+    Exact for plane mirrors. The depth is that of the virtual image along the camera's axis, 0 where the
+    mirror reflects nothing. Shape index (plus :data:`VIRTUAL`), albedo, normal and class are those of the
+    reflected surface, which need not be specular.
     """
     pixels = np.flatnonzero(mirror_pixels(geometry)).astype(np.uint32)
     if not len(pixels):
@@ -49,17 +47,19 @@ def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
     depth = lanes(geometry.depth.ravel()[pixels])
     normal = lanes(np.ascontiguousarray(geometry.normal.reshape(-1, 1, 3)[pixels]))
 
-    # Directions have unit depth and a reflection keeps their length: distances go on counting as depths.
-    turned = direction - 2.0 * dr.dot(direction, normal) * normal
+    # Trace the reflected rays. Directions have unit depth, which reflection keeps: distances are depths.
+    reflected = direction - 2.0 * dr.dot(direction, normal) * normal
     origin = vector3(camera.eye) + depth * (direction + OFFSET * normal)
-    seen = renderer.surfaces(Rays(origin=origin, direction=turned))
+    hit = renderer.surfaces(Rays(origin=origin, direction=reflected))
     found = {
-        "depth": np.array(dr.select(seen.is_hit, depth + seen.distance, 0)),
-        "normal": np.array(dr.select(seen.is_hit, seen.normal, 0)).T,
-        "albedo": np.array(dr.select(seen.is_hit, seen.albedo, 0)).T,
-        "shape_index": np.array(dr.select(seen.is_hit, seen.shape_index + UInt(int(VIRTUAL)), 0)),
-        "surface": np.array(dr.select(seen.is_hit, seen.surface, 0)).astype(np.uint8),
+        "depth": np.array(dr.select(hit.is_hit, depth + hit.distance, 0)),
+        "normal": np.array(dr.select(hit.is_hit, hit.normal, 0)).T,
+        "albedo": np.array(dr.select(hit.is_hit, hit.albedo, 0)).T,
+        "shape_index": np.array(dr.select(hit.is_hit, hit.shape_index + UInt(int(VIRTUAL)), 0)),
+        "surface": np.array(dr.select(hit.is_hit, hit.surface, 0)).astype(np.uint8),
     }
+
+    # Write them over the mirrors.
     layers = {}
     for name, values in found.items():
         layer = getattr(geometry, name).copy()

@@ -1,4 +1,4 @@
-"""Fig. 11: whether keyframe placement by image flow leaves fewer pixels to be recomputed (§4.2, §6)."""
+"""Fig. 11: disoccluded pixels by placement of the keyframes (§4.2, §6)."""
 
 from __future__ import annotations
 
@@ -7,83 +7,91 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.camera.path import Segment
+from enfilade.methods.analysis import Analysis, keyframes_of
+from enfilade.methods.paper.composite import composite
+from enfilade.methods.paper.refine import warped_pair
+from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.pipeline.job import Job
-from enfilade.pipeline.plan import hole_percent
-from enfilade.pipeline.survey import Survey, initial_segments
-from enfilade.pipeline.views import Views
-from enfilade.settings import KeyframeSettings, Placement
+from enfilade.records import Keyframe, Shading
+from enfilade.settings import KeyframeSettings, Placement, WarpSettings
 from studies.cases.case import Case
-
-__all__ = ["measure", "recomputed"]
+from studies.progress import counted
 
 ADAPTATIONS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9)  # A of Eq. 6
 PAPER_A = 0.5  # §6
-PAPER_PERCENT = {"uniform": 4.04, "adapted": 2.00}  # §6, ROOM
+PAPER_PERCENT = {0.0: 4.04, PAPER_A: 2.00}  # by A, §6, ROOM
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """Share of pixels that neither keyframe sees, frame by frame, for several placements.
+    """Share of pixels that neither keyframe shows, frame by frame, for several placements.
 
     Returns
     -------
     dict
-        ``numbers``; ``placements``: of each its ``name``, ``adaptation`` (None for equal flow), the
-        numbers of its ``keyframes``, ``frames`` that were looked at, ``percent`` of each and their ``mean``
-        over all frames of the path.
+        ``numbers``; ``placements``: of each its ``name``, ``adaptation`` (None for equal flow), the numbers
+        of its ``keyframes``, the ``frames`` that were measured, ``percent`` of each and their ``mean`` over
+        all frames of the path.
     """
-    job, views = case.whole, case.views(case.whole)
     plain = KeyframeSettings()
-    chosen = [replace(plain, placement=Placement.ADAPTED, adaptation=a) for a in ADAPTATIONS]
-    chosen.append(replace(plain, placement=Placement.EQUAL_FLOW))
+    placements = [replace(plain, placement=Placement.ADAPTED, adaptation=a) for a in ADAPTATIONS]
+    placements.append(replace(plain, placement=Placement.EQUAL_FLOW))
     rows = []
-    for keyframes in chosen:
-        is_papers = keyframes.placement is Placement.ADAPTED and keyframes.adaptation in (0.0, PAPER_A)
+    for placed in placements:
+        is_papers = placed.placement is Placement.ADAPTED and placed.adaptation in PAPER_PERCENT
         step = 1 if is_papers else case.terms.sweep_step
-        rows.append(recomputed(job, views, case.survey, keyframes, step, case.monitor))
-    return {"numbers": list(job.path.numbers), "spacing": plain.spacing, "placements": rows}
+        rows.append(disocclusions(case.walk, case.analysis, placed, step, case.monitor))
+    return {"numbers": list(case.walk.path.numbers), "spacing": plain.spacing, "placements": rows}
 
 
-def recomputed(
-    job: Job, views: Views, survey: Survey, placed: KeyframeSettings, step: int, monitor: Monitor
+def disocclusions(
+    walk: Walkthrough, analysis: Analysis, placed: KeyframeSettings, step: int, monitor: Monitor
 ) -> dict[str, Any]:
-    """Holes of one placement.
+    """Disoccluded pixels of one placement.
 
-    Parameters
-    ----------
-    job, views, survey
-    placed
-        How the keyframes are placed.
-    step
-        Every so many-th in-between of a segment is looked at; its holes stand for those beside it.
-    monitor
+    Every so many-th in-between of a segment is measured, by `step`, and stands for those around it.
     """
-    job = replace(job, settings=replace(job.settings, keyframes=placed))
-    segments = [s for shot in initial_segments(job.path, survey, job.settings) for s in shot]
-    monitor.stage(f"{job.scene.parent.parent.name}: holes, {_name(placed)}", len(segments))
+    path, numbers = walk.path, walk.path.numbers
+    shots = Analysis(
+        path, walk.settings.replace(KeyframeSettings, **vars(placed)), analysis.frames
+    ).segments()
+    segments = [s for shot in shots for s in shot]
+    adaptation = placed.adaptation if placed.placement is Placement.ADAPTED else None
+    name = placed.placement.value if adaptation is None else f"A = {adaptation:g}"
     percent: dict[int, float] = {}
     total = 0.0
-    for segment in segments:
-        moving = job.path.distinct_inbetweens(segment)
-        looked_at = moving[(step - 1) // 2 :: step] or moving[:1]
-        found = {frame: hole_percent(job, views, segment, frame) for frame in looked_at}
+    for segment in counted(segments, f"disocclusions, {name}", monitor):
+        distinct = path.distinct_inbetweens(segment)
+        chosen = distinct[(step - 1) // 2 :: step] or distinct[:1]
+        found = {frame: disoccluded_percent(walk, segment, frame) for frame in chosen}
         if found:
-            total += len(moving) * float(np.mean(list(found.values())))
+            total += len(distinct) * float(np.mean(list(found.values())))
         percent |= found
-        monitor.advance()
-    numbers = job.path.numbers
-    keyframes = sorted({s.first for s in segments} | {s.last for s in segments})
     return {
         "name": placed.placement.value,
-        "adaptation": placed.adaptation if placed.placement is Placement.ADAPTED else None,
-        "keyframes": [numbers[k] for k in keyframes],
+        "adaptation": adaptation,
+        "keyframes": [numbers[k] for k in keyframes_of(segments)],
         "frames": [numbers[f] for f in percent],
         "percent": list(percent.values()),
-        "mean": total / len(job.path),
+        "mean": total / len(path),
     }
 
 
-def _name(placed: KeyframeSettings) -> str:
-    if placed.placement is Placement.ADAPTED:
-        return f"A = {placed.adaptation:g}"
-    return str(placed.placement.value)
+def disoccluded_percent(walk: Walkthrough, segment: Segment, frame: int) -> float:
+    """Share of a frame's pixels, percent, whose surface neither keyframe of its segment shows."""
+    first, last = _unshaded(walk, segment.first), _unshaded(walk, segment.last)
+    before, after = warped_pair(walk, first, last, frame)
+    _, is_disoccluded = composite(
+        before,
+        after,
+        walk.view(frame).geometry,
+        progress=walk.path.progress(segment, frame),
+        settings=walk.settings[WarpSettings],
+    )
+    return 100.0 * float(is_disoccluded.mean())
+
+
+def _unshaded(walk: Walkthrough, frame: int) -> Keyframe:
+    geometry = walk.view(frame).geometry
+    size = geometry.depth.shape
+    return Keyframe(frame, geometry, Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)))

@@ -1,7 +1,7 @@
-"""A scene lit by a distant lamp without shadows: outlines and textures as they are, and no noise.
+"""A scene under a distant light without shadows: exact outlines and textures, and no noise.
 
-The paper's ray tracer has no noise. Under path tracing what the metric says of reuse and of filters is mixed
-with what it says of noise; this renderer takes the noise away, and the scene's own light with it.
+The paper's ray tracer has no noise. Under path tracing, the metric's results for reuse and filters are mixed
+with its results for noise; this renderer removes the noise, and with it the scene's own illumination.
 """
 
 from __future__ import annotations
@@ -18,33 +18,30 @@ from enfilade.kernels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneFacts, Surfaces
 
-__all__ = ["PlainlyLit"]
-
-SUN = (0.36, 0.48, 0.8)  # direction of the lamp, in the world
-AMBIENT = 0.3  # part of the light that comes from everywhere
-OFFSET = 1e-4  # of the distance: how far from a mirror or a pane a ray goes on
+SUN = (0.36, 0.48, 0.8)  # direction of the light, world space
+AMBIENT = 0.3  # share of the light that is the same from all directions
+OFFSET = 1e-4  # of the distance: start of reflected and transmitted rays
 CHUNK = 4_194_304  # rays in flight
 
 
 class PlainlyLit:
-    """A renderer that shades what another one finds: albedo times a cosine.
+    """A renderer that shades the surfaces of another one with albedo times a cosine.
 
-    What emits is white, what is beyond all surfaces black. Mirrors show what they reflect and panes what
-    is behind them, one deep, without loss; gloss shows nothing but its albedo.
+    Emitters are white and the background is black. Mirrors show the reflected surface and panes the
+    transmitted one, one interaction deep and without loss. Glossy surfaces show their albedo.
 
     Parameters
     ----------
     renderer
-        Of the scene; asked for surfaces alone.
+        Of the scene; only its surfaces are used.
     """
 
     def __init__(self, renderer: Renderer) -> None:
         self._renderer = renderer
 
     def describe(self) -> SceneFacts:
-        """Say what is rendered, and by what."""
-        facts = self._renderer.describe()
-        return SceneFacts(f"{facts.renderer}, plainly lit", facts.variant, facts.shapes)
+        """Facts of the scene and of its renderer."""
+        return self._renderer.describe()
 
     def surfaces(self, rays: Rays) -> Surfaces:
         """Find the first surface along each ray."""
@@ -61,7 +58,7 @@ class PlainlyLit:
     ) -> Shading:
         """Shade a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`.
 
-        Rays through a pixel's centre are all the same: one is sent, and the variance is 0.
+        All rays through a pixel's centre are the same: one is traced, and the variance is 0.
         """
         return estimate(
             camera,
@@ -74,21 +71,24 @@ class PlainlyLit:
         )
 
     def _radiance(self, rays: Rays, _rng: Any) -> Any:
-        direct, seen = self._shaded(rays)
-        is_mirror = seen.is_hit & (seen.surface == opaque(int(SurfaceClass.MIRROR), UInt))
-        is_pane = seen.is_hit & (seen.surface == opaque(int(SurfaceClass.TRANSPARENT), UInt))
-        turned = rays.direction - 2.0 * dr.dot(rays.direction, seen.normal) * seen.normal
+        # Shade the first surface.
+        direct, hit = self._shaded(rays)
+        is_mirror = hit.is_hit & (hit.surface == opaque(int(SurfaceClass.MIRROR), UInt))
+        is_pane = hit.is_hit & (hit.surface == opaque(int(SurfaceClass.TRANSPARENT), UInt))
+
+        # Shade the surface that a mirror reflects or a pane transmits.
+        reflected = rays.direction - 2.0 * dr.dot(rays.direction, hit.normal) * hit.normal
         side = dr.select(is_mirror, Float(OFFSET), Float(-OFFSET))
-        origin = rays.origin + seen.distance * (rays.direction + side * seen.normal)
+        origin = rays.origin + hit.distance * (rays.direction + side * hit.normal)
         onward = Rays(
-            dr.select(seen.is_hit, origin, rays.origin), dr.select(is_mirror, turned, rays.direction)
+            dr.select(hit.is_hit, origin, rays.origin), dr.select(is_mirror, reflected, rays.direction)
         )
-        behind, _ = self._shaded(onward)
-        return dr.select(is_mirror | is_pane, behind, direct)
+        second, _ = self._shaded(onward)
+        return dr.select(is_mirror | is_pane, second, direct)
 
     def _shaded(self, rays: Rays) -> tuple[Any, Surfaces]:
-        seen = self._renderer.surfaces(rays)
-        facing = dr.abs(dr.dot(seen.normal, Array3f(*SUN)))
-        color = seen.albedo * (AMBIENT + (1.0 - AMBIENT) * facing)
-        is_lamp = seen.surface == opaque(int(SurfaceClass.EMISSIVE), UInt)
-        return dr.select(seen.is_hit, dr.select(is_lamp, Array3f(1.0), color), Array3f(0.0)), seen
+        hit = self._renderer.surfaces(rays)
+        cosine = dr.abs(dr.dot(hit.normal, Array3f(*SUN)))
+        color = hit.albedo * (AMBIENT + (1.0 - AMBIENT) * cosine)
+        is_emitter = hit.surface == opaque(int(SurfaceClass.EMISSIVE), UInt)
+        return dr.select(hit.is_hit, dr.select(is_emitter, Array3f(1.0), color), Array3f(0.0)), hit

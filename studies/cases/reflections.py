@@ -1,4 +1,4 @@
-"""§5.4: what filtering along the flow does to what mirrors show."""
+"""§5.4: effect of temporal filters on the reflections in mirrors."""
 
 from __future__ import annotations
 
@@ -8,21 +8,29 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from enfilade.records import F32, Geometry, Mask
-from studies.cases.filtering import antialiased
+from enfilade.gbuffer import image_flow
+from enfilade.records import Geometry, Mask
+from enfilade.settings import AntialiasSettings
+from studies.cases.case import Case
 from studies.cases.mirrored import mirror_pixels
-from studies.cases.seen import Viewer, score_in, visible_percent
-from studies.cases.windows import Example, Row, Windows
+from studies.cases.seen import scores_in
+from studies.cases.windows import Windows
+from studies.progress import counted
 
-__all__ = ["measure", "most_mirrors"]
+FRAME_PX = 2  # of a mirror's border, which shows its frame, too: left out
+SCANNED = 24  # frames of a path that are searched for mirrors
 
-FRAME_PX = 2  # of a mirror's border, which shows its frame beside it: left out
-SCANNED = 24  # frames of a path that are looked at for mirrors
+
+def measure(case: Case) -> dict[str, Any]:
+    """``frames``: measurements of those that show most of mirrors, without noise; see :func:`compare`."""
+    windows = case.plain_windows
+    probes = counted(most_mirrors(windows, case.terms.windows), "mirrors", case.monitor)
+    return {"frames": [compare(windows, frame) for frame in probes]}
 
 
 def most_mirrors(windows: Windows, count: int) -> list[int]:
     """Frames that show most of mirrors, a tenth of the path apart, in order; none without mirrors."""
-    length = len(windows.job.path)
+    length = len(windows.walk.path)
     margin = min(8, length // 4)
     step = max((length - 2 * margin) // SCANNED, 1)
     share = {f: float(_inner(windows.geometry(f)).mean()) for f in range(margin, length - margin, step)}
@@ -33,64 +41,47 @@ def most_mirrors(windows: Windows, count: int) -> list[int]:
     return sorted(chosen[:count])
 
 
-def measure(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Example]:
-    """Compare four temporal filters on mirrors with what should be seen in them.
+def compare(windows: Windows, frame: int) -> dict[str, Any]:
+    """Compare four temporal filters on the mirrors of a frame with the reference.
 
-    ``none``: no temporal filter. ``full``: along the flow of the mirror's surface, as everywhere.
-    ``short``: the same over few frames, the paper's heuristic. ``reflected``: full, along the flow of the
+    ``none``: no temporal filter. ``full``: along the motion of the mirror's surface, as everywhere.
+    ``short``: the same over few frames, the paper's heuristic. ``reflected``: full, along the motion of the
     virtual image.
 
     Returns
     -------
-    rows : dict
-        ``frames``: of each probe its number, ``mirror_percent`` of its pixels, and by filter, in motion
-        (at the velocity of what is seen in the mirror) and as stills: score, JND, and share above 1 JND.
-    example : dict
-        Colours by filter and ``reference`` of the probe with most mirrors, and ``mirror`` 0 or 1.
+    dict
+        ``frame``: its number; ``mirror_percent`` of its pixels; ``surface_deg_s``, ``reflected_deg_s``: mean
+        velocities; ``filters``: by filter, in motion (at the velocity of the reflection), as a still, and by
+        the modern mode: score, JND, and share above 1 JND.
     """
-    rows, examples = windows.each("mirrors", probes, _probe)
-    most = int(np.argmax([row["mirror_percent"] for row in rows]))
-    return {"frames": rows, "example": rows[most]["frame"]}, examples[most]
-
-
-def _probe(windows: Windows, viewer: Viewer, frame: int) -> tuple[Row, Example]:
-    settings = windows.job.settings.antialias
-    geometry, seen = windows.geometry(frame), windows.seen(frame)
-    mirror = _inner(geometry)
-    reference = windows.reference(frame).color
-    velocity = windows.job.viewing.velocity_deg_s(windows.flow(frame, seen).motion)
-
-    def filtered(frames: int, *, follows: bool = False) -> F32:
-        chosen = replace(settings, specular_frames=frames)
-        return antialiased(
-            windows, frame, lambda f: windows.traced(f).color, chosen, windows.seen if follows else None
-        )
-
+    walk, viewer = windows.walk, windows.viewer
+    settings = walk.settings[AntialiasSettings]
+    mirror, reference = _inner(windows.geometry(frame)), windows.reference(frame).color
+    flow = image_flow(windows.reflected(frame), *walk.path.neighbours(frame))
+    velocity = walk.viewing.velocity_deg_s(flow.motion)
+    full = replace(settings, specular_frames=settings.frames)
     made = {
-        "none": filtered(1),
-        "full": filtered(settings.frames),
-        "short": filtered(settings.specular_frames),
-        "reflected": filtered(settings.frames, follows=True),
+        "none": windows.antialiased(frame, replace(settings, specular_frames=1)),
+        "full": windows.antialiased(frame, full),
+        "short": windows.antialiased(frame, settings),
+        "reflected": windows.antialiased(frame, full, geometry_of=windows.reflected),
     }
-    by_filter = {}
+    filters = {}
     for name, color in made.items():
-        maps = {"motion": viewer.paper(color, reference, velocity)}
-        maps["still"] = viewer.paper(color, reference, None)
-        maps["modern"] = viewer.modern(color, reference, velocity)
-        by_filter[name] = {
-            how: {"score": score_in(jnd, mirror), "visible_percent": visible_percent(jnd, mirror)}
-            for how, jnd in maps.items()
+        maps = {
+            "motion": viewer.paper(color, reference, velocity),
+            "still": viewer.paper(color, reference, None),
+            "modern": viewer.modern(color, reference, velocity),
         }
-    speed = np.hypot(velocity[..., 0], velocity[..., 1])
-    own = windows.view(frame).speed_deg_s
-    row = {
-        "frame": windows.job.path.numbers[frame],
+        filters[name] = {how: scores_in(jnd, mirror) for how, jnd in maps.items()}
+    return {
+        "frame": walk.path.numbers[frame],
         "mirror_percent": 100.0 * float(mirror.mean()),
-        "surface_deg_s": float(own[mirror].mean()),
-        "reflected_deg_s": float(speed[mirror].mean()),
-        "filters": by_filter,
+        "surface_deg_s": float(windows.view(frame).speed_deg_s[mirror].mean()),
+        "reflected_deg_s": float(np.hypot(velocity[..., 0], velocity[..., 1])[mirror].mean()),
+        "filters": filters,
     }
-    return row, {**made, "reference": reference, "mirror": mirror.astype(np.float32)}
 
 
 def _inner(geometry: Geometry) -> Mask:

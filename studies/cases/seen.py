@@ -1,4 +1,4 @@
-"""What a viewer sees of the difference between two frames: in motion and as stills, by both modes."""
+"""Visible differences between two frames: in motion and as stills, by both modes of the metric."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from functools import cached_property
 import numpy as np
 
 from enfilade.kernels.tone import display_luminance
-from enfilade.metric import Aqm, Pursuit
+from enfilade.metric import Aqm, MetricOptions, Pursuit
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
-from enfilade.settings import Settings
+from enfilade.settings import MetricSettings, Settings, ViewingSettings
 from enfilade.viewing import Viewing
 
-__all__ = ["Viewer", "score_in", "visible_percent"]
+Scores = dict[str, float | None]
 
-SEEN_JND = 1.0  # 75 % of viewers who look for it (§6)
+VISIBLE_JND = 1.0  # seen by 75 % of observers who look for it (§6)
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """Someone who looks at frames of one size.
+    """Both modes of the metric for frames of one size.
 
     Attributes
     ----------
@@ -36,17 +36,11 @@ class Viewer:
     def shown(self, color: F32) -> F32:
         """Luminance of the screen for linear colours, (H, W) cd/m2."""
         of = self.viewing
-        exposure = self.settings.viewing.exposure_ev
+        exposure_ev = self.settings[ViewingSettings].exposure_ev
         luminance: F32 = display_luminance(
-            color, exposure_ev=exposure, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
+            color, exposure_ev=exposure_ev, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
         )
         return luminance
-
-    def shown_variance(self, variance: F32) -> F32:
-        """Variance on the screen for that of linear luminances, (H, W) (cd/m2)^2, clipping left out."""
-        slope = 2.0**self.settings.viewing.exposure_ev * (self.viewing.peak_cd_m2 - self.viewing.black_cd_m2)
-        scaled: F32 = (variance * slope**2).astype(np.float32)
-        return scaled
 
     def paper(
         self,
@@ -65,42 +59,43 @@ class Viewer:
         test, reference : (H, W, 3) float32
             Linear colours.
         velocity_deg_s : (H, W, 2) float32 or None
-            None: judged as stills.
+            None: compared as stills.
         valid : (H, W) bool, optional
-            Pixels to judge.
+            Pixels to compare.
         noise : (H, W) float32, optional
-            Variance of the difference of both, of linear luminance, which is not counted.
+            Variance of the difference of both, of linear luminance, which does not count.
         noise_blur_px : (H, W) float32, optional
-            Standard deviation of the spatial filter that both have passed since, pixels.
+            Standard deviation of the spatial filter that was applied to both since, pixels.
         """
+        # Exposure and display are linear up to the clipping.
+        slope = 2.0 ** self.settings[ViewingSettings].exposure_ev
+        slope *= self.viewing.peak_cd_m2 - self.viewing.black_cd_m2
         return self._paper.compare(
             self.shown(test),
             self.shown(reference),
             velocity=velocity_deg_s,
             valid=valid,
-            noise_variance=None if noise is None else self.shown_variance(noise),
+            noise_variance=None if noise is None else (noise * slope**2).astype(np.float32),
             noise_blur_px=noise_blur_px,
             pursuit=Pursuit.BOTH,
         ).jnd
 
-    def modern(
-        self, test: F32, reference: F32, velocity_deg_s: F32 | None, *, valid: Mask | None = None
-    ) -> F32:
-        """JND map by the modern mode, of one frame: flicker is nothing to it."""
+    def modern(self, test: F32, reference: F32, velocity_deg_s: F32 | None) -> F32:
+        """JND map by the modern mode for one frame, without flicker."""
         shown = self.shown(test), self.shown(reference)
-        return self._modern.compare(*shown, velocity=velocity_deg_s, valid=valid, pursuit=Pursuit.BOTH).jnd
+        return self._modern.compare(*shown, velocity=velocity_deg_s, pursuit=Pursuit.BOTH).jnd
 
     @cached_property
     def _paper(self) -> Aqm:
-        return Aqm.paper(self.viewing, mask_slope=self.settings.metric.mask_slope)
+        return Aqm(self.viewing, mask_slope=self.settings[MetricSettings].mask_slope)
 
     @cached_property
     def _modern(self) -> Aqm:
-        return Aqm.modern(self.viewing)
+        return Aqm(self.viewing, options=MetricOptions.modern())
 
 
 def score_in(jnd: F32, where: Mask) -> float | None:
-    """One number for a part of a map, JND, as for a whole one: (mean J^3.5)^(1/3.5); None for no pixel."""
+    """Score of a part of a map, JND, (mean J^3.5)^(1/3.5); None for no pixel."""
     if not where.any():
         return None
     return float(np.mean(jnd[where].astype(np.float64) ** POOLING_EXPONENT) ** (1.0 / POOLING_EXPONENT))
@@ -108,4 +103,9 @@ def score_in(jnd: F32, where: Mask) -> float | None:
 
 def visible_percent(jnd: F32, where: Mask) -> float | None:
     """Share of a part of a map above 1 JND, percent; None for no pixel."""
-    return 100.0 * float((jnd[where] > SEEN_JND).mean()) if where.any() else None
+    return 100.0 * float((jnd[where] > VISIBLE_JND).mean()) if where.any() else None
+
+
+def scores_in(jnd: F32, where: Mask) -> Scores:
+    """``score`` and ``visible_percent`` of a part of a map."""
+    return {"score": score_in(jnd, where), "visible_percent": visible_percent(jnd, where)}

@@ -1,4 +1,4 @@
-"""What a path costs on this machine in this hour: the unit in which times of different hours are compared."""
+"""Cost of a path at the present speed of the machine, by which times of different hours are compared."""
 
 from __future__ import annotations
 
@@ -7,55 +7,39 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enfilade.pipeline.job import Job
-from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.renderer import PixelFilter, Purpose
 
-__all__ = ["FILTERS", "PathCost", "mean_cost", "path_costs", "spread_over"]
-
-PathCost = dict[str, dict[str, float]]  # by pixel filter: wall and CPU seconds
+PathCost = dict[str, dict[str, float]]  # by pixel filter: wall and CPU seconds of a path
 
 FILTERS = (PixelFilter.CENTRE, PixelFilter.GAUSSIAN)
-FRAMES = 2  # of a walk that are traced whole to take the time of a path
-TIMED_SPP, WARM_SPP = 8, 1  # their paths a pixel; before that, kernels are compiled
+FRAMES = 2  # of a walk that are traced whole
+TIMED_SPP, WARM_SPP = 8, 1  # the latter first: kernels are compiled
 
 
-def path_costs(renderer: Renderer, job: Job) -> PathCost:
-    """Trace a few frames of a job whole, and divide.
-
-    Returns
-    -------
-    dict
-        By the filter's name in lower case: ``wall`` and ``cpu`` seconds of a path.
-    """
-    path, found = job.path, {}
-    pixels = np.arange(path.width * path.height, dtype=np.uint32)
-    frames = spread_over(len(path), FRAMES)
+def path_costs(walk: Walkthrough) -> PathCost:
+    """``wall`` and ``cpu`` seconds of a path, by pixel filter: a few frames are traced whole."""
+    everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
+    frames, found = spread_over(len(walk.path), FRAMES), {}
     for pixel_filter in FILTERS:
         wall = cpu = 0.0
         for frame in frames:
             for spp in (WARM_SPP, TIMED_SPP):
                 begin, spent = time.perf_counter(), time.process_time()
-                renderer.trace(
-                    path.cameras[frame],
-                    pixels,
-                    RandomKey(job.settings.trace.seed, path.numbers[frame], Purpose.REFERENCE),
-                    spp=spp,
-                    pixel_filter=pixel_filter,
-                )
+                walk.trace(frame, everywhere, Purpose.REFERENCE, spp=spp, pixel_filter=pixel_filter)
                 if spp == TIMED_SPP:
                     wall += time.perf_counter() - begin
                     cpu += time.process_time() - spent
-        paths = len(frames) * TIMED_SPP * len(pixels)
+        paths = len(frames) * TIMED_SPP * everywhere.size
         found[pixel_filter.name.lower()] = {"wall": wall / paths, "cpu": cpu / paths}
     return found
 
 
 def mean_cost(costs: Sequence[PathCost]) -> PathCost:
     """The mean of several measurements."""
-    names = [pixel_filter.name.lower() for pixel_filter in FILTERS]
     return {
         name: {kind: sum(cost[name][kind] for cost in costs) / len(costs) for kind in ("wall", "cpu")}
-        for name in names
+        for name in costs[0]
     }
 
 

@@ -1,202 +1,205 @@
-"""Short sequences around a frame, traced whole and reused, for what is filtered and judged in many ways.
+"""Short sequences around a frame, traced whole and reused from keyframes, to be filtered and compared.
 
-Everything is sampled at pixels' centres, as the paper's rays are (§5.2): what antialiases is the filter.
+All are sampled at pixels' centres, as in the paper (§5.2): antialiasing is left to the filter.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from enfilade.cache import LruCache
 from enfilade.camera.path import Segment
-from enfilade.gbuffer import image_flow
-from enfilade.images import read_shading, write_shading
-from enfilade.methods.paper import composite, warp_keyframe
+from enfilade.gbuffer import View, image_flow
+from enfilade.images.records import read_record, write_record
+from enfilade.methods.analysis import Analysis
+from enfilade.methods.paper.composite import composite
+from enfilade.methods.paper.refine import warped_pair
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import spatial_support_px, temporal_limits
+from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
+from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.pipeline.job import Job
-from enfilade.pipeline.survey import Survey, initial_segments
-from enfilade.pipeline.views import View, Views
-from enfilade.records import F32, Flow, Geometry, Keyframe, Shading, Warped
-from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
+from enfilade.records import F32, Geometry, Keyframe, Shading, Warped
+from enfilade.renderer import PixelFilter, Purpose
+from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
 from studies.cases.mirrored import mirrored
 from studies.cases.seen import Viewer
 
-__all__ = ["Example", "Row", "Windows", "probes_of"]
-
-Row = dict[str, Any]  # what is measured of a frame
-Example = dict[str, F32]  # its images
-
-KEPT, VIEWS_KEPT = 64, 24  # images and views in memory: some 600 MiB at 640x480
+CACHED_IMAGES, CACHED_VIEWS = 64, 24  # some 600 MiB at 640x480
 END_FRAMES = 10  # of a path, where a temporal filter lacks half its support
 
 
-@dataclass(frozen=True, eq=False)
 class Windows:
-    """The frames of a path, made when asked for.
+    """Frames of a walkthrough, made when they are needed.
 
-    Attributes
+    Parameters
     ----------
-    job : Job
-    renderer : Renderer
-    survey : Survey
-    folder : Path or None
-        Holds one EXR file a frame and kind; they depend on the job, which the caller keeps track of. None:
-        nothing is kept, what is cheap to make.
-    monitor : Monitor
-    views : Views
-    reference_spp : int
+    walk
+    analysis
+    monitor
+    probes
+        Number of frames whose surroundings are used.
+    reference_spp
+    folder
+        Holds one file a frame and kind. The caller keeps to one folder for each walkthrough and spp. None:
+        frames are cached in memory only.
     """
 
-    job: Job
-    renderer: Renderer
-    survey: Survey
-    folder: Path | None
-    monitor: Monitor
-    views: Views
-    reference_spp: int
-    _memory: OrderedDict[tuple[str, int], Shading] = field(default_factory=OrderedDict, init=False)
-    _seen: OrderedDict[int, View] = field(default_factory=OrderedDict, init=False)
+    def __init__(
+        self,
+        walk: Walkthrough,
+        analysis: Analysis,
+        monitor: Monitor,
+        *,
+        probes: int,
+        reference_spp: int,
+        folder: Path | None = None,
+    ) -> None:
+        self.walk, self.analysis, self.monitor = walk, analysis, monitor
+        self.probes = probes_of(analysis, probes)
+        self.viewer = Viewer(walk.viewing, walk.settings)
+        self._reference_walk = other_seed(walk)
+        self._reference_spp = reference_spp
+        self._folder = folder
+        self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
+        self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
 
-    def each(
-        self, stage: str, probes: list[int], measured: Callable[[Windows, Viewer, int], tuple[Row, Example]]
-    ) -> tuple[list[Row], list[Example]]:
-        """Measure frames one by one, with progress: a row and images of each."""
-        self.monitor.stage(stage, len(probes))
-        viewer = Viewer(self.job.viewing, self.job.settings)
-        found = []
-        for frame in probes:
-            found.append(measured(self, viewer, frame))
-            self.monitor.advance()
-        return [row for row, _ in found], [example for _, example in found]
-
-    def around(self, frame: int, reach: int) -> range:
-        """Frames of the same shot at most `reach` away."""
-        shot = next(s for s in self.job.path.shots() if frame in s)
+    def around(self, frame: int, settings: AntialiasSettings) -> range:
+        """Frames of the same shot that the filter may use."""
+        reach = max(settings.frames, settings.slow_frames) // 2
+        shot = next(s for s in self.walk.path.shots() if frame in s)
         return range(max(frame - reach, shot.start), min(frame + reach + 1, shot.stop))
 
     def view(self, frame: int) -> View:
-        """What a frame sees, and how it moves."""
-        if frame not in self._seen:
-            self._seen[frame] = self.views[frame]
-            if len(self._seen) > VIEWS_KEPT:
-                self._seen.popitem(last=False)
-        self._seen.move_to_end(frame)
-        return self._seen[frame]
+        """G-buffer and motion vectors of a frame."""
+        return self._views.get(frame, lambda: self.walk.view(frame))
 
     def geometry(self, frame: int) -> Geometry:
-        """What a frame sees."""
+        """G-buffer of a frame."""
         return self.view(frame).geometry
 
-    def seen(self, frame: int) -> Geometry:
-        """The same, with what mirrors show in place of the mirrors."""
-        return mirrored(self.renderer, self.geometry(frame))
-
-    def flow(self, frame: int, geometry: Geometry | None = None) -> Flow:
-        """Image flow, of what the frame sees or of another geometry in its place."""
-        if geometry is None:
-            return self.view(frame).flow
-        return image_flow(geometry, *self.job.path.neighbours(frame))
+    def reflected(self, frame: int) -> Geometry:
+        """The same, with virtual images in place of the mirrors."""
+        return mirrored(self.walk.renderer, self.geometry(frame))
 
     def traced(self, frame: int) -> Shading:
         """A frame with every pixel traced: I_rt of Fig. 9."""
-        spp = self.job.settings.trace.spp
-
-        return self._kept(
-            "traced", frame, lambda: self._trace(frame, spp, Purpose.FILL, PixelFilter.CENTRE, 0)
+        spp = self.walk.settings[SamplingSettings].spp
+        return self._cached(
+            "traced", frame, lambda: _trace(self.walk, frame, spp, Purpose.FILL, PixelFilter.CENTRE)
         )
 
     def reference(self, frame: int) -> Shading:
-        """A frame as it should be: through a Gaussian pixel, with random numbers of its own."""
-        return self._kept(
-            "reference",
-            frame,
-            lambda: self._trace(frame, self.reference_spp, Purpose.REFERENCE, PixelFilter.GAUSSIAN, 1),
+        """The reference of a frame: through a Gaussian pixel filter, with other random numbers."""
+        walk, spp = self._reference_walk, self._reference_spp
+        return self._cached(
+            "reference", frame, lambda: _trace(walk, frame, spp, Purpose.REFERENCE, PixelFilter.GAUSSIAN)
         )
 
     def reused(self, frame: int) -> Shading:
-        """A frame from the keyframes beside it, its holes traced: I_ibr of Fig. 9.
+        """A frame composited from the keyframes around it, disocclusions traced: I_ibr of Fig. 9.
 
-        The keyframes are the initial ones: no segment is split. The variance is that of the noise's density,
-        as the warp carries it (docs/noise.md).
+        The keyframes are the initial ones: no segment is split. The variance is the density of the noise, as
+        warped (docs/noise.md).
         """
-        segment = self._segment(frame)
+        segments = (s for shot in self.analysis.segments() for s in shot)
+        segment = next((s for s in segments if frame in s.inbetweens), None)
         if segment is None:
             return self.traced(frame)
-        return self._kept("reused", frame, lambda: self._composed(segment, frame))
+        return self._cached("reused", frame, lambda: self._composited(segment, frame))
 
-    def _composed(self, segment: Segment, frame: int) -> Shading:
-        settings, camera = self.job.settings.warp, self.job.path.cameras[frame]
-        before, after = (
-            warp_keyframe(self._keyframe(k), camera, settings) for k in (segment.first, segment.last)
-        )
-        geometry, progress = self.geometry(frame), self.job.path.progress(segment, frame)
-        color, is_hole = composite(before, after, geometry, progress=progress, settings=settings)
-        noisy = _with_variance_as_color(before), _with_variance_as_color(after)
-        density, _ = composite(*noisy, geometry, progress=progress, settings=settings)
-        variance = np.ascontiguousarray(density[..., 0])
-        traced = self.traced(frame)
-        color[is_hole], variance[is_hole] = traced.color[is_hole], traced.variance[is_hole]
-        return Shading(color, variance)
-
-    def _keyframe(self, frame: int) -> Keyframe:
+    def keyframe(self, frame: int) -> Keyframe:
+        """A traced frame as a keyframe."""
         return Keyframe(frame, self.geometry(frame), self.traced(frame))
 
-    def _segment(self, frame: int) -> Segment | None:
-        """The segment between whose keyframes a frame lies; None for a keyframe."""
-        shots = initial_segments(self.job.path, self.survey, self.job.settings)
-        return next((s for shot in shots for s in shot if frame in s.inbetweens), None)
+    def antialiased(
+        self,
+        frame: int,
+        settings: AntialiasSettings,
+        color_of: Callable[[int], F32] | None = None,
+        geometry_of: Callable[[int], Geometry] | None = None,
+    ) -> F32:
+        """Filter a frame with its neighbours (§5), (H, W, 3) float32.
 
-    def _trace(self, frame: int, spp: int, purpose: Purpose, pixel_filter: PixelFilter, salt: int) -> Shading:
-        path, trace = self.job.path, self.job.settings.trace
-        made = self.renderer.trace(
-            path.cameras[frame],
-            np.arange(path.width * path.height, dtype=np.uint32),
-            RandomKey((trace.seed + salt) % 2**32, path.numbers[frame], purpose),
-            spp=spp,
-            pixel_filter=pixel_filter,
+        Parameters
+        ----------
+        frame
+        settings
+        color_of
+            Colours of each frame before the filter; by default those of the traced frames.
+        geometry_of
+            Geometry of each frame whose motion is followed, in place of the visible surfaces'. Where it is
+            not specular, the filter has its full length.
+        """
+        viewing, path = self.walk.viewing, self.walk.path
+        span = self.around(frame, settings)
+        slices: dict[int, Slice] = {}
+        for at in span:
+            color = self.traced(at).color if color_of is None else color_of(at)
+            view = self.view(at)
+            support = spatial_support_px(view.speed_deg_s, viewing.pixels_per_degree, settings)
+            geometry = view.geometry if geometry_of is None else geometry_of(at)
+            flow = view.flow if geometry_of is None else image_flow(geometry, *path.neighbours(at))
+            slices[at] = Slice(reconstruct(color, support), geometry, flow)
+        here = slices[frame]
+        return filter_along_flow(
+            here,
+            [slices[at] for at in reversed(range(span.start, frame))],
+            [slices[at] for at in range(frame + 1, span.stop)],
+            temporal_limits(viewing.velocity_deg_s(here.flow.speed), here.geometry, settings),
+            settings,
         )
-        size = path.height, path.width
-        return Shading(made.color.reshape(*size, 3), made.variance.reshape(size), made.dropped)
 
-    def _kept(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
-        key = kind, frame
-        if key not in self._memory:
-            self._memory[key] = (
-                make() if self.folder is None else self._stored(self.folder, kind, frame, make)
-            )
-            if len(self._memory) > KEPT:
-                self._memory.popitem(last=False)
-        self._memory.move_to_end(key)
-        return self._memory[key]
+    def _composited(self, segment: Segment, frame: int) -> Shading:
+        geometry, progress = self.geometry(frame), self.walk.path.progress(segment, frame)
+        settings = self.walk.settings[WarpSettings]
+        warped = warped_pair(self.walk, self.keyframe(segment.first), self.keyframe(segment.last), frame)
+        color, is_disoccluded = composite(*warped, geometry, progress=progress, settings=settings)
+        before, after = map(_with_variance_as_color, warped)
+        density, _ = composite(before, after, geometry, progress=progress, settings=settings)
+        variance, traced = np.ascontiguousarray(density[..., 0]), self.traced(frame)
+        color[is_disoccluded] = traced.color[is_disoccluded]
+        variance[is_disoccluded] = traced.variance[is_disoccluded]
+        return Shading(color, variance)
 
-    def _stored(self, folder: Path, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
-        spp = self.reference_spp if kind == "reference" else self.job.settings.trace.spp
-        name = f"{kind}-{self.job.path.width}x{self.job.path.height}-{spp}"
-        file = folder / name / f"{self.job.path.numbers[frame]:04d}.exr"
-        if file.is_file():
-            return read_shading(file)
-        made = make()
-        write_shading(file, made)
-        return made
+    def _cached(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
+        if self._folder is None:
+            return self._images.get((kind, frame), make)
+        stem = self._folder / kind / f"{self.walk.path.numbers[frame]:04d}"
+        return self._images.get((kind, frame), lambda: stored(stem, make))
 
 
-def probes_of(survey: Survey, path_length: int, count: int) -> list[int]:
-    """Frames at even quantiles of the mean velocity, slowest first, each once.
+def stored(stem: Path, make: Callable[[], Shading]) -> Shading:
+    """A traced image from its file, made and written where the file is missing."""
+    file = stem.with_name(f"{stem.name}.exr")
+    if not file.is_file():
+        write_record(stem, make())
+    return read_record(file, Shading)
 
-    The ends of the path are left out.
-    """
-    margin = min(END_FRAMES, path_length // 4)
-    inner = range(margin, path_length - margin)
-    by_speed = sorted(inner, key=lambda frame: survey.speed_deg_s[frame])
+
+def other_seed(walk: Walkthrough) -> Walkthrough:
+    """The same walkthrough with other random numbers."""
+    seed = (walk.settings[TraceSettings].seed + 1) % 2**32
+    return Walkthrough(walk.path, walk.settings.replace(TraceSettings, seed=seed), walk.renderer)
+
+
+def probes_of(analysis: Analysis, count: int) -> list[int]:
+    """Frames at even quantiles of the mean velocity, slowest first, each once, not at the path's ends."""
+    length = len(analysis.path)
+    margin = min(END_FRAMES, length // 4)
+    by_speed = sorted(range(margin, length - margin), key=lambda frame: analysis.frames[frame].speed_deg_s)
     at = [round((len(by_speed) - 1) * k / max(count - 1, 1)) for k in range(count)]
     return list(dict.fromkeys(by_speed[i] for i in at))
 
 
+def _trace(walk: Walkthrough, frame: int, spp: int, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
+    everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
+    return walk.trace(frame, everywhere, purpose, spp=spp, pixel_filter=pixel_filter).spread(everywhere)
+
+
 def _with_variance_as_color(warped: Warped) -> Warped:
-    density: F32 = np.repeat(warped.variance[..., None], 3, axis=2)
-    return replace(warped, color=density)
+    return replace(warped, color=np.repeat(warped.variance[..., None], 3, axis=2))

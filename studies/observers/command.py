@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from enfilade.cli.group import FAILURE, debug_option
-from enfilade.cli.inputs import json_option, quiet_option
+from enfilade.cli.options import json_option, quiet_option
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.ndimage
 
-from enfilade.metric import SequenceAqm, sequence_score
+from enfilade.metric import sequence_score
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
+from studies.progress import counted
 
 __all__ = ["EXAMPLES", "Pair", "measure", "sequences"]
 
@@ -135,18 +136,16 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
     monitor : Monitor
         Is told of each example.
     """
-    monitor.stage(f"flicker, {mode.name}", len(EXAMPLES))
-    pairs = {}
-    for example, (_, pan_px) in EXAMPLES.items():
+    found = {}
+    for example, (_, pan_px) in counted(list(EXAMPLES.items()), f"flicker, {mode.name}", monitor):
         viewing = screen(SIZE_PX, PIXELS_PER_DEGREE, fps=FPS)
         flow_px = np.zeros((SIZE_PX, SIZE_PX, 2), dtype=np.float32)
         flow_px[..., 0] = -pan_px
         frames = sequences(example)
         scores = []
         for kind in (1, 2):
-            metric = SequenceAqm(mode.aqm(viewing))
-            found = (metric.compare(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames)
-            scores.append(sequence_score(comparison.score for comparison in found))
-        pairs[example] = Pair(*scores)
-        monitor.advance()
-    return pairs
+            judge = mode.sequence_judge(viewing)
+            judged = [judge.judge(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames]
+            scores.append(sequence_score(comparison.score for comparison in judged))
+        found[example] = Pair(*scores)
+    return found

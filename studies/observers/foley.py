@@ -19,6 +19,7 @@ from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
+from studies.progress import counted
 
 __all__ = ["UNMASKED_DB", "Masking", "gabor_and_sine", "measure"]
 
@@ -85,16 +86,14 @@ def measure(mode: Mode, monitor: Monitor) -> Masking:
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     gabor, sine = gabor_and_sine()
     _, people = read_columns("foley.csv", "mask_db", "threshold_db")
-    monitor.stage(f"masking, {mode.name}", len(people["mask_db"]) + 1)
     alone_db = _db(threshold_contrast(observer, gabor, MEAN_CD_M2))
     gain_db = UNMASKED_DB - alone_db
-    monitor.advance()
     found = []
-    for mask_db, known_db in zip(people["mask_db"], people["threshold_db"], strict=True):
+    masks = list(zip(people["mask_db"], people["threshold_db"], strict=True))
+    for mask_db, known_db in counted(masks, f"masking, {mode.name}", monitor):
         mask, guess = (10.0 ** ((db - gain_db) / 20.0) for db in (mask_db, known_db))
         contrast = threshold_contrast(observer, gabor, MEAN_CD_M2, mask=mask * sine, guess=guess)
         found.append(_db(contrast) + gain_db)
-        monitor.advance()
     return Masking(people["mask_db"], people["threshold_db"], np.array(found), gain_db)
 
 

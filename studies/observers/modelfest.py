@@ -19,6 +19,7 @@ from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
+from studies.progress import counted
 
 __all__ = ["PIXELS_PER_DEGREE", "SIZE_PX", "Thresholds", "measure", "target"]
 
@@ -193,12 +194,11 @@ def measure(mode: Mode, monitor: Monitor) -> Thresholds:
     numbers = people["target"].astype(np.int64)
     chosen = ~np.isin(numbers, IMAGES)
     found = []
-    monitor.stage(f"ModelFest, {mode.name}", int(np.count_nonzero(chosen)))
-    for number, known_db in zip(numbers[chosen], people["sensitivity_db"][chosen], strict=True):
+    targets = list(zip(numbers[chosen], people["sensitivity_db"][chosen], strict=True))
+    for number, known_db in counted(targets, f"ModelFest, {mode.name}", monitor):
         guess = 10.0 ** (-known_db / 20.0)
         contrast = threshold_contrast(observer, target(int(number)), MEAN_CD_M2, guess=guess)
         found.append(-20.0 * math.log10(contrast))
-        monitor.advance()
     return Thresholds(
         numbers[chosen], people["sensitivity_db"][chosen], np.array(found), people["spread_db"][chosen]
     )

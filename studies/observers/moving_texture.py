@@ -28,6 +28,7 @@ from enfilade.viewing import Viewing
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.observers.tables import read_columns, read_textures
+from studies.progress import counted
 
 __all__ = [
     "DISPLAYS",
@@ -239,9 +240,7 @@ def measure(mode: Mode, monitor: Monitor) -> Losses:
     textures = read_textures()
     _, people = read_columns("moving_texture.csv", "jnd", "jnd_low", "jnd_high")
     chosen = conditions()
-    monitor.stage(f"moving texture, {mode.name}", len(chosen))
     scores = np.zeros(len(chosen))
-    for index, condition in enumerate(chosen):
+    for index, condition in enumerate(counted(chosen, f"moving texture, {mode.name}", monitor)):
         scores[index] = score(condition, textures[condition.texture], mode)
-        monitor.advance()
     return Losses(chosen, -people["jnd"], people["jnd_high"], people["jnd_low"], scores)

@@ -52,7 +52,7 @@ def write_scene(
     SceneError
         No scene has this name.
     SettingsError
-        No preset has this name, or no image this size.
+        No preset has this name, no image this size, or a library of the generators is missing.
     """
     if name not in SCENES:
         known = ", ".join(SCENES)
@@ -62,7 +62,12 @@ def write_scene(
         raise SettingsError(f"there is no preset {preset!r}; the known ones are {known}")
     if size is not None and min(size) < 1:
         raise SettingsError(f"there is no image of {size[0]}x{size[1]} pixels")
-    from studies.scenes.build import build_scene
+    try:
+        from studies.scenes.build import build_scene
+    except ModuleNotFoundError as error:
+        raise SettingsError(
+            f"{error.name} is not installed; `make setup` or the group `studies` brings it"
+        ) from error
 
     scene, path = build_scene(name, Path(folder), preset, size)
     return SceneFiles(scene=scene, path=path)

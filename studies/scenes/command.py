@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.inputs import Size, json_option
+from enfilade.cli.options import Size, json_option
 from studies.scenes import PRESETS, SCENES
 
 

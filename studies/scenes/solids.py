@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -207,9 +207,3 @@ def arch(width: float, height: float, rise: float, segments: int) -> list[Point2
     angles = np.linspace(0.0, np.pi, segments + 1)
     head = [(width / 2 * float(np.cos(a)), height - rise + rise * float(np.sin(a))) for a in angles]
     return [(-width / 2, 0.0), (width / 2, 0.0), *head]
-
-
-def rows_of(count: int, low: float, high: float) -> list[float]:
-    """Return the centres of `count` equal bays between two ends."""
-    edges = np.linspace(low, high, count + 1).tolist()
-    return [(a + b) / 2 for a, b in pairwise(edges)]

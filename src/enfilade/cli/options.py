@@ -83,7 +83,7 @@ def decorated(*decorators: Callable[[Command], Command]) -> Callable[[Command], 
 
 
 _file = click.Path(path_type=Path)
-job_options = decorated(
+path_options = decorated(
     click.argument("scene", type=_file),
     click.option(
         "--path",
@@ -91,12 +91,6 @@ job_options = decorated(
         type=_file,
         required=True,
         help="The camera path: nerfstudio's camera_path.json, or keyed poses.",
-    ),
-    click.option(
-        "--method",
-        default="decoupled",
-        show_default=True,
-        help="Method: decoupled, paper, reference, or your own as module:Class.",
     ),
     click.option(
         "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
@@ -107,6 +101,15 @@ job_options = decorated(
         help="Frames, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
     ),
     click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
+)
+job_options = decorated(
+    path_options,
+    click.option(
+        "--method",
+        default="decoupled",
+        show_default=True,
+        help="Method: decoupled, paper, reference, or your own as module:Class.",
+    ),
 )
 device_option = click.option(
     "--device",

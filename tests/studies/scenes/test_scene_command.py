@@ -6,15 +6,12 @@ from pathlib import Path
 import pytest
 
 
-def test_scene_says_what_to_type_next(run, tmp_path):
+def test_scene_prints_its_files_and_the_next_commands(run, tmp_path):
     folder = tmp_path / "a room"
     result = run("scene", "room", "--out", folder, "--preset", "small")
     assert result.exit_code == 0
     assert (folder / "scene.xml").exists()
     assert f"enfilade render '{folder}/scene.xml' --path '{folder}/camera_path.json'" in result.stdout
-
-
-def test_scene_as_json(run, tmp_path):
     files = json.loads(run("scene", "room", "--out", tmp_path, "--preset", "small", "--json").stdout)
     assert all(Path(file).exists() for file in files.values())
 

@@ -16,13 +16,7 @@ from enfilade.records import F32, Mask
 __all__ = ["Temporal", "visible_before"]
 
 PLANE_TOLERANCE = 0.01  # of the depth: distance from its plane within which a point is of the same surface
-SHAPE, POSITION, NORMAL, DEPTH, BACKWARD = (
-    "shape_index",
-    "P",
-    "N",
-    "Z",
-    "backward",
-)  # layers of a delivered frame
+SHAPE, POSITION, NORMAL, DEPTH = "shape_index", "P", "N", "Z"  # AOVs of a delivered frame
 
 
 class Temporal:
@@ -71,7 +65,7 @@ def visible_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, np
     Parameters
     ----------
     layers, last
-        Layers ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one
+        AOVs ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one
         before it in the same shot.
 
     Returns
@@ -80,7 +74,7 @@ def visible_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, np
         True where the flow leads to a pixel that shows the same shape on the same plane (or nothing, where
         nothing is hit).
     """
-    backward = layers[BACKWARD].astype(np.float32)
+    backward = layers["backward"].astype(np.float32)
     height, width = backward.shape[:2]
     column = np.arange(width) + backward[..., 0]
     row = np.arange(height)[:, None] + backward[..., 1]

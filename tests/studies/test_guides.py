@@ -5,11 +5,11 @@ import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
-from enfilade.scene.opener import open_renderer
-from enfilade.settings import TraceSettings
+from enfilade.scene.analytic import AnalyticRenderer
+from enfilade.scene.opener import Scene
+from enfilade.settings import Settings
 from scenes_analytic import room, room_walk
 from studies.bench.guides import guides
-from support.analytic import AnalyticRenderer
 
 CHUNK = 1 << 20
 MIRROR = """<scene version="3.0.0">
@@ -18,27 +18,24 @@ MIRROR = """<scene version="3.0.0">
   <bsdf type="twosided"><bsdf type="conductor"><string name="material" value="none"/></bsdf></bsdf>
 </shape>
 <shape type="rectangle" id="wall">
-  <transform name="to_world">
-    <scale value="9"/><rotate x="1" angle="180"/><translate z="6"/>
-  </transform>
+  <transform name="to_world"><scale value="9"/><rotate x="1" angle="180"/><translate z="6"/></transform>
   <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.2, 0.1"/></bsdf></bsdf>
 </shape>
 <emitter type="constant"/>
 </scene>"""
 
 
-def test_they_are_those_of_the_pixels_where_nothing_changes_within_one():
-    renderer, camera = AnalyticRenderer(room(), chunk=CHUNK), room_walk(1).cameras[0]
+def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
+    renderer, camera = AnalyticRenderer(room()), room_walk(1).cameras[0]
     albedo, normal = guides(renderer, camera, seed=0, frame=1, chunk=CHUNK)
     seen = find_geometry(renderer, camera)
     inner = np.zeros(seen.shape_index.shape, bool)
     same = seen.shape_index[1:-1, 1:-1]
-    around = [
-        np.roll(seen.shape_index, shift, (0, 1))[1:-1, 1:-1] for shift in ((1, 0), (-1, 0), (0, 1), (0, -1))
-    ]
+    shifts = ((1, 0), (-1, 0), (0, 1), (0, -1))
+    around = [np.roll(seen.shape_index, shift, (0, 1))[1:-1, 1:-1] for shift in shifts]
     inner[1:-1, 1:-1] = np.all([same == other for other in around], axis=0)
-    flat = inner & (seen.shape_index != 6)  # the ball's normal changes within a pixel
-    assert np.abs(normal - seen.normal)[flat].max() < 1e-4
+    is_flat = inner & (seen.shape_index != 6)  # the ball's normal changes within a pixel
+    assert np.abs(normal - seen.normal)[is_flat].max() < 1e-4
     assert np.median(np.abs(albedo - seen.albedo)[inner]) < 0.01
     # Neither chunks nor anything but the seed change them.
     again = guides(renderer, camera, seed=0, frame=1, chunk=5000)
@@ -47,12 +44,12 @@ def test_they_are_those_of_the_pixels_where_nothing_changes_within_one():
 
 
 @pytest.mark.parametrize("frame", [1, 2])
-def test_a_mirror_shows_what_is_behind(tmp_path, frame):
+def test_a_mirror_shows_the_reflected_surface(tmp_path, frame):
     file = tmp_path / "mirror.xml"
     file.write_text(MIRROR)
-    renderer = open_renderer(file, TraceSettings())
+    renderer = Scene(file).open(Settings())
     camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 30.0, 32, 24)
     albedo, normal = guides(renderer, camera, seed=0, frame=frame, chunk=CHUNK)
-    assert albedo.reshape(-1, 3).min(axis=0) == pytest.approx([0.7, 0.2, 0.1], abs=1e-3)
-    assert albedo.reshape(-1, 3).max(axis=0) == pytest.approx([0.7, 0.2, 0.1], abs=1e-3)
+    for pick in (np.min, np.max):
+        assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx([0.7, 0.2, 0.1], abs=1e-3)
     assert np.abs(normal[..., 2] + 1.0).max() < 1e-4  # the wall's, which faces the mirror

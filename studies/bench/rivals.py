@@ -1,0 +1,113 @@
+"""Rivals as methods: path tracing denoised frame by frame, and keyframes interpolated by FFmpeg."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from enfilade.images import exact_fps
+from enfilade.images.interpolate import interpolate, why_no_interpolation
+from enfilade.methods.analysis import Analysis, keyframes_of
+from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
+from enfilade.methods.denoise import denoise, why_no_denoiser
+from enfilade.methods.reference import Reference
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Frame, Provenance
+from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
+from studies.bench.guides import guides
+
+QUALITIES = ("high", "fast")  # of Open Image Denoise: its best, and five times cheaper
+
+
+@dataclass(frozen=True)
+class DenoiserSettings(Section):
+    """Open Image Denoise, as a rival."""
+
+    table = "denoiser"
+
+    quality: str = option("high", "Quality of its networks.", choices=("high", "balanced", "fast"))
+
+
+class Denoised(Method):
+    """Every frame path traced and denoised by itself, with guides without noise."""
+
+    name = "denoised"
+    settings = (*Reference.settings, DenoiserSettings)
+    passes = Reference.passes
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """One task a frame."""
+        return Reference().tasks(analysis)
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Trace and denoise a frame."""
+        traced = Reference().run(task, inputs, walk)
+        frame = traced.records[task.frame]
+        albedo, normal = guides(
+            walk.renderer,
+            walk.path.cameras[task.frame],
+            seed=walk.settings[TraceSettings].seed,
+            frame=walk.path.numbers[task.frame],
+            chunk=walk.settings[LimitSettings].paths_in_flight,
+        )
+        color = denoise(frame.color, albedo, normal, quality=walk.settings[DenoiserSettings].quality)
+        return Output({task.frame: Frame(color, frame.provenance)}, traced.facts)
+
+
+class Interpolated(Method):
+    """Keyframes path traced, the frames between them made by FFmpeg from the images alone.
+
+    The keyframes are the initial ones of the paper's method. A task holds all frames of a shot in memory.
+    """
+
+    name = "interpolated"
+    settings = (*Reference.settings, KeyframeSettings, ViewingSettings)
+    passes = (
+        Pass("keyframes", Frame),
+        Pass("shots", Frame, reads=("keyframes",)),
+        Pass(FRAMES, Frame, reads=("shots",)),
+    )
+
+    def tasks(self, analysis: Analysis) -> Iterable[Task]:
+        """Keyframes; a task for each shot; its frames."""
+        shots = zip(analysis.path.shots(), analysis.segments(), strict=True)
+        for number, (shot, segments) in enumerate(shots):
+            keyframes = [TaskId("keyframes", frame) for frame in keyframes_of(segments)]
+            yield from (Task("keyframes", of.frame, number) for of in keyframes)
+            yield Task("shots", shot.start, number, tuple(keyframes))
+            yield from (Task(FRAMES, frame, number, (TaskId("shots", shot.start),)) for frame in shot)
+
+    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
+        """Do a task."""
+        match task.pass_name:
+            case "keyframes":
+                return Reference().run(task, inputs, walk)
+            case "shots":
+                return Output(_interpolated(task, inputs, walk))
+            case _:
+                return Output({task.frame: inputs.record("shots", task.frame)})
+
+
+def _interpolated(task: Task, inputs: Inputs, walk: Walkthrough) -> dict[int, Frame]:
+    """All frames of a shot; keyframes and their repetitions as they were traced."""
+    path, shot = walk.path, walk.path.shots()[task.shot]
+    chosen = keyframes_of(inputs.analysis.segments()[task.shot])
+    traced = {frame: inputs.record("keyframes", frame) for frame in chosen}
+    static = {frame: path.static_frame(frame) for frame in shot}
+    keyframes = {frame: traced[first] for frame, first in static.items() if first in traced}
+    frames = {frame: keyframes[max(k for k in keyframes if k <= frame)] for frame in shot}
+    if len(keyframes) > 1:
+        # The filter takes images as they are displayed.
+        exposure = np.float32(2.0 ** walk.settings[ViewingSettings].exposure_ev)
+        shown = {frame: of.color * exposure for frame, of in keyframes.items()}
+        reused = np.full((path.height, path.width), Provenance.REUSED, np.uint8)
+        for frame, image in interpolate(shown, exact_fps(path.fps)):
+            frames[frame] = keyframes.get(frame, Frame(image / exposure, reused))
+    return frames
+
+
+def why_missing(family: str) -> str:
+    """Why a rival can't be had here, and how to get it; empty where it can."""
+    return {"denoised": why_no_denoiser, "interpolated": why_no_interpolation}.get(family, str)()

@@ -1,0 +1,34 @@
+"""Progress of loops and of several runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from enfilade.monitor import Monitor
+
+T = TypeVar("T")
+
+
+def counted(items: Sequence[T], name: str, monitor: Monitor) -> Iterator[T]:
+    """Iterate over the items of a stage and report each when it is done."""
+    for done, item in enumerate(items, 1):
+        yield item
+        monitor.progress(name, done, len(items))
+
+
+@dataclass(frozen=True)
+class Prefixed:
+    """A monitor that puts a prefix before the names of stages: several runs have the same ones."""
+
+    monitor: Monitor
+    prefix: str
+
+    def progress(self, name: str, done: int, total: int) -> None:
+        """Show how many of the items of a stage are done."""
+        self.monitor.progress(f"{self.prefix}: {name}", done, total)
+
+    def say(self, text: str) -> None:
+        """Show a message."""
+        self.monitor.say(f"{self.prefix}: {text}")
