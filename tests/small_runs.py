@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from enfilade.pipeline.job import Job
+from enfilade.pipeline.walkthrough import render
+from enfilade.store import Run
 
 from enfilade.camera.path import CameraPath
 from enfilade.images import read_exr
 from enfilade.monitor import Silence
-from enfilade.pipeline.job import Job
-from enfilade.pipeline.walkthrough import render
 from enfilade.settings import Settings
-from enfilade.store import Run
 from support.analytic_scene import AnalyticScene, write_scene
 
 # A screen of 96 x 72 px, 3 cm wide, seen from half a metre: the paper's 28 pixels a degree, so that a

@@ -90,7 +90,7 @@ def bench(
     Returns
     -------
     dict
-        The contents of ``bench.json``; `docs/bench.md` describes it.
+        The contents of ``bench.json``; `studies/bench/README.md` describes it.
 
     Raises
     ------
@@ -164,7 +164,7 @@ class _Bench:
         folder, job = self._reference(pixel_filter), replace(self._job, method="reference", settings=settings)
         _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
         run = RunFolder.read(folder)
-        return {**_cost(run, UNCHARGED), "variant": run.identity["renderer"]["variant"]}
+        return {**_cost(run, UNCHARGED), "variant": run.identity["scene"]["variant"]}
 
     def row(self, one: Configuration) -> dict[str, Any]:
         """Render and measure a configuration: its row of the result."""

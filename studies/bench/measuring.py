@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison.measures import SCALES, Shown, open_judge, seen_before, shown
+from enfilade.comparison.measures import SCALES, DisplayedPair, display_pair, open_measure, visible_before
 from enfilade.comparison.measures import why_missing as why_no_measure
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
@@ -74,22 +74,22 @@ def measure(
         By measure: ``score`` and ``per_frame``, None where there is no number (identical; a first frame).
     """
     pursuit = Pursuit(job.settings[MetricSettings].metering.value)
-    measures = {name: open_judge(name, job.viewing, pursuit=pursuit) for name in names}
+    measures = {name: open_measure(name, job.viewing, pursuit=pursuit) for name in names}
     values: dict[str, list[float | None]] = {name: [] for name in names}
     for done, pair in enumerate(pairs(test, reference, job, share=share), 1):
         for name, one in measures.items():
-            values[name].append(one.judge(pair))
+            values[name].append(one.measure(pair))
         monitor.progress("measures", done, len(job.path))
     return {
         name: {
-            "score": _finite(measures[name].pooled(values[name])),
+            "score": _finite(measures[name].pool(values[name])),
             "per_frame": [None if value is None else _finite(value) for value in values[name]],
         }
         for name in names
     }
 
 
-def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[Shown]:
+def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[DisplayedPair]:
     """Frames of two run folders side by side, in order; see :func:`measure`."""
     path, exposure_ev = job.path, job.settings[ViewingSettings].exposure_ev
     runs = RunFolder.read(test), RunFolder.read(reference)
@@ -98,11 +98,14 @@ def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Itera
         tested, layers = (read_exr(run.file_of(FRAMES, number)) for run in runs)
         before, after = path.neighbours(frame)
         flow = Flow(layers["backward"], layers["forward"], before is not None, after is not None)
-        seen = seen_before(layers, last) if last is not None and before is not None else None
+        is_visible = visible_before(layers, last) if last is not None and before is not None else None
         color, wanted = (np.ascontiguousarray(of["RGB"], np.float32) for of in (tested, layers))
         if share != 1.0:
             color = wanted + np.float32(share) * (color - wanted)
-        yield shown(color, wanted, job.viewing, exposure_ev=exposure_ev, flow=flow, seen_before=seen)
+        viewing = job.viewing
+        yield display_pair(
+            color, wanted, viewing, exposure_ev=exposure_ev, flow=flow, visible_before=is_visible
+        )
         last = layers
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from enfilade.images import exact_fps
-from enfilade.images.interpolate import interpolate, why_no_interpolation
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
 from enfilade.methods.denoise import denoise, why_no_denoiser
@@ -17,6 +16,7 @@ from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Frame, Provenance
 from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
 from studies.bench.guides import guides
+from studies.bench.interpolate import interpolate, why_no_interpolation
 
 QUALITIES = ("high", "fast")  # of Open Image Denoise: its best, and five times cheaper
 

@@ -14,11 +14,12 @@ from enfilade.reports.charts import (
     ORANGE,
     VERMILION,
     Figure,
+    Panel,
+    Series,
+    draw,
     legend,
-    mark_keyframes,
     new_figure,
     save,
-    stack,
 )
 
 DPI = 110
@@ -53,18 +54,26 @@ def draw_walk(of: Values, scene: str, file: Path) -> Path:
     rows, limit = of["per_frame"], of["split_percent"]
     panels = ("mean image velocity", "predictions", "predictions without noise", "pixels traced, by reason")
     figure, axes = new_figure(scene, panels)
-    frames = [row["frame"] for row in rows]
-    velocity = [row["velocity_deg_s"] for row in rows]
-    axes[0].plot(frames, velocity, color=BLUE, linewidth=1.5, label="mean over the image")
-    mark_keyframes(axes[0], frames, velocity, [row["frame"] for row in rows if row["keyframe"]])
+    velocity = {row["frame"]: row["velocity_deg_s"] for row in rows}
+    keyframes = {row["frame"]: velocity[row["frame"]] for row in rows if row["keyframe"]}
+    curves = (
+        Series("mean over the image", BLUE, velocity),
+        Series("keyframes", VERMILION, keyframes, mark="triangle"),
+    )
+    bars = tuple(
+        Series(name, color, {row["frame"]: row[name] for row in rows}, mark="bar")
+        for name, color in TRACED.items()
+    )
+    draw(axes[0], Panel("velocity", panels[0], "deg/s", "", curves, 1.1 * max(velocity.values())))
+    top = 1.1 * max(sum(row[name] for name in TRACED) for row in rows)
+    draw(axes[3], Panel("traced", panels[3], "%", "", bars, top))
     axes[0].set_ylabel("velocity, deg/s")
     for ax, segments in zip(axes[1:3], (of["segments"], of["plain_segments"]), strict=True):
         _predictions(ax, segments, limit)
-    stack(axes[3], frames, {name: (color, [row[name] for row in rows]) for name, color in TRACED.items()})
     axes[3].set_ylabel("traced, % of pixels")
     for ax in axes:
         ax.set_ylim(bottom=0.0)
-        legend(ax, columns=5)
+        legend(ax)
     return save(figure, file)
 
 

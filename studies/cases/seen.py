@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from enfilade.kernels.tone import display_luminance
-from enfilade.metric import Aqm, MetricOptions, Pursuit
+from enfilade.metric import Aqm, Pursuit
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
 from enfilade.settings import MetricSettings, Settings, ViewingSettings
@@ -87,11 +87,11 @@ class Viewer:
 
     @cached_property
     def _paper(self) -> Aqm:
-        return Aqm(self.viewing, mask_slope=self.settings[MetricSettings].mask_slope)
+        return Aqm.paper(self.viewing, mask_slope=self.settings[MetricSettings].mask_slope)
 
     @cached_property
     def _modern(self) -> Aqm:
-        return Aqm(self.viewing, options=MetricOptions.modern())
+        return Aqm.modern(self.viewing)
 
 
 def score_in(jnd: F32, where: Mask) -> float | None:

@@ -13,10 +13,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.metric import Fitted
+from enfilade.metric import Aqm, ModernMetric, Transducer
+from enfilade.metric.aperture import APERTURE_SIGMA_DEG
 from enfilade.monitor import Monitor, Silence
+from enfilade.viewing import Viewing
 from studies.observers import foley, modelfest
-from studies.observers.mode import Mode
+from studies.observers.mode import MODERN, Mode
 from studies.progress import counted
 
 __all__ = ["APERTURES_DEG", "TRANSDUCERS", "Fit", "fit", "measure"]
@@ -115,13 +117,20 @@ def _between(name: str, data: str, chosen: float, own: Float64Array, others: Flo
     return Fit(name, data, (chosen,), mine, float(own[best]), asked, asked)
 
 
-def measure(mode: Mode, monitor: Monitor) -> tuple[Fit, ...]:
-    """Fit all that was fitted anew.
+def _with(transducer: Transducer, aperture_sigma_deg: float = APERTURE_SIGMA_DEG) -> Mode:
+    """The modern mode with other constants."""
+
+    def aqm(viewing: Viewing) -> Aqm:
+        return Aqm(ModernMetric(viewing, transducer=transducer, aperture_sigma_deg=aperture_sigma_deg))
+
+    return replace(MODERN, aqm=aqm)
+
+
+def measure(monitor: Monitor) -> tuple[Fit, ...]:
+    """Fit all fitted constants of the modern mode anew.
 
     Parameters
     ----------
-    mode : Mode
-        The metric; its own `fitted` must be among the candidates.
     monitor : Monitor
         Is told of each candidate.
 
@@ -129,29 +138,24 @@ def measure(mode: Mode, monitor: Monitor) -> tuple[Fit, ...]:
     -----
     About a minute and a half of CPU time.
     """
-
-    def with_numbers(**numbers: float) -> Mode:
-        return replace(mode, fitted=replace(mode.fitted, **numbers))
-
     masking = [
-        foley.measure(with_numbers(neighbour_share=share, semi_saturation=z), Silence()).error_db
-        for share, z in counted(TRANSDUCERS, f"fits of the transducer, {mode.name}", monitor)
+        foley.measure(_with(Transducer(z, fraction)), Silence()).error_db
+        for fraction, z in counted(TRANSDUCERS, "fits of the transducer", monitor)
     ]
     thresholds, masked = [], []
-    for sigma_deg in counted(APERTURES_DEG, f"fits of the aperture, {mode.name}", monitor):
-        other = with_numbers(aperture_sigma_deg=sigma_deg)
+    for sigma_deg in counted(APERTURES_DEG, "fits of the aperture", monitor):
+        other = _with(Transducer(), sigma_deg)
         thresholds.append(-modelfest.measure(other, Silence()).error_db)
         masked.append(foley.measure(other, Silence()).error_db)
-    has: Fitted = mode.fitted
     apertures = tuple((sigma_deg,) for sigma_deg in APERTURES_DEG)
-    chosen = has.aperture_sigma_deg
+    has, chosen = Transducer(), APERTURE_SIGMA_DEG
     by_modelfest, by_foley = _rms(np.array(thresholds)), _rms(np.array(masked))
     return (
         fit(
-            "transducer: neighbour_share, semi_saturation",
+            "transducer: neighbour_fraction, semi_saturation",
             "Foley, each mask by the others",
             TRANSDUCERS,
-            (has.neighbour_share, has.semi_saturation),
+            (has.neighbour_fraction, has.semi_saturation),
             np.array(masking),
         ),
         fit(

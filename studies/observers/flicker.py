@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.ndimage
 
-from enfilade.metric import sequence_score
+from enfilade.metric import SequenceAqm, sequence_score
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
@@ -136,7 +136,7 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
     monitor : Monitor
         Is told of each example.
     """
-    found = {}
+    pairs = {}
     for example, (_, pan_px) in counted(list(EXAMPLES.items()), f"flicker, {mode.name}", monitor):
         viewing = screen(SIZE_PX, PIXELS_PER_DEGREE, fps=FPS)
         flow_px = np.zeros((SIZE_PX, SIZE_PX, 2), dtype=np.float32)
@@ -144,8 +144,8 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
         frames = sequences(example)
         scores = []
         for kind in (1, 2):
-            judge = mode.sequence_judge(viewing)
-            judged = [judge.judge(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames]
-            scores.append(sequence_score(comparison.score for comparison in judged))
-        found[example] = Pair(*scores)
-    return found
+            metric = SequenceAqm(mode.aqm(viewing))
+            found = (metric.compare(frame[kind], frame[0], backward_flow_px=flow_px) for frame in frames)
+            scores.append(sequence_score(comparison.score for comparison in found))
+        pairs[example] = Pair(*scores)
+    return pairs

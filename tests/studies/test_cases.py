@@ -13,7 +13,6 @@ from enfilade.camera.path import Segment
 from enfilade.errors import InputError, RunFolderError
 from enfilade.monitor import Silence
 from enfilade.records import SurfaceClass
-from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 from enfilade.settings import KeyframeSettings, Placement
 from scenes_analytic import room, room_walk
 from small_walks import room_job, windows_of
@@ -25,6 +24,7 @@ from studies.cases.runner import ITEMS, measure
 from studies.cases.seen import score_in
 from studies.cases.speed import mean_cost, spread_over
 from studies.cases.terms import TERMS
+from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 
 TEMPLATE = Path(__file__).parents[2] / "studies" / "cases" / "README.md"
 TINY = dataclasses.replace(
