@@ -192,9 +192,9 @@ def _blocks(image: F32) -> F32:
 def _change(image: F32, before: F32, backward: F32) -> float:
     """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image."""
     fetched, is_inside = moved(before, backward)
-    share = float(_blocks(is_inside.astype(np.float32)).mean())
+    covered = float(_blocks(is_inside.astype(np.float32)).mean())
     change = _blocks(np.where(is_inside, image - fetched, np.float32(0.0)))
-    return float(np.abs(change).mean()) / share if share else 0.0
+    return float(np.abs(change).mean()) / covered if covered else 0.0
 
 
 class _FromLayers:

@@ -129,8 +129,8 @@ def _trust(image: U8, other: U8, compensated: U8) -> F32:
         cv2.GaussianBlur(_blocks(cv2.absdiff(image, of).astype(np.float32)), (0, 0), sigma)
         for of in (other, compensated)
     )
-    share = after / np.maximum(before, np.float32(1e-3))
-    trust = np.clip((REFUSED - share) / (REFUSED - TRUSTED), 0.0, 1.0)
+    remainder = after / np.maximum(before, np.float32(1e-3))
+    trust = np.clip((REFUSED - remainder) / (REFUSED - TRUSTED), 0.0, 1.0)
     return np.asarray(cv2.resize(trust, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 

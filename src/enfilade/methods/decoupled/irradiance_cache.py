@@ -67,11 +67,11 @@ class IrradianceCache:
         """
         total, weight = Array3f(0), Float(0)
         valid = Float(0)
-        for one, share in zip(self.images, self.weights, strict=True):
+        for one, own in zip(self.images, self.weights, strict=True):
             found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
-            total += share * sum(found.totals, Array3f(0))
-            weight += share * found.weight
-            valid += dr.select(share > 0.0, found.weight, 0.0)
+            total += own * sum(found.totals, Array3f(0))
+            weight += own * found.weight
+            valid += dr.select(own > 0.0, found.weight, 0.0)
         is_found = valid > MIN_WEIGHT
         return dr.select(is_found, total / weight, 0.0), is_found
 
@@ -240,11 +240,11 @@ def _averaged(
     totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
     weight, valid = Float(0), Float(0)
     dr.eval(position, own)
-    for one, share in zip(images, weights, strict=True):
+    for one, of_image in zip(images, weights, strict=True):
         # Look up the image; coarser ones weigh less.
         found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
         its = footprint(position, normal, one.eye, one.direction_from_pixel)
-        counts = opaque(float(share)) * dr.minimum(own / its, 1.0)
+        counts = opaque(float(of_image)) * dr.minimum(own / its, 1.0)
 
         # Accumulate its layers.
         for layer in layers:

@@ -112,14 +112,14 @@ def lookup(
         is_same &= (dr.abs(distance) <= tolerance) & (depth > 0.0)
 
         # Weight it, and accumulate its layers.
-        share = dr.select(is_same, tap.weight + MIN_TAP_WEIGHT, 0.0)
+        of_tap = dr.select(is_same, tap.weight + MIN_TAP_WEIGHT, 0.0)
         if image.normals is not None:
             other = _unpacked(dr.gather(UInt, image.normals, tap.lane, is_inside))
-            share *= dr.maximum(dr.dot(normal, other) * scale, 0.0)
+            of_tap *= dr.maximum(dr.dot(normal, other) * scale, 0.0)
         for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
-            totals[layer] += share * dr.gather(Array3f, value, tap.lane, is_same)
-            variances[layer] += share * dr.gather(Float, variance, tap.lane, is_same)
-        weight += share
+            totals[layer] += of_tap * dr.gather(Array3f, value, tap.lane, is_same)
+            variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)
+        weight += of_tap
     return Found(tuple(totals), tuple(variances), weight)
 
 

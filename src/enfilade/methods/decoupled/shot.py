@@ -116,12 +116,12 @@ class Shot:
         The weights change continuously along the path.
         """
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
-        images, shares = [self._accumulated_image(f) for f in weights], list(weights.values())
-        view = reproject_to(self.walk.view(frame).geometry, images, shares)
+        images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
+        view = reproject_to(self.walk.view(frame).geometry, images, own)
         # Fill up to a fixed number of images, so that one kernel serves all frames.
         missing = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES - len(images)
-        images, shares = [*images, *[images[0]] * missing], [*shares, *[0.0] * missing]
-        return IrradianceCache.of([view], [1.0]), IrradianceCache.of(images, shares, self.hash_grid(frame))
+        images, own = [*images, *[images[0]] * missing], [*own, *[0.0] * missing]
+        return IrradianceCache.of([view], [1.0]), IrradianceCache.of(images, own, self.hash_grid(frame))
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
         """Diffuse pixels of a frame that neither the nearest keyframes nor other images show, (H, W)."""

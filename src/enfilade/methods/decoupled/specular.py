@@ -119,7 +119,7 @@ def accumulate_temporally(
     total, weight = Array3f(color), dr.ones(Float, dr.width(color))
     luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, luminance)
-    for other, share in others:
+    for other, of_frame in others:
         # Reproject.
         found = lookup(position, normal, here.shape_indices, other, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
@@ -128,7 +128,7 @@ def accumulate_temporally(
         # Weight by the difference, in units of the noise.
         difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - luminance)
         counts = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
-        counts = dr.select(found.weight > MIN_WEIGHT, opaque(share) * counts, 0.0)
+        counts = dr.select(found.weight > MIN_WEIGHT, opaque(of_frame) * counts, 0.0)
 
         # Accumulate.
         total += counts * value

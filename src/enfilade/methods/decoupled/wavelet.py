@@ -72,9 +72,9 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
     """
     related = Float(1)  # variance of the result over that of independent pixels
     for level in range(levels):
-        color, variance, share = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
+        color, variance, fraction = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
         part = INDEPENDENT[level] if level < len(INDEPENDENT) else INDEPENDENT_BEYOND
-        related *= share ** (part - 1.0)
+        related *= fraction ** (part - 1.0)
         dr.eval(color, variance, related)
     return color, variance * related
 
@@ -122,12 +122,12 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
             # Accumulate.
-            share = surface * dr.exp(-difference)
-            total += share * other
-            total_variance += share * share * dr.gather(Float, variance, tap)
-            squares += share * share
+            of_tap = surface * dr.exp(-difference)
+            total += of_tap * other
+            total_variance += of_tap * of_tap * dr.gather(Float, variance, tap)
+            squares += of_tap * of_tap
             weight += surface
-            taken += share
+            taken += of_tap
 
     # Give the weight of taps that differ too much to the pixel itself: leaving them out of the mean would
     # lose the energy of rare bright samples.
@@ -228,9 +228,9 @@ def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sig
             i = dr.clip(Int(column) + across, 0, columns - 1)
             j = dr.clip(Int(row) + down, 0, rows - 1)
             tap = UInt(j * columns + i)
-            share = math.exp(-(across**2 + down**2) / (2.0 * sigma**2))
-            total += share * dr.gather(Array3f, color, tap)
-            weight += share
+            of_tap = math.exp(-(across**2 + down**2) / (2.0 * sigma**2))
+            total += of_tap * dr.gather(Array3f, color, tap)
+            weight += of_tap
             is_edge |= dr.gather(UInt, shape_indices, tap) != shape_indices
     return dr.select(is_edge, total / weight, color)
 

@@ -41,9 +41,9 @@ def composite(
     is_disoccluded = total <= 0.0
 
     # Blend.
-    share = np.where(is_disoccluded, 0.0, weight_before / np.where(is_disoccluded, 1.0, total))[..., None]
-    other = np.where(is_disoccluded[..., None], 0.0, 1.0 - share)
-    color = share * before.color + other * after.color
+    first = np.where(is_disoccluded, 0.0, weight_before / np.where(is_disoccluded, 1.0, total))[..., None]
+    last = np.where(is_disoccluded[..., None], 0.0, 1.0 - first)
+    color = first * before.color + last * after.color
     return color.astype(np.float32), is_disoccluded
 
 

@@ -91,8 +91,8 @@ def _is_visible(jnd: F32, region: Mask, least: float, settings: MaskSettings) ->
 
     # Compare the percentage above 1 JND.
     size = np.count_nonzero(region)
-    share = np.count_nonzero(region & (jnd > 1.0)) * 100.0
-    if size >= least and share > settings.specular_percent * size:
+    percent = 100.0 * np.count_nonzero(region & (jnd > 1.0)) / max(size, 1)
+    if size >= least and percent > settings.specular_percent:
         return True
 
     # Find a group above 2 JND.

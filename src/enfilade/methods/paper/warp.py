@@ -158,9 +158,9 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
 
     # Normalize, and clear disoccluded pixels.
     is_disoccluded = is_empty | (total <= 0.0)
-    share = dr.select(is_disoccluded, 0.0, 1.0 / total)
+    inverse = dr.select(is_disoccluded, 0.0, 1.0 / total)
     magnification = dr.select(is_disoccluded, 0.0, det)
-    color, variance = color * share, variance * share * dr.maximum(det, 1.0)
+    color, variance = color * inverse, variance * inverse * dr.maximum(det, 1.0)
     variance = dr.select(is_disoccluded, 0.0, variance)
     depth = dr.select(is_disoccluded | (depth >= INFINITE), 0.0, depth)
     shape_index = dr.select(is_disoccluded, 0, shape_index)
