@@ -90,7 +90,7 @@ def bench(
     Returns
     -------
     dict
-        The contents of ``bench.json``; `docs/bench.md` describes it.
+        The contents of ``bench.json``; `studies/bench/README.md` describes it.
 
     Raises
     ------
