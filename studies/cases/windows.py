@@ -104,7 +104,7 @@ class Windows:
         """A frame composited from the keyframes around it, disocclusions traced: I_ibr of Fig. 9.
 
         The keyframes are the initial ones: no segment is split. The variance is the density of the noise, as
-        warped (docs/noise.md).
+        warped (:mod:`enfilade.metric.noise`).
         """
         segments = (s for shot in self.analysis.segments() for s in shot)
         segment = next((s for s in segments if frame in s.inbetweens), None)
