@@ -111,7 +111,9 @@ def test_folders_without_a_run_are_refused(run, tmp_path, command):
         assert str(folder) in result.stderr
 
 
-@pytest.mark.parametrize(("variant", "chosen"), [("cuda_ad_rgb", "gpu"), ("llvm_ad_rgb", "cpu"), (None, "auto")])
+@pytest.mark.parametrize(
+    ("variant", "chosen"), [("cuda_ad_rgb", "gpu"), ("llvm_ad_rgb", "cpu"), (None, "auto")]
+)
 def test_work_uses_the_device_of_the_run(tmp_path, variant, chosen):
     if variant:
         RunFolder.create(tmp_path, {"scene": {"variant": variant}}).close()

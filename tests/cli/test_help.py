@@ -34,7 +34,9 @@ def test_help_answers(run, arguments):
 
 
 def test_render_has_at_most_30_flags():
-    options = [p for p in main.get_command(click.Context(main), "render").params if isinstance(p, click.Option)]
+    options = [
+        p for p in main.get_command(click.Context(main), "render").params if isinstance(p, click.Option)
+    ]
     assert len(options) <= 30
 
 

@@ -41,7 +41,9 @@ def test_precedence(settings, tmp_path):
     assert (made[KeyframeSettings].spacing, made[KeyframeSettings].adaptation) == (40, 0.0)
     assert (made[SamplingSettings].spp, made[TraceSettings].seed) == (8, 7)
     # A flag that repeats the default wins, too.
-    assert settings("--settings", file, "--set", "keyframes.spacing=25", *PAPER)[KeyframeSettings].spacing == 25
+    assert (
+        settings("--settings", file, "--set", "keyframes.spacing=25", *PAPER)[KeyframeSettings].spacing == 25
+    )
 
 
 def test_assignments(settings):

@@ -19,7 +19,7 @@ from enfilade.gbuffer import find_geometry
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from keyframes_analytic import projected
+from support.analytic_truth import projected
 
 HEAD = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="6"/></integrator>

@@ -2,7 +2,7 @@
 
 import pytest
 
-from balls import MATERIALS, front_camera, opened_scene, traced_irradiance
+from support.material_scene import MATERIALS, front_camera, opened_scene, traced_irradiance
 
 
 @pytest.fixture(scope="session")

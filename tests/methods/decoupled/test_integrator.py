@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from balls import MATERIALS, PIXEL_ANGLE, front_camera, opened_scene, pixels_of, traced_irradiance
 from enfilade.arrays import lanes
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, positions
@@ -15,6 +14,14 @@ from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from support.material_scene import (
+    MATERIALS,
+    PIXEL_ANGLE,
+    front_camera,
+    opened_scene,
+    pixels_of,
+    traced_irradiance,
+)
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 EMPTY = IrradianceCache()
@@ -55,7 +62,9 @@ def integrator_of(renderer) -> Integrator:
     return Integrator(renderer)
 
 
-def estimated(radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None):
+def estimated(
+    radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None
+):
     estimate = Estimate(
         camera,
         pixels_of(camera)[:pixels],
