@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 
 from enfilade.camera.path import Segment
 from enfilade.errors import InputError, RunFolderError
@@ -23,6 +22,7 @@ from studies.cases.runner import ITEMS, measure
 from studies.cases.seen import score_in
 from studies.cases.speed import mean_cost, spread_over
 from studies.cases.terms import TERMS
+from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 from support.example_scenes import room, room_walk
 from support.study_runs import room_job, windows_of
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from enfilade.scene.analytic import AnalyticRenderer
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
 from studies.bench.guides import guides
+from support.analytic import AnalyticRenderer
 from support.example_scenes import room, room_walk
 
 CHUNK = 1 << 20

@@ -4,8 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from enfilade.scene.analytic import AnalyticRenderer
-from enfilade.scene.analytic_scene import AnalyticScene, Checker, Material, Quad
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, image_flow
@@ -16,6 +14,8 @@ from studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from studies.cases.seen import Viewer, score_in, visible_percent
 from studies.cases.supports import uniform
 from studies.cases.windows import probes_of
+from support.analytic import AnalyticRenderer
+from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 from support.example_scenes import room
 from support.study_runs import windows_of
 
