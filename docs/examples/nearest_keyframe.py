@@ -4,7 +4,7 @@ Keyframes are path traced. A pixel of another frame takes the colour of the keyf
 same point. Where the keyframe shows another surface (a disocclusion), and in the sky, the pixel is path
 traced. Highlights and reflections of reused pixels are those of the keyframe. In the folder of this file:
 
-    PYTHONPATH=. enfilade render scene.xml --path path.json --method nearest_keyframe:NearestKeyframe
+    PYTHONPATH=. enfilade render scene.xml --path path.json --out run --method nearest_keyframe:NearestKeyframe
 """
 
 import numpy as np

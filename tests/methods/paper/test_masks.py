@@ -89,39 +89,26 @@ def test_shapes_that_are_not_reusable_are_traced():
     np.testing.assert_array_equal(specular_pixels(geometry, frozenset()), shape_index > 1)
 
 
-def test_equal_images_are_reusable():
-    assert traced_shapes(differences()) == frozenset()
+ROWS = (slice(5, 7), slice(3, 13), 1.5)  # 20 of 100 pixels of the first pane
+VISIBILITY = {
+    "equal images": ((), set()),
+    "a group above 2 JND": (((slice(6, 8), slice(4, 6), 2.5),), {2}),
+    "a group on the other pane": (((slice(6, 8), slice(20, 22), 2.5),), {3}),
+    "2 JND itself": (((slice(6, 8), slice(4, 6), 2.0),), set()),
+    "outliers": (tuple((row, column, 9.0) for row in (6, 9) for column in range(3, 13, 2)), set()),
+    "three pixels": (((6, slice(4, 7), 9.0),), set()),
+    "four pixels": (((6, slice(4, 8), 9.0),), {2}),
+    "four pixels that touch at corners": (tuple((6 + k, 4 + k, 3.0) for k in range(4)), {2}),
+    "a fifth above 1 JND": ((ROWS,), set()),
+    "a quarter above 1 JND": ((ROWS, (7, slice(3, 8), 1.5)), set()),
+    "more than a quarter above 1 JND": ((ROWS, (7, slice(3, 9), 1.5)), {2}),
+}
 
 
-def test_a_group_above_2_jnd_is_traced():
-    assert traced_shapes(differences((slice(6, 8), slice(4, 6), 2.5))) == {2}
-    assert traced_shapes(differences((slice(6, 8), slice(20, 22), 2.5))) == {3}
-
-
-def test_two_jnd_are_not_above_the_threshold():
-    assert traced_shapes(differences((slice(6, 8), slice(4, 6), 2.0))) == frozenset()
-
-
-def test_outliers_are_not_a_group():
-    scattered = differences(*((6, c, 9.0) for c in range(3, 13, 2)), *((9, c, 9.0) for c in range(3, 13, 2)))
-    assert traced_shapes(scattered) == frozenset()
-    three = differences((6, slice(4, 7), 9.0))
-    assert traced_shapes(three) == frozenset()
-    four = differences((6, slice(4, 8), 9.0))
-    assert traced_shapes(four) == {2}
-
-
-def test_groups_are_eight_connected():
-    diagonal = differences(*((6 + k, 4 + k, 3.0) for k in range(4)))
-    assert traced_shapes(diagonal) == {2}
-
-
-def test_more_than_a_quarter_above_1_jnd_is_traced():
-    rows = differences((slice(5, 7), slice(3, 13), 1.5))  # 20 of 100
-    assert traced_shapes(rows) == frozenset()
-    quarter = rows + differences((7, slice(3, 8), 1.5))  # 25 of 100: not more than a quarter
-    assert traced_shapes(quarter) == frozenset()
-    assert traced_shapes(quarter + differences((7, 8, 1.5))) == {2}
+@pytest.mark.parametrize("name", VISIBILITY)
+def test_visible_differences_of_specular_shapes(name):
+    places, expected = VISIBILITY[name]
+    assert traced_shapes(differences(*places)) == expected
 
 
 def test_the_thresholds_are_the_settings():
