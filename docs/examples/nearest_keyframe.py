@@ -2,9 +2,10 @@
 
 Keyframes are path traced. A pixel of another frame takes the colour of the keyframe's pixel that shows the
 same point. Where the keyframe shows another surface (a disocclusion), and in the sky, the pixel is path
-traced. Highlights and reflections of reused pixels are those of the keyframe. In the folder of this file:
+traced. Highlights and reflections of reused pixels are those of the keyframe. With this folder in
+``PYTHONPATH``:
 
-    PYTHONPATH=. enfilade render scene.xml --path path.json --out run --method nearest_keyframe:NearestKeyframe
+    enfilade render scene.xml --path path.json --out run --method nearest_keyframe:NearestKeyframe
 """
 
 import numpy as np
