@@ -33,6 +33,7 @@ class Purpose(IntEnum):
     GUIDE = 8
     PREPASS = 9
     PREPASS_HASH_GRID = 10
+    SECOND_PILOT = 11
 
 
 @dataclass(frozen=True)

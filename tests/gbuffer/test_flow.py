@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import image_flow
 from enfilade.records import Flow
-from keyframes_analytic import first_hits, geometry_of, pixel_centres, projected, ray_directions
-from scenes_analytic import ball, room, room_walk, slide, wall
 from support.analytic_scene import AnalyticScene, Plane
+from support.analytic_truth import first_hits, geometry_of, pixel_centres, projected, ray_directions
+from support.example_scenes import ball, room, room_walk, slide, wall
 
 PROMISED_PX = 1e-3
 

@@ -6,9 +6,9 @@ import pytest
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import positions
 from enfilade.records import SurfaceClass
-from keyframes_analytic import first_hits, geometry_of, ray_directions
-from scenes_analytic import ball, room, room_walk, slide, wall
 from support.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere
+from support.analytic_truth import first_hits, geometry_of, ray_directions
+from support.example_scenes import ball, room, room_walk, slide, wall
 
 SCENES = {
     "wall": (wall(), slide(1).cameras[0]),

@@ -12,9 +12,9 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from scenes_analytic import room, room_walk, slide, wall
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Material, Plane, Quad
+from support.example_scenes import room, room_walk, slide, wall
 
 ROUNDING = 1e-6  # products and quotients of a few float32
 

@@ -19,7 +19,7 @@ def positions(count=500):
     return x, y
 
 
-def test_it_is_its_twin():
+def test_interpolation_matches_its_twin():
     x, y = positions()
     got = np.array(sample(lanes(VALUES), Float(x), Float(y), width=W, height=H)).T
     expected = np.array([interpolated(VALUES, float(a), float(b)) for a, b in zip(x, y, strict=True)])
@@ -27,7 +27,7 @@ def test_it_is_its_twin():
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3])
-def test_at_the_centres_every_value_is_kept_exactly(channels):
+def test_values_at_pixel_centres_are_exact(channels):
     values = VALUES[..., :channels]
     _, column, row = pixel_grid(H, W)
     got = sample(
@@ -40,16 +40,16 @@ def test_at_the_centres_every_value_is_kept_exactly(channels):
     assert image(got, H, W).tobytes() == np.ascontiguousarray(values).tobytes()
 
 
-def test_a_position_off_by_float32_rounding_still_counts_as_a_centre():
+def test_positions_off_by_float32_rounding_count_as_centres():
     x, y = np.float32(1919.5) * np.float32(1 + 6e-8), np.float32(5.5)
     taps = bilinear_taps(Float(x), Float(y), width=1920, height=1080)
-    weights = {int(lane[0]): float(weight[0]) for lane, weight in taps if weight[0] != 0.0}
+    weights = {int(tap.lane[0]): float(tap.weight[0]) for tap in taps if tap.weight[0] != 0.0}
     assert weights == {5 * 1920 + 1919: 1.0}
 
 
 def test_weights_sum_to_one_and_are_not_negative():
     x, y = positions()
-    weights = np.array([np.array(w) for _, w in bilinear_taps(Float(x), Float(y), width=W, height=H)])
+    weights = np.array([np.array(t.weight) for t in bilinear_taps(Float(x), Float(y), width=W, height=H)])
     assert (weights >= 0.0).all()
     assert (weights.sum(axis=0) == 1.0).all()  # multiples of 1/65536: exact
 

@@ -74,7 +74,7 @@ def test_lifting_and_projecting_are_inverse():
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_it_is_the_explicit_projection(name):
+def test_reprojection_matches_the_explicit_projection(name):
     x, y, depth = points()
     target = MOTIONS[name]
     disparity = np.float32(1) / depth
@@ -86,7 +86,7 @@ def test_it_is_the_explicit_projection(name):
     assert is_seen.mean() > 0.8
     assert is_ahead[is_seen].all()
     expected = np.stack([new_x - exact[0], new_y - exact[1]], axis=1)[is_seen]
-    # Sums of terms of up to 320 px in float32, divided: a hundredth of what is promised (0.001 px) for
+    # Sums of terms of up to 320 px in float32, divided: a hundredth of the limit (0.001 px) for
     # small motions; displacements of hundreds of pixels are off by a few 1e-6 of themselves.
     np.testing.assert_allclose(flow[is_seen], expected, atol=TOLERANCE_PX[name], rtol=3e-6)
     np.testing.assert_allclose(ratio[is_seen], (new_depth * disparity)[is_seen], rtol=1e-5)
@@ -104,14 +104,14 @@ def test_small_motion_loses_no_digits():
     assert np.abs(flow - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_equal_views_move_nothing_at_all():
+def test_equal_cameras_have_no_motion():
     x, y, depth = points()
     flow, ratio, _ = run(START, x, y, np.float32(1) / depth)
     assert not flow.any()
     assert (ratio == 1.0).all()
 
 
-def test_at_infinity_only_rotation_counts():
+def test_points_at_infinity_move_with_the_rotation_alone():
     x, y, _ = points()
     zero = np.zeros_like(x)
     turned = moved((0, 0, 0), (5, 10, -3))
@@ -119,7 +119,7 @@ def test_at_infinity_only_rotation_counts():
     np.testing.assert_allclose(run(shifted, x, y, zero)[0], run(turned, x, y, zero)[0], atol=1e-4)
 
 
-def test_what_comes_behind_the_eye_is_said_to_be():
+def test_points_behind_the_camera_are_marked():
     forward = moved(-4.0 * START.world_from_camera[:3, 2], (0, 0, 0))  # 4 units along the view
     x = np.full(4, W / 2, np.float32)
     y = np.full(4, H / 2, np.float32)

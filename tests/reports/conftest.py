@@ -5,15 +5,15 @@ import shutil
 import pytest
 
 from enfilade.reports.page import write_report
-from made_up_runs import made_up_run
+from support.synthetic_runs import synthetic_run
 
 
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory):
     """Folder with the run folders ``run`` and ``reference``. Not to be written in."""
     folder = tmp_path_factory.mktemp("reported")
-    made_up_run(folder / "run", noise=0.05)
-    made_up_run(folder / "reference")
+    synthetic_run(folder / "run", noise=0.05)
+    synthetic_run(folder / "reference")
     return folder
 
 

@@ -27,7 +27,7 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.lock import Lock
 from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings
-from made_up_runs import made_up_run
+from support.synthetic_runs import synthetic_run
 
 
 class Notes(Silence, list):
@@ -129,7 +129,7 @@ def test_without_a_reference_its_layers_are_missing(copied, tmp_path):
 
 
 def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
-    folder = made_up_run(tmp_path / "run", finished=(1, 2, 3, 5))
+    folder = synthetic_run(tmp_path / "run", finished=(1, 2, 3, 5))
     with (folder / "ledger.jsonl").open("a") as ledger:
         ledger.write('{"pass": "frames", "fra')  # being written just now
     before = {file: file.read_bytes() for file in folder.rglob("*.[!l]*")}
@@ -147,7 +147,7 @@ def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
 
 
 def test_before_the_first_frame(tmp_path):
-    notes, text, data = written(made_up_run(tmp_path / "run", finished=()), tmp_path)
+    notes, text, data = written(synthetic_run(tmp_path / "run", finished=()), tmp_path)
     assert "No frame to show yet" in text
     assert notes == ["no frame is finished yet"]
     assert data["frames"] == data["values"] == []
@@ -178,7 +178,7 @@ def test_refused(runs, copied, tmp_path):
         with pytest.raises(SettingsError, match="give 1 or more"):
             written(copied, tmp_path, max_mb=size)
     with pytest.raises(ImageError, match="run has the frame 4"):
-        written(copied, tmp_path, reference=made_up_run(tmp_path / "part", finished=(1, 2, 3)))
+        written(copied, tmp_path, reference=synthetic_run(tmp_path / "part", finished=(1, 2, 3)))
     (copied / "job.json").write_text("{}")
     with pytest.raises(RunFolderError, match=r"job\.json is damaged"):
         written(copied, tmp_path)
@@ -212,14 +212,14 @@ def test_wide_pictures_are_scaled(runs, monkeypatch):
 def test_names_are_text_and_not_markup(runs, tmp_path):
     folder = shutil.copytree(runs / "run", tmp_path / "<img src=x onerror=alert(1)>")
     identity = {"method": {"name": "<b>", "revision": 1}}
-    for run in (folder, made_up_run(tmp_path / "b", facts={"rays": {"<img>": 1}}, **identity)):
+    for run in (folder, synthetic_run(tmp_path / "b", facts={"rays": {"<img>": 1}}, **identity)):
         _, text, _ = written(run, tmp_path)
         assert "<img" not in text.partition('id="data">')[0]
         assert "<b>" not in text.partition("<dd>")[2].partition("</dd>")[0]
 
 
 def test_methods_without_rays_or_layers(tmp_path):
-    folder = made_up_run(tmp_path / "run", facts={"dropped": 2}, layers=["RGB"])
+    folder = synthetic_run(tmp_path / "run", facts={"dropped": 2}, layers=["RGB"])
     notes, text, data = written(folder, tmp_path)
     assert list(series_of(text, data)) == ["velocity", "traced", "time"]
     assert [layer["name"] for layer in data["layers"]] == ["result"]

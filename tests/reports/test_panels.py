@@ -6,11 +6,11 @@ from defusedxml.ElementTree import fromstring
 
 from enfilade.reports.charts import PALETTE, Panel, Series, draw, new_figure, svg
 from enfilade.reports.panels import plan_panels, quality_panel, run_panels, time_panel
-from made_up_runs import made_up_plan, made_up_summary
+from support.synthetic_runs import synthetic_plan, synthetic_summary
 
 
 def panels(split_percent=None, **terms):
-    return {panel.name: panel for panel in run_panels(made_up_summary(**terms), split_percent)}
+    return {panel.name: panel for panel in run_panels(synthetic_summary(**terms), split_percent)}
 
 
 def values(panel):
@@ -18,13 +18,13 @@ def values(panel):
 
 
 def test_velocity_with_keyframes():
-    rows, drawn = made_up_summary()["per_frame"], values(panels()["velocity"])
+    rows, drawn = synthetic_summary()["per_frame"], values(panels()["velocity"])
     assert drawn["mean over the image"] == {row["frame"]: row["velocity_deg_s"] for row in rows}
     assert list(drawn["keyframes"]) == [row["frame"] for row in rows if row["keyframe"]]
 
 
 def test_predictions_before_and_after_splitting():
-    segments, panel = made_up_summary()["segments"], panels(12.5)["predictions"]
+    segments, panel = synthetic_summary()["segments"], panels(12.5)["predictions"]
     before = {s["middle"]: s["percent_visible"] for s in segments if s["depth"] == 0}
     after = {s["middle"]: s["percent_visible"] for s in segments if not s["is_split"]}
     assert values(panel)["pursuit, before split"] == before
@@ -37,7 +37,7 @@ def test_predictions_before_and_after_splitting():
 
 
 def test_segments_without_a_middle_or_a_second_prediction():
-    summary = made_up_summary()
+    summary = synthetic_summary()
     empty = {"first": 1, "last": 2, "middle": None, "depth": 0, "is_split": False, "percent_visible": 0.0}
     summary["segments"] = [{**s, "percent_visible_no_pursuit": None} for s in summary["segments"]] + [empty]
     panel = run_panels(summary)[-1]
@@ -73,9 +73,9 @@ def test_quality_and_plan():
     panel = quality_panel({"per_frame": [{"number": 7, "score_jnd": 0.4}, {"number": 9, "score_jnd": 0.2}]})
     assert values(panel) == {"score": {7: 0.4, 9: 0.2}}
     assert panel.level[0] == 1.0 < panel.top
-    velocity, pixels = plan_panels(made_up_plan())
+    velocity, pixels = plan_panels(synthetic_plan())
     assert list(values(velocity)["keyframes"]) == [1, 21, 41, 60]
-    assert list(values(pixels)["slow"].values()) == made_up_plan()["slow_percent"]
+    assert list(values(pixels)["slow"].values()) == synthetic_plan()["slow_percent"]
 
 
 def bars(*series):

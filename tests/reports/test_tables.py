@@ -1,8 +1,8 @@
 """Tables have the figures of the summary, for any method."""
 
 from enfilade.reports.tables import comparison_table, percent, plan_tables, result_line, run_tables, seconds
-from made_up_runs import made_up_plan, made_up_summary
-from printed import as_text
+from support.console import as_text
+from support.synthetic_runs import synthetic_plan, synthetic_summary
 
 
 def rows(table):
@@ -10,25 +10,25 @@ def rows(table):
 
 
 def test_pixels_are_listed_by_reason():
-    table = rows(run_tables(made_up_summary())[0])
+    table = rows(run_tables(synthetic_summary())[0])
     assert table[1] == ["method", "slow", "specular", "disoccluded", "keyframes", "total"]
     assert table[-1] == ["paper", "20.0", "7.9", "0.43", "5.8", "34.1"]
 
 
 def test_rays_are_listed_where_they_are_counted():
-    table = rows(run_tables(made_up_summary(method="decoupled"))[0])
+    table = rows(run_tables(synthetic_summary(method="decoupled"))[0])
     assert table[1] == ["method", "irradiance", "camera", "specular", "total"]
     assert table[-1] == ["decoupled", "2.00", "12.50", "0.00", "14.50"]
 
 
 def test_time_is_listed_by_stage_and_adds_up():
-    table = rows(run_tables(made_up_summary())[1])
+    table = rows(run_tables(synthetic_summary())[1])
     assert ["final", "gather", "2.5", "min", "4.8", "min", "1.25", "s", "62.5"] in table
     assert table[-1] == ["total", "4.0", "min", "7.2", "min", "2.00", "s", "100.0"]
 
 
 def test_plan_of_traced_pixels():
-    walk, forecast = plan_tables(made_up_plan())
+    walk, forecast = plan_tables(synthetic_plan())
     assert "60 frames, 4 initial keyframes: 1, 21, 41, 60" in as_text(walk)
     assert ["pixels", "traced,", "%", "31.5"] in rows(forecast)
     assert ["disoccluded", "1.5"] in rows(forecast)
@@ -36,7 +36,7 @@ def test_plan_of_traced_pixels():
 
 
 def test_plan_of_rays():
-    table = rows(plan_tables(made_up_plan(method="decoupled"))[1])
+    table = rows(plan_tables(synthetic_plan(method="decoupled"))[1])
     assert ["rays", "per", "pixel", "and", "frame", "15.0"] in table
     assert ["final", "gather", "12.00"] in table
     assert ["tasks", "64"] in table
@@ -44,7 +44,7 @@ def test_plan_of_rays():
 
 
 def test_many_keyframes_are_cut_short_and_none_are_left_out():
-    plan = {**made_up_plan(), "keyframes": list(range(1, 61, 2))}
+    plan = {**synthetic_plan(), "keyframes": list(range(1, 61, 2))}
     assert "21, 23, ... 59" in as_text(plan_tables(plan)[0])
     assert rows(plan_tables({**plan, "keyframes": []})[0])[-1] == ["60", "frames"]
 

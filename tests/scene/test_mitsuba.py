@@ -13,13 +13,13 @@ import pytest
 
 from enfilade.arrays import Array3f, rows
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.device import active
 from enfilade.errors import SceneError
 from enfilade.gbuffer import find_geometry
+from enfilade.images import write_exr
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from keyframes_analytic import projected
+from support.analytic_truth import projected
 
 HEAD = """<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="6"/></integrator>
@@ -88,8 +88,7 @@ def opened(file, **settings):
 
 def write_holes(folder):
     """A texture whose left half is 1 and whose right half is 0."""
-    mi.set_variant(active().variant)
-    mi.Bitmap(np.array([[[1.0], [0.0]]], np.float32)).write(str(folder / "holes.exr"))
+    write_exr(folder / "holes.exr", {"": np.array([[[1.0] * 3, [0.0] * 3]], np.float32)})
 
 
 def place(index):

@@ -6,9 +6,9 @@ from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import why_inseparable
 from enfilade.scene.opener import Scene
 from enfilade.settings import LimitSettings, Settings
-from scenes_analytic import ball, wall
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import write_scene
+from support.example_scenes import ball, wall
 
 BALL = '<shape type="sphere" id="ball"/><emitter type="constant"/>'
 RENDERER = "support.analytic:load"

@@ -15,14 +15,14 @@ from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Silence
 from enfilade.runs.render import render
 from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
-from printed import as_text
-from scenes_analytic import room_walk
-from small_walks import room_files, room_job
 from studies.__main__ import main
 from studies.bench.bench import bench
 from studies.bench.configurations import chosen, lineup
 from studies.bench.measuring import available
 from studies.bench.tables import bench_tables
+from support.console import as_text
+from support.example_scenes import room_walk
+from support.study_runs import room_files, room_job
 
 NAMES = ["traced-1", "traced-4", *([] if why_no_denoiser() else ["denoised-2"])]
 

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from small_walks import room_files
 from studies.cases import threshold
+from support.study_runs import room_files
 
 
 @pytest.fixture

@@ -14,8 +14,6 @@ from enfilade.errors import InputError, RunFolderError
 from enfilade.monitor import Silence
 from enfilade.records import SurfaceClass
 from enfilade.settings import KeyframeSettings, Placement
-from scenes_analytic import room, room_walk
-from small_walks import room_job, windows_of
 from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
 from studies.cases.blocks import BLOCKS
 from studies.cases.case import Case, Result, begin
@@ -25,6 +23,8 @@ from studies.cases.seen import score_in
 from studies.cases.speed import mean_cost, spread_over
 from studies.cases.terms import TERMS
 from support.analytic_scene import AnalyticScene, Checker, Material, Quad
+from support.example_scenes import room, room_walk
+from support.study_runs import room_job, windows_of
 
 TEMPLATE = Path(__file__).parents[2] / "studies" / "cases" / "README.md"
 TINY = dataclasses.replace(

@@ -7,9 +7,9 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
-from scenes_analytic import room, room_walk
 from studies.bench.guides import guides
 from support.analytic import AnalyticRenderer
+from support.example_scenes import room, room_walk
 
 CHUNK = 1 << 20
 MIRROR = """<scene version="3.0.0">

@@ -10,14 +10,14 @@ from enfilade.gbuffer import find_geometry, image_flow
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import MetricSettings
-from scenes_analytic import room
-from small_walks import windows_of
 from studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
 from studies.cases.seen import Viewer, score_in, visible_percent
 from studies.cases.supports import uniform
 from studies.cases.windows import probes_of
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Checker, Material, Quad
+from support.example_scenes import room
+from support.study_runs import windows_of
 
 
 @cache

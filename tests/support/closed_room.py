@@ -29,7 +29,7 @@ def opened_room(folder: Path) -> MitsubaRenderer:
         _ball("bottle", (-1.2, 0.35, -1.8), 0.35,
               '<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.2, 0.4, 0.6"/>'
               '<float name="alpha" value="0.2"/></bsdf>'),
-        _lamp("lamp", '<scale value="1.2"/><rotate x="1" angle="90"/><translate x="0" y="2.45" z="-0.5"/>', 1.5),
+        _lamp("lamp", '<scale value="1.2"/><rotate x="1" angle="90"/><translate y="2.45" z="-0.5"/>', 1.5),
     ]  # fmt: skip
     # Paths of any length: the irradiance cache does not count the edges of a path.
     integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'
@@ -57,7 +57,8 @@ def _lamp(name: str, transform: str, radiance: float) -> str:
 
 
 def _shape(kind: str, name: str, transform: str, content: str) -> str:
-    return f'<shape type="{kind}" id="{name}"><transform name="to_world">{transform}</transform>{content}</shape>'
+    to_world = f'<transform name="to_world">{transform}</transform>'
+    return f'<shape type="{kind}" id="{name}">{to_world}{content}</shape>'
 
 
 def _ball(name: str, centre: tuple[float, float, float], radius: float, bsdf: str) -> str:

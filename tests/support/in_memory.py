@@ -53,7 +53,7 @@ def run_passes(
     walk: Walkthrough,
     *,
     last: str = FRAMES,
-    before: Callable[[Task], None] = lambda task: None,
+    before: Callable[[Task], object] = id,
 ) -> InMemory:
     """Run all tasks up to a pass, in the order of the passes, and check what each task is given and writes.
 

@@ -11,10 +11,10 @@ from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.records import SurfaceClass
 from enfilade.renderer import Purpose, RandomKey, Rays
-from keyframes_analytic import ray_directions
-from scenes_analytic import ball, slide
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Checker, Material, Plane
+from support.analytic_truth import ray_directions
+from support.example_scenes import ball, slide
 
 # A ray's direction, its products and quotients are each rounded to 24 bits: a handful of 6e-8.
 ROUNDING = 1e-6

@@ -1,8 +1,15 @@
-"""A scene that several tests share."""
+"""Scenes that several tests share."""
 
 import pytest
 
-from balls import MATERIALS, front_camera, opened_scene, traced_irradiance
+from support.material_scene import MATERIALS, front_camera, opened_scene, traced_irradiance
+
+
+@pytest.fixture(scope="session")
+def materials(tmp_path_factory):
+    """Balls of all materials, and the path traced irradiance of an image."""
+    renderer = opened_scene(tmp_path_factory.mktemp("materials"), MATERIALS)
+    return renderer, traced_irradiance(renderer, front_camera())[1]
 
 
 @pytest.fixture(scope="session")

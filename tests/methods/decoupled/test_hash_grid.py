@@ -40,18 +40,43 @@ def test_keys_are_one_to_one_with_cells_and_directions(width, size):
     assert len(set(found.values())) == len(found)
 
 
+def grid_at(point, width, shape_index=1, light=1.0):
+    """An uploaded entry at one point."""
+    key = keys([point], UP, width, shape_index=shape_index)
+    return Entries.of(np.repeat(key, MIN_SAMPLES), np.full((MIN_SAMPLES, 3), light)).upload()
+
+
+def is_found(grid, points, width, shape_index=1):
+    """Whether lookups at points find an entry."""
+    position = Array3f(np.float32(points).T)
+    at = position, Array3f(*UP[0].tolist()), UInt(shape_index), Float(width)
+    return np.array(grid.lookup(*at, Array3f(0.5))[1])
+
+
+# Entries of the camera's paths 1 m away are ENTRY_PX pixels wide: 2 mm at 1280 pixels, 0.5 mm at 3840.
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_far_surfaces_do_not_share_entries(axis):
-    # Points 1 m to 8 km apart, in cells of 2 mm.
-    points = np.full((15, 3), 0.3)
-    points[1:, axis] += 2.0 ** np.arange(14)
-    assert len(set(keys(points, np.tile(UP, (15, 1)), 2.0**-9).tolist())) == 15
+@pytest.mark.parametrize(("width", "apart_m"), [(2.0**-9, 32.0), (2.0**-11, 8.0)])
+def test_far_surfaces_do_not_share_entries(axis, width, apart_m):
+    # At all distances of 2^k m, among them those at which coordinates of 14 bits repeat.
+    near = np.full((1, 3), 0.3)
+    far = near + np.eye(3)[axis] * np.array([[apart_m]] + [[2.0**k] for k in range(-2, 14)])
+    grid = grid_at(near[0], width)
+    assert is_found(grid, near, width).all()
+    assert not is_found(grid, far, width).any()
+    assert len({*keys(far[1:], np.tile(UP, (16, 1)), width).tolist()}) == 16
 
 
-def test_shapes_and_sizes_do_not_share_entries():
+@pytest.mark.parametrize("shape_index", [1, 8191, 8192, 8193, 100_000])
+def test_shapes_do_not_share_entries(shape_index):
+    # Also those whose indices differ by 8192, or by any other power of two.
+    point, others = [0.3, 0.3, 0.3], {shape_index ^ (1 << bit) for bit in range(31)} | {shape_index + 8192}
+    grid = grid_at(point, 0.01, shape_index)
+    assert is_found(grid, [point], 0.01, shape_index).all()
+    assert not is_found(grid, [point] * len(others), 0.01, np.array(sorted(others), np.uint32)).any()
+
+
+def test_sizes_do_not_share_entries():
     point = np.float32([[0.3, 0.3, 0.3]])
-    by_shape = {int(keys(point, UP, 1.0, shape_index=1 + k)[0]) for k in (0, *(1 << b for b in range(31)))}
-    assert len(by_shape) == 32
     by_size = {int(keys(0.0 * point, UP, 2.0**k)[0]) for k in range(-29, 40)}
     assert len(by_size) == 69
     points, normals = random_points(500)
@@ -75,16 +100,16 @@ def test_lookup_finds_the_mean_of_the_smallest_entry():
     whole = Entries.joined([*parts, *parts])  # twice, in any order
     mean = whole.sums / whole.counts[:, None]
     at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(0.7)
-    found, is_found = (np.array(v) for v in whole.upload().lookup(*at, Array3f(0.5)))
+    found, is_hit = (np.array(v) for v in whole.upload().lookup(*at, Array3f(0.5)))
     enough = dict(zip(whole.keys, whole.counts >= MIN_SAMPLES, strict=True))
     place = {key: i for i, key in enumerate(whole.keys)}
     by_level = [keys(points, normals, 0.7, level) for level in range(LEVELS)]
     for i in range(len(points)):
         first = next((k[i] for k in by_level if enough[k[i]]), None)
-        assert is_found[i] == (first is not None)
+        assert is_hit[i] == (first is not None)
         if first is not None:
             np.testing.assert_allclose(found[:, i], mean[place[first]], rtol=1e-5)
-    assert 0.1 < is_found.mean() < 1.0
+    assert 0.1 < is_hit.mean() < 1.0
 
 
 def test_lookup_of_points_without_an_entry_misses():

@@ -1,11 +1,11 @@
-"""What a page knows of points, against loops."""
+"""Lookup of irradiance images at points in the world, against loops."""
 
 import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, UInt, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.lookup import FLOOR, Page, footprint, lookup, packed
+from enfilade.methods.decoupled.lookup import MIN_TAP_WEIGHT, UploadedImage, footprint, lookup, packed
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
@@ -13,8 +13,8 @@ TOLERANCE = 0.01
 
 
 @pytest.fixture
-def page():
-    """A wall at z = 0, seen by two shapes; a stretch of it is not known."""
+def wall():
+    """A wall at z = 0 of two shapes, with a column of unknown pixels: depth, shape index, values."""
     x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
     direction = np.stack([x, y, np.ones_like(x)], -1) @ CAMERA.direction_from_pixel.T
     depth = (-CAMERA.eye[2] / direction[..., 2]).astype(np.float32)
@@ -24,9 +24,9 @@ def page():
     return depth, shape_index, value
 
 
-def found(page, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
-    depth, shape_indices, value = page
-    opened = Page(
+def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
+    depth, shape_indices, value = wall
+    uploaded = UploadedImage(
         depths=lanes(depth),
         shape_indices=lanes(shape_indices),
         normals=None if normals is None else packed(lanes(normals)),
@@ -39,11 +39,11 @@ def found(page, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
         height=HEIGHT,
     )
     position = Array3f(np.asarray(points, np.float32).T)
-    return lookup(position, Array3f(*normal), UInt(shape_index), opened, plane_tolerance=TOLERANCE)
+    return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, plane_tolerance=TOLERANCE)
 
 
-def by_loops(page, point, shape_index):
-    depth, shape_indices, value = page
+def by_loops(wall, point, shape_index):
+    depth, shape_indices, value = wall
     seen = CAMERA.pixel_from_direction @ (point - CAMERA.eye)
     x, y = seen[:2] / seen[2] - 0.5
     total, weight = np.zeros(3), 0.0
@@ -58,37 +58,37 @@ def by_loops(page, point, shape_index):
                 and shape_indices[v, u] == shape_index
                 and abs(there[2] - point[2]) <= TOLERANCE * seen[2]
             ):
-                total += (wx * wy + FLOOR) * value[v, u]
-                weight += wx * wy + FLOOR
+                total += (wx * wy + MIN_TAP_WEIGHT) * value[v, u]
+                weight += wx * wy + MIN_TAP_WEIGHT
     return total, weight
 
 
 @pytest.mark.parametrize("shape_index", [1, 2])
-def test_it_does_what_loops_do(page, shape_index):
+def test_lookup_matches_loops(wall, shape_index):
     points = np.random.default_rng(2).uniform((-2.5, -1.8, -0.2), (2.5, 1.8, 0.2), (400, 3))
     points[:300, 2] = 0.0
-    got = found(page, points, shape_index)
-    wanted = [by_loops(page, point, shape_index) for point in points]
+    got = found(wall, points, shape_index)
+    wanted = [by_loops(wall, point, shape_index) for point in points]
     np.testing.assert_allclose(np.array(got.weight), [w for _, w in wanted], atol=2e-4)
     np.testing.assert_allclose(np.array(got.totals[0]).T, [t for t, _ in wanted], atol=5e-4)
     np.testing.assert_allclose(np.array(got.totals[1]), 2.0 * np.array(got.totals[0]), rtol=1e-5)
     assert 0.2 < np.mean([w > 0 for _, w in wanted]) < 0.8
 
 
-def test_pixels_whose_surface_is_turned_count_by_the_cosine(page):
+def test_pixels_are_weighted_by_the_cosine_of_the_normals(wall):
     points = np.random.default_rng(3).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
     turned = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     turned[..., 0], turned[..., 2] = np.sin(1.1), np.cos(1.1)
-    plain, got = found(page, points, 1), found(page, points, 1, normals=turned)
+    plain, got = found(wall, points, 1), found(wall, points, 1, normals=turned)
     np.testing.assert_allclose(np.array(got.weight), np.cos(1.1) * np.array(plain.weight), atol=3e-3)
-    other_way = found(page, points, 1, normals=turned * np.float32([1, 1, -1]))
+    other_way = found(wall, points, 1, normals=turned * np.float32([1, 1, -1]))
     assert not np.array(other_way.weight).any()
 
 
-def test_of_two_surfaces_that_meet_that_with_the_normal_counts_alone(page):
+def test_surfaces_that_meet_at_an_edge_do_not_mix(wall):
     upright = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     upright[::2, :, 2], upright[1::2, :, 1] = 1.0, 1.0
-    depth, shape_indices, value = page
+    depth, shape_indices, value = wall
     value[::2], value[1::2] = 1.0, 5.0
     points = np.random.default_rng(4).uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), (50, 3))
     got = found((depth, shape_indices, value), points, 1, normals=upright)
@@ -98,12 +98,12 @@ def test_of_two_surfaces_that_meet_that_with_the_normal_counts_alone(page):
     np.testing.assert_allclose(np.array(got.totals[0])[:, known] / weight[known], 1.0, atol=0.02)
 
 
-def test_the_other_side_of_a_surface_is_not_known(page):
+def test_the_back_of_a_surface_is_not_found(wall):
     point = [[0.0, 0.0, 0.0]]
-    assert np.array(found(page, point, 1).weight)[0] + np.array(found(page, point, 2).weight)[0] > 0.5
+    assert np.array(found(wall, point, 1).weight)[0] + np.array(found(wall, point, 2).weight)[0] > 0.5
     behind = (0.0, 0.0, -1.0)
-    assert np.array(found(page, point, 1, behind).weight)[0] == 0.0
-    assert np.array(found(page, point, 2, behind).weight)[0] == 0.0
+    assert np.array(found(wall, point, 1, behind).weight)[0] == 0.0
+    assert np.array(found(wall, point, 2, behind).weight)[0] == 0.0
 
 
 def test_footprints_grow_with_the_square_of_distance_and_at_grazing_angles():

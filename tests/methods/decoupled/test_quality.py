@@ -1,7 +1,7 @@
 """The default method against path tracing: error at equal cost, and energy, over fixed seeds.
 
-The whole method is measured, from the prepass to the delivered frame. The limits are such that a quarter more
-error, or two percent less energy, fails.
+The whole method is measured, from the prepass to the delivered frame. A quarter more error, on diffuse or on
+specular surfaces, or two percent less energy fails.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ SEEDS = range(1, 7)
 JUDGED = (0, 3, 6)  # frames: a keyframe, and frames that are nearer to one or the other
 PARTS, PART_SPP = 8, 24  # of the reference: independent images
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+PATHS = 18  # rays a pixel of the method, and paths a pixel of path tracing at equal cost
 PATH = room_path(9, (144, 96))
 
 pytestmark = pytest.mark.slow
@@ -78,27 +79,37 @@ def measured(tmp_path_factory) -> Measured:
     )
 
 
-# Measured: 0.389 with a standard error of 0.014 over blocks of 4x4 pixels, 0.096 with one of 0.002 over pixels.
-@pytest.mark.parametrize(("block", "limit"), [(4, 0.45), (1, 0.105)])
-def test_error_is_below_that_of_path_tracing_at_equal_cost(measured, block, limit):
+# Means over 18 seeds: 0.346, 0.0665, 1.55, 0.707. Standard errors with 6 seeds: 4 %, 2.5 %, 7 %, 3 %.
+@pytest.mark.parametrize(
+    ("is_specular", "block", "limit"),
+    [(False, 4, 0.40), (False, 1, 0.0735), (True, 4, 1.85), (True, 1, 0.79)],
+    ids=["diffuse, blocks", "diffuse, pixels", "specular, blocks", "specular, pixels"],
+)
+def test_error_is_below_that_of_path_tracing_at_equal_cost(measured, is_specular, block, limit):
+    specular = [measured.names.index(name) + 1 for name in ("mirror", "bottle")]
+    where = np.isin(measured.shape_index, specular) == is_specular
     ours, parts = _averaged(measured.frames, block), _averaged(measured.parts, block)
     reference, variance = parts.mean(axis=0), parts.var(axis=0, ddof=1)
-    weight = 1.0 / (reference**2 + 0.01)
-    # Squared error, less the noise of the reference; and that of path tracing with as many paths as rays.
+    weight = (_averaged(where[..., None], block) > 0.5) / (reference**2 + 0.01)
+    # Squared error, less the noise of the reference; and that of path tracing with as many paths.
     error = ((ours - reference) ** 2 - variance / PARTS) * weight
-    traced = variance * (PART_SPP / measured.rays_per_pixel) * weight
-    assert error.mean() < limit * traced.mean()
+    traced = variance * (PART_SPP / PATHS) * weight
+    assert error.mean(axis=0).sum() < limit * traced.sum()
 
 
-def test_energy_is_that_of_path_tracing(measured):
-    # Lamps excluded. Measured: 1.0055, with a standard error of 0.001: at this size smoothing the prepass
-    # images, of 72x48 pixels, brightens bounced light by a percent.
+def test_cost_does_not_grow(measured):
+    assert measured.rays_per_pixel == pytest.approx(PATHS, rel=0.05)
+
+
+def test_energy_equals_that_of_path_tracing(measured):
+    # Without the lamp. Mean over 18 seeds: 1.0065; smoothing the prepass images, of 72x48 pixels here,
+    # brightens indirect light by a percent.
     energy, error = measured.energy(measured.shape_index != measured.names.index("lamp") + 1)
     assert error < 0.002
     assert 0.997 < energy < 1.014
 
 
-def test_energy_of_each_shape_is_that_of_path_tracing(measured):
+def test_energy_of_each_shape_equals_that_of_path_tracing(measured):
     wrong = {}
     for number, name in enumerate(measured.names, 1):
         where = measured.shape_index == number
@@ -111,5 +122,5 @@ def test_energy_of_each_shape_is_that_of_path_tracing(measured):
 
 def _averaged(images: np.ndarray, block: int) -> np.ndarray:
     """Images averaged over blocks of pixels."""
-    *count, height, width, _ = images.shape
-    return images.reshape(*count, height // block, block, width // block, block, 3).mean(axis=(-4, -2))
+    *count, height, width, channels = images.shape
+    return images.reshape(*count, height // block, block, width // block, block, channels).mean(axis=(-4, -2))

@@ -1,14 +1,13 @@
-"""Virtual images: where that seems to be which mirrors and panes show."""
+"""Virtual images: apparent positions of surfaces seen in mirrors and through glass."""
 
 import numpy as np
 
-from balls import MATERIALS, front_camera, opened_scene, pane
 from enfilade.gbuffer import find_geometry, positions
-from enfilade.methods.decoupled import VirtualImages
-from enfilade.methods.decoupled.virtual import BEHIND
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
+from support.material_scene import MATERIALS, front_camera, opened_scene, pane
 
 
-def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
+def test_virtual_images_of_a_mirror_lie_behind_it(tmp_path):
     mirror = (
         '</shape><shape type="rectangle" id="mirror"><transform name="to_world"><scale value="3"/>'
         '<translate z="-1.4"/></transform><bsdf type="conductor"/>'
@@ -17,20 +16,20 @@ def test_a_mirror_shows_things_as_far_behind_it(tmp_path):
     seen = find_geometry(renderer, camera)
     shown = VirtualImages(renderer).reflected(seen)
     names = renderer.describe().shapes
-    is_floor = shown.shape_index == BEHIND + names.index("floor") + 1
+    is_floor = shown.shape_index == IN_VIRTUAL_IMAGE + names.index("floor") + 1
     assert is_floor.sum() > 20
     points = positions(shown)[is_floor]
-    # The floor, y = 0, goes on behind an upright mirror.
+    # The floor, y = 0, continues behind an upright mirror.
     np.testing.assert_allclose(points[:, 1], 0.0, atol=2e-3)
     assert points[:, 2].max() < -1.4
-    # Also where lanes fill up a kernel.
+    # The last lane is followed by padding.
     last = np.flatnonzero(seen.shape_index == names.index("mirror") + 1)[-1]
     assert is_floor.ravel()[last]
     is_same = shown.shape_index == seen.shape_index
     np.testing.assert_array_equal(shown.depth[is_same], seen.depth[is_same])
 
 
-def test_rough_glass_shows_no_image(tmp_path):
+def test_rough_glass_has_no_virtual_image(tmp_path):
     balls = {"rough": MATERIALS["roughdielectric"], "glass": MATERIALS["thindielectric"]}
     renderer, camera = opened_scene(tmp_path, balls), front_camera()
     seen = find_geometry(renderer, camera)
@@ -39,10 +38,10 @@ def test_rough_glass_shows_no_image(tmp_path):
     assert rough.sum() > 20
     np.testing.assert_array_equal(shown.shape_index[rough], seen.shape_index[rough])
     np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
-    assert (shown.shape_index[glass] >= BEHIND).all()
+    assert (shown.shape_index[glass] >= IN_VIRTUAL_IMAGE).all()
 
 
-def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
+def test_surfaces_behind_a_pane_keep_their_positions(tmp_path):
     bare, camera = opened_scene(tmp_path, {"ball": MATERIALS["diffuse"]}), front_camera()
     behind = find_geometry(bare, camera)
     renderer = opened_scene(tmp_path, {"ball": pane("front", 1.0)})
@@ -53,10 +52,10 @@ def test_a_pane_shows_what_is_behind_it_where_that_is(tmp_path):
     np.testing.assert_allclose(positions(through)[where], positions(behind)[where], atol=2e-3)
     names = renderer.describe().shapes
     assert set(through.shape_index[where]) == {
-        BEHIND + names.index(name) + 1 for name in ("ball", "floor", "back")
+        IN_VIRTUAL_IMAGE + names.index(name) + 1 for name in ("ball", "floor", "back")
     }
-    # The floor before the pane goes on behind it.
-    is_floor = where & (mirrored.shape_index == BEHIND + names.index("floor") + 1)
+    # The reflected floor continues behind the pane.
+    is_floor = where & (mirrored.shape_index == IN_VIRTUAL_IMAGE + names.index("floor") + 1)
     assert is_floor.sum() > 20
     np.testing.assert_allclose(positions(mirrored)[is_floor][:, 1], 0.0, atol=2e-3)
     assert positions(mirrored)[is_floor][:, 2].max() < 1.0

@@ -1,4 +1,4 @@
-"""Smoothing along surfaces, against loops."""
+"""Edge-avoiding wavelets against loops, fireflies, and soft edges."""
 
 import dataclasses
 
@@ -9,10 +9,10 @@ from enfilade.arrays import image, lanes, matrix3
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled.wavelet import (
     Guide,
-    share_without_speckles,
+    firefly_weights,
     smooth,
-    with_soft_edges,
-    with_spread_speckles,
+    soften_edges,
+    spread_fireflies,
 )
 from twins import wavelet as twin
 
@@ -62,7 +62,7 @@ def scene():
     return Scene(color, np.full((HEIGHT, WIDTH), 0.01, np.float32), depth, normal, shape_index)
 
 
-def test_it_does_what_loops_do(scene):
+def test_smoothing_matches_loops(scene):
     color, variance = scene.smoothed()
     wanted, wanted_variance = twin.smooth(
         *(a.astype(float) for a in (scene.color, scene.variance, scene.depth, scene.normal)),
@@ -97,30 +97,30 @@ def grey(light):
 
 
 def on_a_wall(light, variance, **options):
-    """Smooth grey light on a plain wall, (H, W); with the variance that is left."""
+    """Smoothed grey light on a plain wall, (H, W), and its variance."""
     color, variance = lanes(grey(light)), lanes(variance.astype(np.float32))
     color, variance = smooth(color, variance, wall(*light.shape), **{**OPTIONS, **options})
     return image(color, *light.shape)[..., 0], image(variance, *light.shape)
 
 
-def test_what_is_left_of_the_noise_is_told():
+def test_the_variance_of_the_result_is_that_of_its_noise():
     light = np.random.default_rng(7).normal(0.5, 0.1, (96, 128))
     inside = slice(20, -20), slice(20, -20)
     for levels in (1, 2, 4):
         smoothed, variance = on_a_wall(light, np.full(light.shape, 0.01), levels=levels, deviations=100.0)
-        told = np.sqrt(variance[inside].mean())
-        assert 0.8 < told / smoothed[inside].std() < 1.25
+        deviation = np.sqrt(variance[inside].mean())
+        assert 0.8 < deviation / smoothed[inside].std() < 1.25
 
 
-def test_no_light_is_lost():
-    """One path in eight finds a lot: what it found counts as much when it is spread."""
+def test_energy_of_rare_bright_paths_is_kept():
+    """One path in eight finds light; four paths a pixel."""
     light = (np.random.default_rng(8).random((96, 128, 4)) < 0.125).mean(axis=2)
     smoothed, _ = on_a_wall(light, light * (1.0 - light) / 3.0, levels=4)
     assert abs(smoothed.mean() / light.mean() - 1.0) < 0.005
     assert smoothed.std() < 0.35 * light.std()
 
 
-def test_noise_goes_and_edges_stay(scene):
+def test_noise_is_smoothed_and_edges_stay(scene):
     color, variance = scene.smoothed(levels=4)
     inside = color[2:10, 1:4]
     assert inside.std() < 0.5 * scene.color[2:10, 1:4].std()
@@ -129,15 +129,15 @@ def test_noise_goes_and_edges_stay(scene):
     assert np.abs(color[:, 11].mean() - 3.0 * 0.9) < 0.4
 
 
-def test_without_noise_nothing_changes(scene):
+def test_images_without_noise_are_unchanged(scene):
     scene.color[:] = np.where(np.arange(WIDTH) % 2, 1.0, 1.1)[None, :, None]
     scene.variance[:] = 0.0
     color, _ = scene.smoothed()
     np.testing.assert_allclose(color, scene.color, rtol=1e-5)
 
 
-def test_no_light_is_lost_where_noise_meets_none(scene):
-    """A noisy pixel among black ones without noise: what it gives away arrives."""
+def test_energy_is_kept_where_noise_borders_on_no_noise(scene):
+    """A noisy pixel among black ones without noise."""
     scene.normal[:], scene.depth[:], scene.shape_index[:] = (0.0, 0.0, 1.0), 4.0, 1
     scene.color[:], scene.variance[:] = 0.0, 0.0
     scene.color[9, 12], scene.variance[9, 12] = 1.0, 1.0
@@ -145,26 +145,26 @@ def test_no_light_is_lost_where_noise_meets_none(scene):
     assert 0.7 < color.sum() / scene.color.sum() < 1.3
 
 
-def test_a_speckle_is_cut_to_its_brightest_neighbour():
-    color = np.ones((5, 6, 3), np.float32)
-    color[2, 3] = 50.0
+def test_fireflies_are_clamped_to_their_brightest_neighbour():
+    color = np.ones((5, 9, 3), np.float32)
+    color[2, 3] = color[0, 8] = color[2, 6] = 50.0  # one of them at the corner
     color[1, 3] = 1.5
-    cut = color * image(share_without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)[..., None]
-    np.testing.assert_allclose(cut[2, 3], 3.0, rtol=1e-5)
-    color[2, 3] = cut[2, 3]
-    np.testing.assert_array_equal(cut, color)
+    weights = image(firefly_weights(lanes(color), width=9, height=5, times=2.0), 5, 9)
+    expected = color.copy()
+    expected[2, 3], expected[0, 8], expected[2, 6] = 3.0, 2.0, 2.0
+    np.testing.assert_allclose(color * weights[..., None], expected, rtol=1e-5)
 
 
 def spread(light, variance, **options):
     options = {"times": 2.0, "levels": 4, **options}
-    color, variance = with_spread_speckles(
+    color, variance = spread_fireflies(
         lanes(grey(light)), lanes(variance.astype(np.float32)), wall(*light.shape), **options
     )
     return image(color, *light.shape)[..., 0], image(variance, *light.shape)
 
 
-def test_speckles_of_a_page_are_spread_and_their_light_stays():
-    """One pixel in a hundred glares: alone, in pairs, at the border."""
+def test_fireflies_are_spread_and_keep_their_energy():
+    """One pixel in a hundred is a firefly: alone, in pairs, at the border."""
     rng = np.random.default_rng(11)
     light = np.ones((96, 128))
     light.ravel()[rng.choice(light.size, light.size // 100, replace=False)] = 60.0
@@ -175,7 +175,7 @@ def test_speckles_of_a_page_are_spread_and_their_light_stays():
     assert left.max() < 0.01 * variance.max()
 
 
-def test_what_is_bright_beside_bright_pixels_is_no_speckle():
+def test_bright_lines_and_spots_are_not_fireflies():
     light = np.ones((24, 32))
     light[10, 4:20] = light[15:17, 9:11] = 50.0  # a thin line, and a spot of four pixels
     got, _ = spread(light, np.zeros_like(light))
@@ -184,18 +184,11 @@ def test_what_is_bright_beside_bright_pixels_is_no_speckle():
     np.testing.assert_allclose(spot, 50.0, rtol=0.02)
 
 
-def test_a_speckle_at_the_border_is_one():
-    color = np.ones((5, 6, 3), np.float32)
-    color[0, 0] = color[2, 5] = 50.0
-    cut = color * image(share_without_speckles(lanes(color), width=6, height=5, times=2.0), 5, 6)[..., None]
-    np.testing.assert_allclose(cut[[0, 2], [0, 5]], 2.0, rtol=1e-5)
-
-
-def test_edges_between_items_are_as_soft_as_the_filter():
+def test_edges_between_shapes_are_antialiased_by_the_filter():
     rng = np.random.default_rng(5)
     color = rng.random((6, 9, 3)).astype(np.float32)
     shape_indices = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
-    got = image(with_soft_edges(lanes(color), lanes(shape_indices), width=9, height=6, sigma=0.5), 6, 9)
+    got = image(soften_edges(lanes(color), lanes(shape_indices), width=9, height=6, sigma=0.5), 6, 9)
     padded = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
     weights = np.exp(-np.add.outer(np.array([1, 0, 1]), np.array([1, 0, 1])) / 0.5)
     expected = color.copy()

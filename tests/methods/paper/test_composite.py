@@ -1,4 +1,4 @@
-"""Compositing: the right surface, the weights, and what neither keyframe sees."""
+"""Compositing of two warped keyframes: visible surfaces, weights, disocclusions."""
 
 import dataclasses
 
@@ -7,12 +7,13 @@ import pytest
 import scipy.ndimage
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.paper import agrees, composite, warp_keyframe
+from enfilade.methods.paper.composite import agrees, composite
+from enfilade.methods.paper.warp import warp_keyframe
 from enfilade.records import Geometry, Warped
 from enfilade.settings import WarpSettings
-from keyframes_analytic import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
-from scenes_analytic import room, room_walk
 from support.analytic_scene import AnalyticScene, Material, Plane, Sphere
+from support.analytic_truth import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
+from support.example_scenes import room, room_walk
 
 SETTINGS = WarpSettings(depth_tolerance=0.02)
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 50.0, 1, 1)
@@ -30,7 +31,7 @@ def pixel(depth=2.0, shape_index=1):
     )
 
 
-def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_hole=False):
+def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded=False):
     size = (1, 1)
     return Warped(
         np.full((*size, 3), value, np.float32),
@@ -38,64 +39,67 @@ def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_hole=False)
         np.full(size, depth, np.float32),
         np.full(size, shape_index, np.uint32),
         np.full(size, magnification, np.float32),
-        np.full(size, is_hole),
+        np.full(size, is_disoccluded),
     )
 
 
-def joined(before, after, progress=0.5, of=None):
-    color, is_hole = composite(before, after, of or pixel(), progress=progress, settings=SETTINGS)
+def composited(before, after, progress=0.5, of=None):
+    color, is_disoccluded = composite(before, after, of or pixel(), progress=progress, settings=SETTINGS)
     assert color.dtype == np.float32
-    return float(color[0, 0, 0]), bool(is_hole[0, 0])
+    return float(color[0, 0, 0]), bool(is_disoccluded[0, 0])
 
 
 @pytest.mark.parametrize(
     ("progress", "expected"), [(0.5, 0.5), (0.25, 0.25), (0.9, 0.9), (0.0, 0.0), (1.0, 1.0)]
 )
-def test_the_nearer_keyframe_in_time_counts_more(progress, expected):
-    color, is_hole = joined(warped(0.0), warped(1.0), progress)
+def test_keyframes_are_weighted_by_their_distance_in_time(progress, expected):
+    color, is_disoccluded = composited(warped(0.0), warped(1.0), progress)
     assert color == pytest.approx(expected, abs=1e-6)
-    assert not is_hole
+    assert not is_disoccluded
 
 
-def test_the_less_magnified_sample_counts_more():
-    assert joined(warped(0.0, magnification=4.0), warped(1.0))[0] == pytest.approx(0.8)
-    assert joined(warped(0.0, magnification=0.1), warped(1.0))[0] == pytest.approx(0.5)  # no bonus for small
+def test_magnified_samples_weigh_less():
+    assert composited(warped(0.0, magnification=4.0), warped(1.0))[0] == pytest.approx(0.8)
+    assert composited(warped(0.0, magnification=0.1), warped(1.0))[0] == pytest.approx(
+        0.5
+    )  # minified samples gain no weight
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
         {"depth": 1.0},  # an occluder
-        {"depth": 3.0},  # what is behind, seen through a hole
+        {"depth": 3.0},  # an occluded surface
         {"depth": 2.05},
         {"shape_index": 2},
-        {"is_hole": True},
+        {"is_disoccluded": True},
     ],
 )
-def test_the_surface_that_the_frame_sees_is_taken(wrong):
-    assert joined(warped(0.2), warped(0.9, **wrong)) == (pytest.approx(0.2), False)
-    assert joined(warped(0.9, **wrong), warped(0.2)) == (pytest.approx(0.2), False)
-    assert joined(warped(0.9, **wrong), warped(0.9, **wrong)) == (0.0, True)
+def test_only_the_visible_surface_is_used(wrong):
+    assert composited(warped(0.2), warped(0.9, **wrong)) == (pytest.approx(0.2), False)
+    assert composited(warped(0.9, **wrong), warped(0.2)) == (pytest.approx(0.2), False)
+    assert composited(warped(0.9, **wrong), warped(0.9, **wrong)) == (0.0, True)
 
 
 def test_depths_agree_within_the_tolerance():
-    assert joined(warped(0.0, depth=2.039), warped(1.0, depth=1.961))[0] == pytest.approx(0.5)
+    assert composited(warped(0.0, depth=2.039), warped(1.0, depth=1.961))[0] == pytest.approx(0.5)
 
 
-def test_sky_is_joined_too():
+def test_sky_is_composited():
     sky = pixel(depth=0.0, shape_index=0)
     assert (
-        joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0, depth=0.0, shape_index=0), of=sky)[0] == 0.5
+        composited(warped(0.0, depth=0.0, shape_index=0), warped(1.0, depth=0.0, shape_index=0), of=sky)[0]
+        == 0.5
     )
-    assert joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0), of=sky) == (0.0, False)
-    assert joined(warped(0.0, depth=0.0, shape_index=0), warped(1.0)) == (1.0, False)
+    assert composited(warped(0.0, depth=0.0, shape_index=0), warped(1.0), of=sky) == (0.0, False)
+    assert composited(warped(0.0, depth=0.0, shape_index=0), warped(1.0)) == (1.0, False)
 
 
-def test_a_hole_is_no_sky():
+def test_disocclusions_are_not_sky():
     sky = pixel(depth=0.0, shape_index=0)
-    hole = warped(0.0, depth=0.0, shape_index=0, is_hole=True)
-    assert not agrees(hole, sky, 0.02).any()
-    assert joined(hole, hole, of=sky) == (0.0, True)
+    disoccluded = warped(0.0, depth=0.0, shape_index=0, is_disoccluded=True)
+    assert not agrees(disoccluded, sky, 0.02).any()
+    assert composited(disoccluded, disoccluded, of=sky) == (0.0, True)
 
 
 def between(scene, path, first, last, frame):
@@ -105,22 +109,22 @@ def between(scene, path, first, last, frame):
     )
     truth = keyframe_of(scene, path.cameras[frame])
     progress = (frame - first) / (last - first)
-    color, is_hole = composite(before, after, truth.geometry, progress=progress, settings=SETTINGS)
-    return color, is_hole, truth, (before, after)
+    color, is_disoccluded = composite(before, after, truth.geometry, progress=progress, settings=SETTINGS)
+    return color, is_disoccluded, truth, (before, after)
 
 
-def test_a_room_between_its_keyframes_looks_as_it_does():
+def test_a_composited_room_matches_its_exact_image():
     path = room_walk(25)
-    color, is_hole, truth, _ = between(room(), path, 0, 12, 5)
-    assert is_hole.mean() < 0.06
+    color, is_disoccluded, truth, _ = between(room(), path, 0, 12, 5)
+    assert is_disoccluded.mean() < 0.06
     # Checkerboards sampled once a pixel and resampled: their edges differ by half a pixel.
-    assert psnr(color[~is_hole], truth.shading.color[~is_hole].astype(float)) > 20
-    smooth = np.isin(truth.geometry.shape_index, (2, 3, 4, 5, 7)) & ~is_hole  # walls and ceiling
+    assert psnr(color[~is_disoccluded], truth.shading.color[~is_disoccluded].astype(float)) > 20
+    smooth = np.isin(truth.geometry.shape_index, (2, 3, 4, 5, 7)) & ~is_disoccluded  # walls and ceiling
     assert psnr(color[smooth], truth.shading.color[smooth].astype(float)) > 34
 
 
-def test_one_keyframe_on_either_side_of_an_occluder():
-    # A ball before a wall: each keyframe sees the wall on another side of the ball; together, nearly all.
+def test_two_keyframes_show_both_sides_of_an_occluder():
+    # Each keyframe shows the wall on one side of the ball, both together nearly all of it.
     scene = AnalyticScene(
         (
             Plane((0, 0, -2), (0, 0, 1), Material((0.2, 0.3, 0.4))),
@@ -137,18 +141,18 @@ def test_one_keyframe_on_either_side_of_an_occluder():
     before, after = (warp_keyframe(keyframe_of(scene, at(x)), middle, SETTINGS) for x in (-0.5, 0.5))
     geometry = geometry_of(scene, middle)
     one = [~agrees(w, geometry, SETTINGS.depth_tolerance) for w in (before, after)]
-    color, is_hole = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
-    np.testing.assert_array_equal(is_hole, one[0] & one[1])
-    assert is_hole.mean() < 0.2 * min(one[0].mean(), one[1].mean())
-    ball = (geometry.shape_index == 2) & ~is_hole
+    color, is_disoccluded = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
+    np.testing.assert_array_equal(is_disoccluded, one[0] & one[1])
+    assert is_disoccluded.mean() < 0.2 * min(one[0].mean(), one[1].mean())
+    ball = (geometry.shape_index == 2) & ~is_disoccluded
     assert (color[ball][:, 2] == 0).all()  # no wall in it
-    assert (color[(geometry.shape_index == 1) & ~is_hole][:, 2] > 0.05).all()  # no ball in the wall
+    assert (color[(geometry.shape_index == 1) & ~is_disoccluded][:, 2] > 0.05).all()  # no ball in the wall
 
 
-@pytest.mark.parametrize("frame", [3, 8, 12, 16, 21])
-def test_holes_are_where_neither_keyframe_sees_the_surface(frame):
+@pytest.mark.parametrize("frame", [3, 12, 21])
+def test_disocclusions_are_surfaces_that_neither_keyframe_shows(frame):
     scene, path = room(), room_walk(25, size=(160, 120), turn_deg=30)
-    _, is_hole, truth, _ = between(scene, path, 0, 24, frame)
+    _, is_disoccluded, truth, _ = between(scene, path, 0, 24, frame)
     camera = path.cameras[frame]
     direction = ray_directions(camera)
     depth, shape_index = first_hits(scene, camera.eye, direction)
@@ -156,20 +160,20 @@ def test_holes_are_where_neither_keyframe_sees_the_surface(frame):
     seen = np.zeros(shape_index.shape, bool)
     edge = edges(shape_index)
     for end in (0, 24):
-        by = is_seen_by(scene, path.cameras[end], world)
+        by = is_visible_to(scene, path.cameras[end], world)
         seen |= by
         edge |= edges(by)
-    # A splat covers, or leaves, half a pixel more than the surface; nothing more than a pixel off.
+    # Splats end within half a pixel of the silhouette: nothing is wrong by more than a pixel.
     border = scipy.ndimage.binary_dilation(edge, np.ones((3, 3)))
-    wrong = (is_hole == seen) & ~border
-    assert (is_hole & ~border).sum() > 20
-    # Surfaces that a keyframe saw so obliquely that their splats are beyond the largest size are holes.
-    assert not (wrong & ~is_hole).any()
+    wrong = (is_disoccluded == seen) & ~border
+    assert (is_disoccluded & ~border).sum() > 20
+    # Surfaces at grazing angles in the keyframe, whose splats exceed the largest size, are disoccluded, too.
+    assert not (wrong & ~is_disoccluded).any()
     assert wrong.mean() < 0.002
     assert (truth.geometry.shape_index > 0).all()
 
 
-def is_seen_by(scene, camera, world):
+def is_visible_to(scene, camera, world):
     nearest, _ = first_hits(scene, camera.eye, world - camera.eye)
     at, ahead = projected(camera, world)
     inside = (ahead > 0) & (at > 0).all(-1) & (at < (camera.width, camera.height)).all(-1)

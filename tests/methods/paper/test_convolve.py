@@ -1,11 +1,11 @@
-"""The Gaussian of varying width against its twin."""
+"""Gaussian convolution of varying width against its twin."""
 
 import numpy as np
 import pytest
 
 from enfilade.arrays import image, lanes
 from enfilade.methods.paper.convolve import blur_axis
-from enfilade.methods.paper import reconstruct
+from enfilade.methods.paper.spatial_filter import reconstruct
 from twins.blur import blurred, blurred_rows
 
 H, W = 21, 26
@@ -17,23 +17,23 @@ def noise_image():
 
 
 def supports():
-    yield "still", np.full((H, W), 3.0, np.float32)
+    yield "at rest", np.full((H, W), 3.0, np.float32)
     yield "even", np.full((H, W), 4.0, np.float32)
     yield "fast", np.full((H, W), 11.0, np.float32)
     yield "wider than the image", np.full((H, W), 31.0, np.float32)
-    yield "a pixel alone", np.full((H, W), 1.0, np.float32)
+    yield "one pixel", np.full((H, W), 1.0, np.float32)
     yield "varying", np.random.default_rng(12).uniform(1, 12, (H, W)).astype(np.float32)
 
 
 @pytest.mark.parametrize(("name", "support"), list(supports()), ids=lambda v: v if isinstance(v, str) else "")
-def test_it_is_its_twin(name, support):
+def test_convolution_matches_its_twin(name, support):
     np.testing.assert_allclose(
         reconstruct(noise_image(), support), blurred(noise_image(), support), atol=ROUNDING
     )
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_each_axis_is_its_twin(axis):
+def test_each_axis_matches_its_twin(axis):
     support = np.linspace(1, 11, H * W, dtype=np.float32).reshape(H, W)
     got = image(blur_axis(lanes(noise_image()), lanes(support), width=W, height=H, axis=axis), H, W)
     if axis == 0:
@@ -54,7 +54,7 @@ def test_a_support_of_one_changes_nothing():
     np.testing.assert_array_equal(reconstruct(color, np.ones((H, W), np.float32)), color)
 
 
-def test_a_point_becomes_the_gaussian_that_is_promised():
+def test_the_impulse_response_is_the_gaussian():
     color = np.zeros((H, W, 3), np.float32)
     color[10, 13] = 1.0
     row = reconstruct(color, np.full((H, W), 9.0, np.float32))[10, :, 0]
@@ -64,7 +64,7 @@ def test_a_point_becomes_the_gaussian_that_is_promised():
     assert not row[13 + 5 :].any()
 
 
-def test_one_column_and_one_row():
+def test_images_of_one_column_or_row():
     for size in ((1, 9), (9, 1), (1, 1)):
         color = np.random.default_rng(1).random((*size, 3)).astype(np.float32)
         support = np.full(size, 7.0, np.float32)

@@ -48,7 +48,7 @@ def one(x=10.5, y=8.5, near=0.5, by_x=(1, 0), by_y=(0, 1), slope=(0, 0)):
 
 @pytest.mark.parametrize(("count", "seed", "spread"), [(60, 1, 1.5), (300, 2, 0.7), (25, 3, 5.0), (1, 4, 1)])
 @pytest.mark.parametrize("reach", [3.0, 12.0])
-def test_it_is_its_twin(count, seed, spread, reach):
+def test_splatting_matches_its_twin(count, seed, spread, reach):
     table = random_splats(count, seed, spread)
     got = winners(splat_nearest(as_lanes(table), width=W, height=H, reach=reach))
     np.testing.assert_array_equal(got, nearest([tuple(s) for s in table], W, H, reach))
@@ -62,7 +62,7 @@ def test_the_order_of_the_splats_does_not_matter():
     np.testing.assert_array_equal(np.where(shuffled < 0, -1, order[shuffled]), straight)
 
 
-def test_the_key_holds_the_depth_at_the_pixels_centre():
+def test_keys_contain_the_depth_at_the_pixel_centre():
     # 1 / depth is 0.5 at (10.5, 8.5) and rises by 0.1 a source pixel, which is 4 target pixels wide.
     keys = splat_nearest(
         as_lanes(one(by_x=(4, 0), by_y=(0, 4), slope=(0.1, 0.0))), width=W, height=H, reach=9.0
@@ -74,13 +74,13 @@ def test_the_key_holds_the_depth_at_the_pixels_centre():
     np.testing.assert_allclose(depth, 1.0 / (0.5 + 0.1 * (columns - 10) / 4), rtol=1e-6)
 
 
-def test_a_tie_goes_to_the_lower_lane():
+def test_of_equal_depths_the_lower_lane_wins():
     table = np.concatenate([one(), one()])
     keys = splat_nearest(as_lanes(table), width=W, height=H, reach=9.0)
     assert winners(keys)[8, 10] == 0
 
 
-def test_surfaces_at_infinity_lie_behind_everything():
+def test_surfaces_at_infinity_lie_behind_all_others():
     table = np.concatenate([one(near=0.0), one(near=1e-6)])
     keys = splat_nearest(as_lanes(table), width=W, height=H, reach=9.0)
     assert winners(keys)[8, 10] == 1
@@ -101,12 +101,12 @@ def test_surfaces_at_infinity_lie_behind_everything():
         {"by_x": (math.inf, 0)},
     ],
 )
-def test_what_is_turned_away_too_large_or_outside_covers_nothing(change):
+def test_splats_that_face_away_are_too_large_or_outside_cover_nothing(change):
     keys = splat_nearest(as_lanes(one(**change)), width=W, height=H, reach=9.0)
     assert (winners(keys) == -1).all()
 
 
-def test_tiles_of_a_plane_leave_no_crack():
+def test_splats_of_a_plane_leave_no_cracks():
     # Parallelograms of a linear map, at every magnification that stays within the reach.
     for angle in np.linspace(0, 1.5, 7):
         for scale in (0.4, 0.7, 1.0, 1.3, 2.0, 3.9):

@@ -1,4 +1,4 @@
-"""How wide the filter is: the numbers of §5.2."""
+"""Spatial and temporal support of the filter: the numbers of §5.2."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.paper import spatial_support_px, temporal_limits
-from enfilade.methods.paper.support import PAPER_PIXELS_PER_DEGREE
+from enfilade.methods.paper.support import PAPER_PIXELS_PER_DEGREE, spatial_support_px, temporal_limits
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.settings import AntialiasSettings
 from enfilade.viewing import Viewing
@@ -21,7 +20,7 @@ def support(speed_deg_s, settings=SETTINGS, density=PAPER_PIXELS_PER_DEGREE):
 
 
 def limits(speed_deg_s, surface=SurfaceClass.DIFFUSE, settings=SETTINGS):
-    """Frames to either side: most, and before the growth may end."""
+    """Frames to either side: the most, and the least before a slow trajectory may end."""
     zeros = np.zeros((1, 1, 3), np.float32)
     one = np.ones((1, 1))
     geometry = Geometry(
@@ -49,20 +48,20 @@ def test_spatial_support_rises_with_velocity(a, b):
     assert 3.0 <= support(slow) <= support(fast) <= 11.0
 
 
-def test_spatial_support_is_that_of_the_settings():
+def test_spatial_support_follows_the_settings():
     settings = AntialiasSettings(
         support_still_px=1.0, support_fast_px=5.0, support_beyond_px=7.0, fast_deg_s=8.0
     )
     assert [support(v, settings) for v in (0, 4, 8, 9)] == [1.0, 3.0, 5.0, 7.0]
 
 
-def test_the_pixels_are_those_of_the_papers_screen():
+def test_blur_is_given_in_pixels_of_the_papers_display():
     assert Viewing(640, 480).pixels_per_degree == pytest.approx(PAPER_PIXELS_PER_DEGREE, abs=1e-3)
     finer = 2 * PAPER_PIXELS_PER_DEGREE
     assert [support(v, density=finer) for v in (0, 8, 16, 17)] == pytest.approx([3, 9, 15, 19])
 
 
-def test_a_support_is_a_pixel_at_least():
+def test_spatial_support_is_at_least_one_pixel():
     shrinking = AntialiasSettings(support_still_px=3.0, support_fast_px=1.0, support_beyond_px=1.0)
     assert support(16, shrinking, density=160.0) == 1.0
     assert support(99, shrinking, density=160.0) == 1.0
@@ -78,17 +77,20 @@ def test_temporal_support(speed_deg_s, frames_each_side):
 
 @pytest.mark.parametrize("surface", [SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT])
 @pytest.mark.parametrize("speed_deg_s", [0.0, 0.1, 5.0])
-def test_specular_surfaces_have_a_short_one(surface, speed_deg_s):
+def test_specular_surfaces_have_a_short_temporal_support(surface, speed_deg_s):
     assert limits(speed_deg_s, surface) == (1, 1)
 
 
 @pytest.mark.parametrize("surface", [SurfaceClass.NONE, SurfaceClass.DIFFUSE, SurfaceClass.EMISSIVE])
-def test_others_do_not(surface):
+def test_other_surfaces_have_the_full_temporal_support(surface):
     assert limits(5.0, surface) == (5, 5)
 
 
-def test_temporal_support_is_that_of_the_settings():
+def test_temporal_support_follows_the_settings():
     settings = AntialiasSettings(frames=1, slow_frames=1, specular_frames=1)
     assert limits(5.0, settings=settings) == (0, 0)
-    assert limits(0.0, settings=AntialiasSettings(frames=9, slow_frames=3)) == (4, 4)  # it never shrinks
+    assert limits(0.0, settings=AntialiasSettings(frames=9, slow_frames=3)) == (
+        4,
+        4,
+    )  # slow pixels never have less
     assert limits(5.0, SurfaceClass.MIRROR, AntialiasSettings(frames=3, specular_frames=9)) == (1, 1)

@@ -1,4 +1,4 @@
-"""The filter along the flow: its twin, and what it is for."""
+"""The temporal filter along the image flow: against its twin, and its effect on aliasing."""
 
 import dataclasses
 
@@ -8,19 +8,20 @@ import pytest
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import image_flow
-from enfilade.methods.paper import Slice, filter_along_flow, reconstruct, spatial_support_px
-from enfilade.methods.paper.support import TemporalLimits
+from enfilade.methods.paper.spatial_filter import reconstruct
+from enfilade.methods.paper.support import TemporalLimits, spatial_support_px
+from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.records import Flow, Geometry
 from enfilade.settings import AntialiasSettings
-from keyframes_analytic import geometry_of, psnr, traced_image
-from scenes_analytic import room, room_walk
 from support.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad
+from support.analytic_truth import geometry_of, psnr, traced_image
+from support.example_scenes import room, room_walk
 from twins.trajectory import filtered
 
 H, W = 14, 18
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
 SETTINGS = AntialiasSettings()
-APART = AntialiasSettings(separate_items=True)
+SEPARATED = AntialiasSettings(separate_items=True)
 
 
 def limits(reach, least=None):
@@ -29,8 +30,8 @@ def limits(reach, least=None):
     return TemporalLimits(reach, least)
 
 
-def made_up(seed, flow_scale=1.0):
-    """A frame of noise with a flow of noise over two shapes."""
+def noise_slice(seed, flow_scale=1.0):
+    """A frame of noise with random flow over two shapes."""
     random = np.random.default_rng(seed)
     zeros = np.zeros((H, W, 3), np.float32)
     depth = random.uniform(1.0, 1.04, (H, W)).astype(np.float32)
@@ -49,15 +50,15 @@ def made_up(seed, flow_scale=1.0):
         (4, 1, 5, 5, 2.0),
         (5, 5, 5, 2, 0.1),  # slow: ends where half a pixel is covered
         (0, 0, 5, 5, 1.0),
-        (3, 3, 1, 1, 1.0),  # more neighbours than it looks at
+        (3, 3, 1, 1, 1.0),  # more neighbours than the reach
         (2, 2, 0, 0, 1.0),
     ],
 )
-@pytest.mark.parametrize("settings", [SETTINGS, APART], ids=["together", "apart"])
-def test_it_is_its_twin(earlier, later, reach, least, flow_scale, settings):
-    frame = made_up(1, flow_scale)
-    before = [made_up(10 + k, flow_scale) for k in range(earlier)]
-    after = [made_up(20 + k, flow_scale) for k in range(later)]
+@pytest.mark.parametrize("settings", [SETTINGS, SEPARATED], ids=["together", "separated"])
+def test_filtering_matches_its_twin(earlier, later, reach, least, flow_scale, settings):
+    frame = noise_slice(1, flow_scale)
+    before = [noise_slice(10 + k, flow_scale) for k in range(earlier)]
+    after = [noise_slice(20 + k, flow_scale) for k in range(later)]
     of = limits(reach, least)
     got = filter_along_flow(frame, before, after, of, settings)
     expected = filtered(frame, before, after, of.reach, of.least, separate_items=settings.separate_items)
@@ -67,7 +68,7 @@ def test_it_is_its_twin(earlier, later, reach, least, flow_scale, settings):
 
 
 def test_each_pixel_has_its_own_reach():
-    frame, before, after = made_up(1), [made_up(2), made_up(3)], [made_up(4), made_up(5)]
+    frame, before, after = noise_slice(1), [noise_slice(2), noise_slice(3)], [noise_slice(4), noise_slice(5)]
     reach = np.arange(H * W).reshape(H, W) % 3
     got = filter_along_flow(frame, before, after, limits(reach), SETTINGS)
     for value in range(3):
@@ -75,24 +76,24 @@ def test_each_pixel_has_its_own_reach():
         np.testing.assert_array_equal(got[reach == value], alone[reach == value])
 
 
-def test_without_reach_nothing_changes():
-    frame = made_up(1)
-    got = filter_along_flow(frame, [made_up(2)], [made_up(3)], limits(0), SETTINGS)
+def test_a_support_of_one_frame_changes_nothing():
+    frame = noise_slice(1)
+    got = filter_along_flow(frame, [noise_slice(2)], [noise_slice(3)], limits(0), SETTINGS)
     assert got.tobytes() == frame.color.tobytes()
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, APART], ids=["together", "apart"])
-def test_frames_that_stand_still_are_unchanged(settings):
-    frame = made_up(1, flow_scale=0.0)
+@pytest.mark.parametrize("settings", [SETTINGS, SEPARATED], ids=["together", "separated"])
+def test_static_frames_are_unchanged(settings):
+    frame = noise_slice(1, flow_scale=0.0)
     got = filter_along_flow(frame, [frame] * 7, [frame] * 7, limits(7, 5), settings)
     np.testing.assert_allclose(got, frame.color, rtol=1e-6)  # 15 products, summed and divided in float32
 
 
 def weights_of(frames, speed_px, *, reach=7, least=5):
-    """Weights with which the frames to the right count, by giving each of them its own colour."""
+    """Weights of the frame and of the later ones, from impulses in one frame at a time."""
 
     def slice_(value):
-        one = made_up(1, 0.0)
+        one = noise_slice(1, 0.0)
         forward = np.full((H, W, 2), (speed_px, 0), np.float32)
         return Slice(
             np.full((H, W, 3), value, np.float32),
@@ -126,12 +127,12 @@ def test_weights_are_a_gaussian_over_the_support():
         (0.3, 5),
     ],
 )
-def test_the_growth_ends_where_half_a_pixel_is_covered(speed_px, frames):
+def test_slow_trajectories_end_when_they_cover_half_a_pixel(speed_px, frames):
     assert (weights_of(7, speed_px) > 0).sum() - 1 == frames
 
 
 def test_a_trajectory_ends_at_the_border():
-    frame = made_up(1, 0.0)
+    frame = noise_slice(1, 0.0)
     out = Flow(
         np.zeros((H, W, 2), np.float32),
         np.full((H, W, 2), (0.0, 4.0), np.float32),
@@ -169,7 +170,7 @@ def middle_filtered(slices, settings=SETTINGS, reach=5):
 
 
 def test_a_moving_texture_has_less_aliasing():
-    # Checks of 0.8 px: centre samples alias badly; along the flow they fall on other places in the pixel.
+    # Checks of 0.8 px alias; the samples along the flow lie at different places in the pixel.
     checks = Material(Checker((1, 1, 1), (0, 0, 0), period=0.11))
     scene = AnalyticScene((Plane((0, 0, 0), (0, 0, 1), checks),))
     size, step = (64, 48), 0.0237  # 0.34 px a frame
@@ -190,8 +191,8 @@ def test_a_moving_texture_has_less_aliasing():
     assert errors[2] > errors[1] + 6  # the motion-compensated one much more
 
 
-def test_compensated_motion_keeps_a_pattern_sharp():
-    # What the same average does without the flow: it blurs along the motion.
+def test_motion_compensation_keeps_patterns_sharp():
+    # The same average without flow blurs along the motion.
     scene, path = room(), room_walk(48)
     slices = sequence(scene, path, support=False)[18:29]
     still = [
@@ -206,8 +207,8 @@ def test_compensated_motion_keeps_a_pattern_sharp():
     assert with_flow > psnr(slices[5].color, truth)  # and better than one sample a pixel
 
 
-def test_separate_items_leave_no_ghost_beside_an_occluder():
-    # A white post before a black wall, the camera moves: behind the post the trajectories of the wall end.
+def test_flow_separation_leaves_no_ghost_beside_an_occluder():
+    # A white post before a black wall: where the post hides the wall, trajectories of the wall end.
     white = Material((1.0, 1.0, 1.0))
     scene = AnalyticScene(
         (
@@ -221,9 +222,9 @@ def test_separate_items_leave_no_ghost_beside_an_occluder():
     slices = sequence(scene, CameraPath(cameras, tuple(range(11)), 30.0), support=False)
     wall = slices[5].geometry.shape_index == 1
     ghost = middle_filtered(slices)[wall][:, 0]
-    apart = middle_filtered(slices, APART)[wall][:, 0]
+    apart = middle_filtered(slices, SEPARATED)[wall][:, 0]
     assert ghost.max() > 0.1
     # A trajectory that just misses the post interpolates half a pixel of it.
     assert apart.sum() < 0.3 * ghost.sum()
-    post = middle_filtered(slices, APART)[slices[5].geometry.shape_index == 2][:, 0]
+    post = middle_filtered(slices, SEPARATED)[slices[5].geometry.shape_index == 2][:, 0]
     assert post.min() > 0.6

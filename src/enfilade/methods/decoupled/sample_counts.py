@@ -110,11 +110,15 @@ def _pilot_frame(shot: Shot) -> int:
 
 
 def _pilot_jnd(shot: Shot, frame: int, where: Mask) -> float:
-    """Visible difference between two irradiance images of a keyframe, as its surfaces show them."""
+    """Visible difference between two irradiance images of a keyframe, as its surfaces show them.
+
+    Their random numbers are not those of the keyframe's own irradiance image, whose error would then depend
+    on the number of paths that they decide.
+    """
     walk = shot.walk
     geometry = walk.view(frame).geometry
     shown = []
-    for purpose in (Purpose.PILOT, Purpose.IRRADIANCE):
+    for purpose in (Purpose.PILOT, Purpose.SECOND_PILOT):
         image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
         light = light_of(accumulate(geometry, where, [upload(geometry, image)]))
         shown.append(walk.display_luminance(geometry.albedo * light))

@@ -1,4 +1,6 @@
-"""Balls of every material in a lit corner, and panes, as Mitsuba scenes."""
+"""Mitsuba scenes of spheres of every material, and of panes, in an illuminated corner."""
+
+from functools import cache
 
 import numpy as np
 
@@ -70,7 +72,7 @@ def opened_scene(folder, balls: dict[str, str], sky: str = CONSTANT) -> MitsubaR
 
 
 def pane(name: str, z: float, reflectance: float = 1.0, transmittance: float = 1.0) -> str:
-    """A ball's material, its end, and an upright pane, but for its end."""
+    """An entry of `balls` that ends its sphere and opens the shape of an upright pane."""
     return (
         f'{MATERIALS["diffuse"]}</shape><shape type="rectangle" id="{name}"><transform name="to_world">'
         f'<scale value="3"/><translate z="{z}"/></transform><bsdf type="thindielectric">'
@@ -87,13 +89,18 @@ def pixels_of(camera: Camera) -> np.ndarray:
     return np.arange(camera.width * camera.height, dtype=np.uint32)
 
 
+@cache
+def integrator_of(renderer: MitsubaRenderer) -> Integrator:
+    """One integrator a renderer, whose kernels are recorded once."""
+    return Integrator(renderer)
+
+
 def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> list[Shading]:
     """Reflection and transmission, (N,), without a cache."""
-    integrator = Integrator(renderer)
     estimate = Estimate(
         camera,
         pixels_of(camera),
-        lambda rays, rng, square: integrator.specular_radiance(
+        lambda rays, rng, square: integrator_of(renderer).specular_radiance(
             IrradianceCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE
         ),
         chunk=1 << 20,

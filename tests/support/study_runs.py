@@ -14,11 +14,11 @@ from enfilade.monitor import Silence
 from enfilade.runs.job import Job
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
-from scenes_analytic import room_walk
 from studies.cases.plain import PlainlyLit
 from studies.cases.windows import Windows
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene
+from support.example_scenes import room_walk
 
 # A screen of 64 x 48 px at the paper's 28 pixels a degree. Keyframes every 6 frames.
 TABLES: dict[str, dict[str, Any]] = {

@@ -1,4 +1,4 @@
-"""Made-up runs and plans, with figures like those of the paper's Figs. 12 and 13."""
+"""Synthetic runs, summaries and plans, with values like those of the paper's Figs. 12 and 13."""
 
 import math
 
@@ -14,7 +14,7 @@ SIZE = (64, 48)
 FRAMES = tuple(range(1, 11))
 
 
-def made_up_summary(count=120, *, spacing=20, method="paper"):
+def synthetic_summary(count=120, *, spacing=20, method="paper"):
     """Summary of a run: of `paper` with segments, of `decoupled` with rays, of `reference` with neither."""
     per_frame = []
     for i in range(count):
@@ -91,7 +91,7 @@ def _segment(first, last, visible, is_split, depth):
     }
 
 
-def made_up_plan(count=60, *, method="paper"):
+def synthetic_plan(count=60, *, method="paper"):
     """A plan: of `decoupled` with rays."""
     speed = [abs(6.0 * math.sin(i / 17.0)) + 0.3 for i in range(count)]
     return {
@@ -111,7 +111,7 @@ def made_up_plan(count=60, *, method="paper"):
     }
 
 
-def made_up_run(folder, *, noise=0.0, finished=None, has_video=True, facts=None, layers=None, **identity):
+def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=None, layers=None, **identity):
     """Write the run folder of a user's method with the passes ``probe`` and ``frames``.
 
     Parameters

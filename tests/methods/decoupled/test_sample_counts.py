@@ -1,0 +1,78 @@
+"""Numbers of samples: the pilot pass, the quality, and pixels of small emitters."""
+
+import numpy as np
+import pytest
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled.sample_counts import (
+    edge_spp,
+    irradiance_spp,
+    small_emitter_pixels,
+    specular_spp,
+)
+from enfilade.records import Geometry
+from enfilade.renderer import Emitters
+from enfilade.settings import DecoupledSettings
+
+H, W = 20, 30
+CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
+
+
+def geometry_of(shape_index):
+    """A G-buffer of shapes at depth 1."""
+    zeros = np.zeros((H, W, 3), np.float32)
+    depth = (shape_index > 0).astype(np.float32)
+    return Geometry(CAMERA, depth, zeros, zeros, shape_index.astype(np.uint32), np.zeros((H, W), np.uint8))
+
+
+def emitters(pixels, depth, shape_index):
+    """Points at the centres of pixels (x, y)."""
+    across = np.array([(x + 0.5, y + 0.5, 1.0) for x, y in pixels]).reshape(-1, 3)
+    position = CAMERA.eye + depth * (across @ CAMERA.direction_from_pixel.T)
+    return Emitters(position.astype(np.float32), np.full(len(pixels), shape_index, np.uint32))
+
+
+@pytest.mark.parametrize(
+    ("jnd", "quality", "keyframes", "spp"),
+    [
+        (10.0, 1.0, 2, 200),  # 4 (10 / 1)^2 / 2
+        (10.0, 1.0, 20, 44),  # over 9 accumulated images, of which half are counted: 44.4, to the next 4
+        (10.0, 5.0, 2, 8),
+        (0.0, 1.0, 2, 4),  # the fewest
+        (100.0, 1.0, 2, 256),  # the most
+    ],
+)
+def test_irradiance_spp_falls_with_the_square_of_the_quality(jnd, quality, keyframes, spp):
+    assert irradiance_spp(jnd, quality, keyframes) == pytest.approx(spp, abs=4)
+
+
+def test_camera_and_specular_rays_follow_the_quality_or_the_settings():
+    counts = [
+        (edge_spp(s), specular_spp(s)) for s in (DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64))
+    ]
+    assert counts == [(64, 34), (64, 17), (16, 8), (8, 4)]
+    given = DecoupledSettings(edge_spp=5, specular_spp=3)
+    assert (edge_spp(given), specular_spp(given)) == (5, 3)
+
+
+def test_small_emitters_are_found_between_camera_rays():
+    geometry = geometry_of(np.ones((H, W)))
+    mask = small_emitter_pixels(emitters([(4, 7), (4, 7), (29, 19)], 0.9, shape_index=5), geometry)
+    assert sorted(np.argwhere(mask).tolist()) == [[7, 4], [19, 29]]
+    sky = geometry_of(np.zeros((H, W)))
+    assert small_emitter_pixels(emitters([(4, 7)], 50.0, shape_index=5), sky).sum() == 1
+    assert not small_emitter_pixels(emitters([], 50.0, shape_index=5), sky).any()
+
+
+def test_occluded_emitters_and_the_interior_of_large_ones_are_left_out():
+    shape_index = np.ones((H, W))
+    shape_index[5:15, 3:13] = 2
+    geometry = geometry_of(shape_index)
+    for pixels, depth in (([(4, 7)], 1.2), ([(4, 7)], -0.9), ([(-1, 7), (4, 20), (30, 7)], 0.9)):
+        assert not small_emitter_pixels(emitters(pixels, depth, shape_index=5), geometry).any()
+    large = [(x, y) for x in range(3, 13) for y in range(5, 15)]
+    outline = np.zeros((H, W), bool)
+    outline[5:15, 3:13] = True
+    outline[6:14, 4:12] = False
+    found = small_emitter_pixels(emitters(large, 1.0, shape_index=2), geometry)
+    np.testing.assert_array_equal(found, outline)

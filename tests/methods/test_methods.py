@@ -1,0 +1,59 @@
+"""All methods, task by task in memory: independent random numbers, finite frames near the reference."""
+
+import numpy as np
+import pytest
+
+from enfilade.methods.opener import METHODS, open_method
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Provenance
+from enfilade.settings import Settings
+from support.closed_room import opened_room, room_path
+from support.in_memory import run_passes
+
+PATH = room_path(7, (48, 32))
+TABLES = {
+    "sampling": {"spp": 16},
+    "keyframes": {"spacing": 3},
+    "decoupled": {"spacing": 3, "quality": 100.0},  # few paths: as many in the pilot as in the keyframes
+    "masks": {"split_percent": 20.0},
+}
+
+
+class RecordingWalkthrough(Walkthrough):
+    """Records the keys of all random numbers."""
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.keys = []
+
+    def random(self, frame, purpose):
+        self.keys.append((self.path.numbers[frame], purpose))
+        return super().random(frame, purpose)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Walkthrough and results of each method."""
+    renderer = opened_room(tmp_path_factory.mktemp("room"))
+    walks = {name: RecordingWalkthrough(PATH, Settings.from_tables(TABLES), renderer) for name in METHODS}
+    return {name: (walk, run_passes(open_method(name), walk)) for name, walk in walks.items()}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_no_stream_of_random_numbers_is_used_twice(runs, name):
+    # In particular, the pilot's two images and the irradiance image of its keyframe are independent.
+    keys = runs[name][0].keys
+    assert len(set(keys)) == len(keys) >= len(PATH)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_frames_are_those_of_the_reference_up_to_noise(runs, name):
+    reference, found = (runs[n][1] for n in ("reference", name))
+    assert np.isfinite(found.colors).all()
+    np.testing.assert_allclose(found.colors.mean(axis=(1, 2)), reference.colors.mean(axis=(1, 2)), rtol=0.05)
+    provenances = np.unique([found.record("frames", frame).provenance for frame in range(len(PATH))])
+    reused = {Provenance.REUSED, Provenance.SPECULAR, Provenance.DISOCCLUDED}
+    assert set(provenances) - {Provenance.SLOW} == {
+        Provenance.KEYFRAME,
+        *(reused if name != "reference" else ()),
+    }
