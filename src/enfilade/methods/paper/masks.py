@@ -91,7 +91,7 @@ def _is_visible(jnd: F32, region: Mask, least: float, settings: MaskSettings) ->
 
     # Compare the percentage above 1 JND.
     size = np.count_nonzero(region)
-    percent = 100.0 * np.count_nonzero(region & (jnd > 1.0)) / max(size, 1)
+    percent = 100.0 * float(np.mean(jnd[region] > 1.0))
     if size >= least and percent > settings.specular_percent:
         return True
 
