@@ -70,7 +70,7 @@ def test_any_settings_survive_their_tables(spp, adaptation, placement, separate)
     tables = {
         "sampling": {"spp": spp},
         "keyframes": {"adaptation": adaptation, "placement": placement.value},
-        "antialias": {"separate_items": separate},
+        "antialias": {"separate_shapes": separate},
     }
     settings = Settings.from_tables(tables)
     assert settings[KeyframeSettings] == KeyframeSettings(placement=placement, adaptation=adaptation)
@@ -111,7 +111,7 @@ def test_ranges_include_their_ends_and_nothing_beyond(cls, f):
         ({"viewing": {"distance_m": math.nan}}, "distance_m = nan"),
         ({"viewing": {"distance_m": math.inf}}, "finite"),
         ({"viewing": {"distance_m": 10**400}}, "finite"),
-        ({"antialias": {"separate_items": 1}}, "expected bool"),
+        ({"antialias": {"separate_shapes": 1}}, "expected bool"),
         ({"antialias": {"frames": 10}}, r"\[antialias\] frames = 10: give an odd number"),
         ({"antialias": {"slow_frames": 2}}, "slow_frames = 2: give an odd number"),
         ({"antialias": {"specular_frames": 4}}, "specular_frames = 4: give an odd number"),

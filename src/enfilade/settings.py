@@ -253,7 +253,7 @@ class AntialiasSettings(Section):
         11.0, "Spatial support beyond it, pixels of 1/28 degree.", least=1.0, most=31.0
     )
     fast_deg_s: float = option(16.0, "The fast velocity, deg/s.", least=0.1)
-    separate_items: bool = option(False, "Leave out samples of another surface along the flow (§5.3).")
+    separate_shapes: bool = option(False, "Leave out samples of another surface along the flow (§5.3).")
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ def _compare(windows: Windows, frame: int) -> tuple[dict[str, Any], Example]:
     settings = windows.walk.settings[AntialiasSettings]
     raw, reference = windows.traced(frame).color, windows.reference(frame).color
     together, apart = (
-        windows.antialiased(frame, replace(settings, separate_items=separate)) for separate in (False, True)
+        windows.antialiased(frame, replace(settings, separate_shapes=separate)) for separate in (False, True)
     )
     changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.shape_index)
     errors = [np.abs(viewer.shown(image) - viewer.shown(reference)) for image in (together, apart)]

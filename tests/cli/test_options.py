@@ -48,11 +48,11 @@ def test_precedence(settings, tmp_path):
 
 def test_assignments(settings):
     made = settings(
-        *("--set", "keyframes.placement=equal-flow", "--set", "antialias.separate_items = true", *PAPER),
+        *("--set", "keyframes.placement=equal-flow", "--set", "antialias.separate_shapes = true", *PAPER),
         *("--set", "video.codec='av1'", "--codec", "ffv1"),
     )
     assert made[KeyframeSettings].placement is Placement.EQUAL_FLOW
-    assert made[AntialiasSettings].separate_items
+    assert made[AntialiasSettings].separate_shapes
     assert made[VideoSettings].codec == "ffv1"
     assert settings("--quality", "5")[DecoupledSettings].quality == 5.0
 

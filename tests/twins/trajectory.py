@@ -7,7 +7,7 @@ import numpy as np
 from twins.bilinear import interpolated
 
 
-def filtered(frame, earlier, later, reach, least, *, separate_items=False):
+def filtered(frame, earlier, later, reach, least, *, separate_shapes=False):
     """Colours (H, W, 3) of `frame`, averaged along its trajectories."""
     height, width = reach.shape
     out = np.zeros((height, width, 3))
@@ -17,7 +17,7 @@ def filtered(frame, earlier, later, reach, least, *, separate_items=False):
             weights = 1.0
             for neighbours, direction in ((earlier, "backward"), (later, "forward")):
                 for distance, color in _walk(
-                    frame, neighbours, direction, (column, row), reach, least, separate_items
+                    frame, neighbours, direction, (column, row), reach, least, separate_shapes
                 ):
                     w = math.exp(-0.5 * (distance / ((2 * reach[row, column] + 1) / 6)) ** 2)
                     total = total + w * color
@@ -26,7 +26,7 @@ def filtered(frame, earlier, later, reach, least, *, separate_items=False):
     return out
 
 
-def _walk(frame, neighbours, direction, pixel, reach, least, separate_items):
+def _walk(frame, neighbours, direction, pixel, reach, least, separate_shapes):
     height, width = reach.shape
     column, row = pixel
     x, y, travelled = column + 0.5, row + 0.5, 0.0
@@ -42,7 +42,7 @@ def _walk(frame, neighbours, direction, pixel, reach, least, separate_items):
         travelled += math.hypot(*flow)
         if not (0 <= x < width and 0 <= y < height):
             return
-        if separate_items:
+        if separate_shapes:
             there = following.geometry
             there_depth = float(there.depth[int(y), int(x)])
             if there.shape_index[int(y), int(x)] != shape_index or abs(there_depth - depth) > 0.05 * depth:

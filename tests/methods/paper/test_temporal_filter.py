@@ -21,7 +21,7 @@ from twins.trajectory import filtered
 H, W = 14, 18
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
 SETTINGS = AntialiasSettings()
-SEPARATED = AntialiasSettings(separate_items=True)
+SEPARATED = AntialiasSettings(separate_shapes=True)
 
 
 def limits(reach, least=None):
@@ -61,7 +61,7 @@ def test_filtering_matches_its_twin(earlier, later, reach, least, flow_scale, se
     after = [noise_slice(20 + k, flow_scale) for k in range(later)]
     of = limits(reach, least)
     got = filter_along_flow(frame, before, after, of, settings)
-    expected = filtered(frame, before, after, of.reach, of.least, separate_items=settings.separate_items)
+    expected = filtered(frame, before, after, of.reach, of.least, separate_shapes=settings.separate_shapes)
     # Positions are rounded to 1/256 px, where float32 may choose another one: a weight then differs by 1/256.
     assert (np.abs(got - expected) < 3e-6).mean() > 0.97
     np.testing.assert_allclose(got, expected, atol=0.02)

@@ -57,14 +57,14 @@ def filter_along_flow(
     limits
         Temporal support.
     settings
-        With ``separate_items`` a trajectory ends where it meets another surface (§5.3).
+        With ``separate_shapes`` a trajectory ends where it meets another surface (§5.3).
 
     Returns
     -------
     (H, W, 3) float32
     """
     height, width = limits.reach.shape
-    weights = _Weights(lanes(limits.reach), lanes(limits.least), settings.separate_items)
+    weights = _Weights(lanes(limits.reach), lanes(limits.least), settings.separate_shapes)
     color = lanes(frame.color)
     total, weight = Array3f(color), Float(1)
     for neighbours, is_later in ((earlier, False), (later, True)):
@@ -89,7 +89,7 @@ def filter_along_flow(
 class _Weights:
     reach: Any  # Float
     least: Any  # Float
-    separate_items: bool
+    separate_shapes: bool
 
 
 @dataclass
@@ -138,7 +138,7 @@ class _Trajectories:
         # End outside the image, and on another surface.
         is_inside = (self.x >= 0) & (self.x < self.width) & (self.y >= 0) & (self.y < self.height)
         self.is_open &= is_wanted & is_inside
-        if self.weights.separate_items:
+        if self.weights.separate_shapes:
             self._separate(into)
 
     def weight(self, distance: int) -> Any:
