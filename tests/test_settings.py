@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enfilade.errors import SettingsError
+from enfilade.methods.analysis import SPACING
 from enfilade.settings import (
     LAYERS,
     SECTIONS,
@@ -39,7 +40,7 @@ def name(value):
 def test_the_paper_is_the_default():
     settings = Settings()
     keyframes, masks = settings[KeyframeSettings], settings[MaskSettings]
-    assert (keyframes.spacing, keyframes.adaptation) == (25, 0.5)  # §4.2
+    assert (SPACING, keyframes.adaptation) == (25, 0.5)  # §4.2
     assert masks.slow_deg_s == 0.5  # §4.1
     assert masks.split_percent == 10.0  # §4.3
     assert (masks.specular_jnd, masks.specular_percent) == (2.0, 25.0)

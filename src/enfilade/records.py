@@ -33,7 +33,6 @@ class SurfaceClass(IntEnum):
 
 
 SPECULAR = (SurfaceClass.GLOSSY, SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
-LOBE_LAYERS = ("reflected", "transmitted")  # of what lobes scatter: the latter straight through what is clear
 MIN_DIFFUSE_ALBEDO = 1e-4  # below it a surface counts as having no diffuse lobe
 
 

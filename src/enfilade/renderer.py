@@ -79,13 +79,13 @@ class Rays:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """First hits of rays, as lanes. All other fields are undefined where `is_hit` is false.
+    """First hits of rays, as lanes. Fields but `is_hit` and `distance` are undefined where nothing is hit.
 
     Attributes
     ----------
     is_hit : Bool
     distance : Float
-        Along the ray, in lengths of its direction.
+        Along the ray, in lengths of its direction; infinite where nothing is hit.
     normal : Array3f
         Shading normal in world space, unit length, in the hemisphere of the ray's origin.
     albedo : Array3f
@@ -334,4 +334,4 @@ def why_inseparable(renderer: Renderer) -> str:
     """Reason why a renderer can't estimate the lobes of its scene apart; empty if it can."""
     if isinstance(renderer, LobeRenderer):
         return renderer.why_inseparable
-    return f"the renderer {renderer.describe().renderer!r} does not estimate lobes apart"
+    return f"the renderer {renderer.describe().renderer!r} does not separate lobes"

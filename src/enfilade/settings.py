@@ -174,10 +174,20 @@ class KeyframeSettings(Section):
     placement: Placement = option(
         Placement.ADAPTED, "Uniform spacing adapted by flow (Eq. 6), plain, or equal flow."
     )
-    spacing: int = option(25, "Uniform spacing of keyframes, frames (Delta).", least=2)
+    spacing: int = option(
+        0, "Uniform spacing of keyframes, frames (Delta), 2 or more; 0: 25 of paper, 8 of decoupled.", least=0
+    )
     adaptation: float = option(
         0.5, "Largest relative change of the spacing (A of Eq. 6).", least=0.0, most=0.9
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.spacing == 1:
+            raise SettingsError(
+                f"[{self.table}] spacing = 1: every frame would be a keyframe; give 2 or more, or 0 for the "
+                "method's own"
+            )
 
 
 @dataclass(frozen=True)
@@ -268,7 +278,6 @@ class DecoupledSettings(Section):
     irradiance_spp: int = option(
         0, "Paths a pixel of an irradiance image; 0: derived from the quality.", least=0, most=1_048_576
     )
-    spacing: int = option(8, "Uniform spacing of the keyframes, frames.", least=2)
     lookup_keyframes: int = option(4, "Nearest keyframes that are looked up.", least=1, most=16)
     min_spp: int = option(4, "Camera rays of every pixel.", least=2, most=4096)
     edge_spp: int = option(

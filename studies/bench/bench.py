@@ -22,7 +22,6 @@ from typing import Any
 
 from enfilade.camera.path import CameraPath
 from enfilade.cli.progress import watch
-from enfilade.comparison.measures import SCALES
 from enfilade.device import Choice, activate
 from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.files import read_json, write_json
@@ -43,6 +42,7 @@ from enfilade.settings import (
     ViewingSettings,
 )
 from studies.bench.configurations import FAMILIES, Configuration
+from studies.bench.measures import SCALES
 from studies.bench.measuring import available, measure
 from studies.bench.ratios import ratios
 from studies.bench.rivals import why_missing

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison.measures import SCALES, DisplayedPair, display_pair, open_measure, visible_before
+from enfilade.comparison.measures import display_pair
 from enfilade.comparison.measures import why_missing as why_no_measure
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
@@ -20,6 +20,7 @@ from enfilade.records import Flow
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.settings import MetricSettings, ViewingSettings
+from studies.bench.measures import SCALES, Temporal, TrackedPair, open_measure, visible_before
 
 
 def available(asked: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
@@ -34,8 +35,7 @@ def available(asked: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
     has_changes = any(path.neighbours(frame)[0] for frame in range(len(path)))
     reasons = {name: why_no_measure(name) for name in SCALES}
     if not has_changes:
-        changes = (name for name, scale in SCALES.items() if scale.is_of_changes)
-        reasons |= {name: f"{name} is left out: it needs consecutive frames" for name in changes}
+        reasons[Temporal.name] = f"{Temporal.name} is left out: it needs consecutive frames"
     for name in asked:
         if why := reasons.get(name, f"there is no measure {name!r}; known are: {', '.join(SCALES)}"):
             raise SettingsError(why)
@@ -74,7 +74,7 @@ def measure(
         By measure: ``score`` and ``per_frame``, None where there is no number (identical; a first frame).
     """
     pursuit = Pursuit(job.settings[MetricSettings].metering.value)
-    measures = {name: open_measure(name, job.viewing, pursuit=pursuit) for name in names}
+    measures = {name: open_measure(name, job.viewing, pursuit) for name in names}
     values: dict[str, list[float | None]] = {name: [] for name in names}
     for done, pair in enumerate(pairs(test, reference, job, share=share), 1):
         for name, one in measures.items():
@@ -89,7 +89,7 @@ def measure(
     }
 
 
-def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[DisplayedPair]:
+def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Iterator[TrackedPair]:
     """Frames of two run folders side by side, in order; see :func:`measure`."""
     path, exposure_ev = job.path, job.settings[ViewingSettings].exposure_ev
     runs = RunFolder.read(test), RunFolder.read(reference)
@@ -102,10 +102,8 @@ def pairs(test: Path, reference: Path, job: Job, *, share: float = 1.0) -> Itera
         color, wanted = (np.ascontiguousarray(of["RGB"], np.float32) for of in (tested, layers))
         if share != 1.0:
             color = wanted + np.float32(share) * (color - wanted)
-        viewing = job.viewing
-        yield display_pair(
-            color, wanted, viewing, exposure_ev=exposure_ev, flow=flow, visible_before=is_visible
-        )
+        pair = display_pair(color, wanted, job.viewing, exposure_ev=exposure_ev)
+        yield TrackedPair(**vars(pair), flow=flow, visible_before=is_visible)
         last = layers
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison.measures import SCALES
+from studies.bench.measures import SCALES
 
 OURS = "decoupled"  # the family that is compared with the others
 AQM_MARGIN_JND = 0.1  # by which ours may be worse than path tracing: no visible difference

@@ -41,7 +41,7 @@ def measure(case: Case) -> dict[str, Any]:
         is_papers = placed.placement is Placement.ADAPTED and placed.adaptation in PAPER_PERCENT
         step = 1 if is_papers else case.terms.sweep_step
         rows.append(disocclusions(case.walk, case.analysis, placed, step, case.monitor))
-    return {"numbers": list(case.walk.path.numbers), "spacing": plain.spacing, "placements": rows}
+    return {"numbers": list(case.walk.path.numbers), "placements": rows}
 
 
 def disocclusions(

@@ -103,7 +103,7 @@ def test_the_job(run, jobs, camera_path):
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (("--set", "keyframes.spacing=1"), ("[keyframes] spacing = 1", "at least 2")),
+        (("--set", "keyframes.spacing=1"), ("[keyframes] spacing = 1", "2 or more")),
         (("--seed", "4294967296"), ("[trace] seed", "between 0 and 4294967295")),
         (("--set", "viewing.distance_m=nan"), ("[viewing] distance_m", "finite")),
         (("--set", "keyframes.spacing=many"), ("[keyframes] spacing", "expected int")),

@@ -1,4 +1,4 @@
-"""Sequences are judged frame by frame, with the flow that comes with them."""
+"""Sequences are compared frame by frame, with the flow that comes with them."""
 
 import json
 import math

@@ -81,7 +81,7 @@ def test_none_and_a_single_image_stand_still(sequence):
         notes = Notes()
         found = compared(folder, folder, notes, flow=flow)
         assert (found.flow, found.frames[0].velocity_deg_s) == ("none", 0.0)
-        assert "stood still" in notes.said[0]
+        assert "compared as static" in notes.said[0]
 
 
 def test_layers_that_are_asked_for_have_to_be_there(sequence):

@@ -82,7 +82,7 @@ def test_wrong_input_is_refused_before_the_scene_is_loaded(tmp_path, monkeypatch
 
 
 def test_a_scene_that_the_method_can_not_render_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match=r"can't render .*wall does not separate lobes"):
+    with pytest.raises(SettingsError, match=r"can't render .*wall' does not separate lobes"):
         plan(toy_job(tmp_path, method="decoupled"), monitor := Stages())
     assert monitor.done == []
 

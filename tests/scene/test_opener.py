@@ -31,7 +31,7 @@ def test_a_renderer_of_your_own(tmp_path):
     of.check(LimitSettings())
     renderer = of.open(Settings())
     assert isinstance(renderer, AnalyticRenderer)
-    assert "'analytic' does not estimate lobes apart" in why_inseparable(renderer)
+    assert "'analytic' does not separate lobes" in why_inseparable(renderer)
     before = of.identity()
     assert before["renderer"] == RENDERER
     write_scene(of.file, wall())

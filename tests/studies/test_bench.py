@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from enfilade.comparison.measures import SCALES, why_missing
+from enfilade.comparison.measures import why_missing
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.methods.denoise import why_no_denoiser
@@ -18,6 +18,7 @@ from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter
 from studies.__main__ import main
 from studies.bench.bench import bench
 from studies.bench.configurations import chosen, lineup
+from studies.bench.measures import SCALES
 from studies.bench.measuring import available
 from studies.bench.tables import bench_tables
 from support.console import as_text

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from enfilade.comparison.measures import DisplayedPair, display_pair
+from enfilade.comparison.measures import display_pair
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import Flow
 from enfilade.viewing import Viewing
+from studies.bench.measures import TrackedPair
 
 HEIGHT, WIDTH = 48, 64
 VIEWING = Viewing(WIDTH, HEIGHT, diagonal_m=0.025)  # 28 pixels per degree
@@ -27,17 +28,12 @@ def noise(seed: int, size: float) -> np.ndarray:
 
 def pair(
     test: np.ndarray, reference: np.ndarray, *, shift: float = 0.0, is_first: bool = False
-) -> DisplayedPair:
+) -> TrackedPair:
     """Encoded images as a measure sees them; the surfaces move by `shift` pixels a frame."""
     backward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     backward[..., 0] = -shift
     x = np.broadcast_to(np.arange(WIDTH) - shift, (HEIGHT, WIDTH))
     seen = (x >= 0.0) & (x <= WIDTH - 1)
     flow = Flow(np.zeros_like(backward) if is_first else backward, -backward, not is_first, True)
-    return display_pair(
-        srgb_decode(test),
-        srgb_decode(reference),
-        VIEWING,
-        flow=flow,
-        visible_before=None if is_first else seen,
-    )
+    shown = display_pair(srgb_decode(test), srgb_decode(reference), VIEWING)
+    return TrackedPair(**vars(shown), flow=flow, visible_before=None if is_first else seen)

@@ -22,8 +22,8 @@ __all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
 
 Layers = Mapping[str, npt.NDArray[Any]]
 
-CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1, that means a cut where flow back is made up
-RESTING_DIFFERENCE = 0.02  # ... where layers know none: in a shot the camera rests, and little changes
+CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1: a cut, where backward motion is not known
+RESTING_DIFFERENCE = 0.02  # ... where it is known to be none: in a shot, the camera rests
 BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 
@@ -105,9 +105,9 @@ def open_motion(
         )
     known = frozenset[int]() if starts is None else starts
     if choice is FlowChoice.NONE:
-        return _Still("image flow: none, as asked; all is judged as if it stood still", known)
+        return _Still("image flow: none, as asked; the sequences are compared as static", known)
     if len(reference) == 1:
-        return _Still("image flow: none in a single image; it is judged as if it stood still", known)
+        return _Still("image flow: none in a single image; it is compared as static", known)
     return _Estimated(reference.width, reference.height, known)
 
 
@@ -115,7 +115,7 @@ def open_motion(
 class _Kind:
     text: str
     read: Callable[[Layers], Flow | None]
-    is_forward_only: bool = False  # the flow to the last frame is made up from that to the next
+    is_forward_only: bool = False  # backward motion is taken to be the opposite
 
 
 def _flow(backward: npt.NDArray[Any], forward: npt.NDArray[Any]) -> Flow:
@@ -247,7 +247,7 @@ class _Estimated:
         self._starts = starts
         self.text = (
             "image flow: no layers of it, so it is estimated from the reference (dense inverse search); "
-            "--flow none judges all as if it stood still"
+            "--flow none compares them as static"
         )
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:

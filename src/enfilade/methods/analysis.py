@@ -14,6 +14,8 @@ from enfilade.methods.keyframes import place_keyframes
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.settings import KeyframeSettings, MaskSettings, Settings
 
+SPACING = 25  # Delta, frames (§4.2)
+
 
 @dataclass(frozen=True)
 class FrameStatistics:
@@ -66,14 +68,14 @@ class Analysis:
     path: CameraPath
     settings: Settings
     frames: tuple[FrameStatistics, ...]
-    _segments: dict[int | None, list[list[Segment]]] = field(default_factory=dict, init=False, repr=False)
+    _segments: dict[int, list[list[Segment]]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
         """Build from :func:`to_table` of every frame."""
         return cls(path, settings, tuple(FrameStatistics(**table) for table in tables))
 
-    def segments(self, spacing: int | None = None) -> list[list[Segment]]:
+    def segments(self, spacing: int = SPACING) -> list[list[Segment]]:
         """Segments between the initial keyframes of each shot (§4.2).
 
         A repeated pose is never a keyframe.
@@ -81,7 +83,7 @@ class Analysis:
         Parameters
         ----------
         spacing
-            Uniform spacing, instead of ``[keyframes] spacing``.
+            Of the method, where ``[keyframes] spacing`` is 0; by default the paper's.
 
         Returns
         -------
@@ -92,10 +94,9 @@ class Analysis:
             self._segments[spacing] = self._placed(spacing)
         return self._segments[spacing]
 
-    def _placed(self, spacing: int | None) -> list[list[Segment]]:
+    def _placed(self, spacing: int) -> list[list[Segment]]:
         settings = self.settings[KeyframeSettings]
-        if spacing is not None:
-            settings = replace(settings, spacing=spacing)
+        settings = replace(settings, spacing=settings.spacing or spacing)
         shots = []
         for shot in self.path.shots():
             speed = np.array([self.frames[frame].speed_px for frame in shot])

@@ -134,10 +134,10 @@ def _traced_panel(summary: Mapping[str, Any]) -> Panel:
 
 def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: float | None) -> Panel:
     """Predictions of the metric for the middles of segments, before and after segments are split (§4.3)."""
-    judged = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
+    compared = sorted((s for s in segments if s["middle"] is not None), key=lambda s: s["middle"])
     chosen = {
-        ("before split", "square"): [s for s in judged if s["depth"] == 0],
-        ("after split", "circle"): [s for s in judged if not s["is_split"]],
+        ("before split", "square"): [s for s in compared if s["depth"] == 0],
+        ("after split", "circle"): [s for s in compared if not s["is_split"]],
     }
     eyes = (
         ("pursuit", "percent_visible", VERMILION),
@@ -148,14 +148,14 @@ def _predictions_panel(segments: Sequence[Mapping[str, Any]], split_percent: flo
         for eye, key, color in eyes
         for (when, mark), of in chosen.items()
     ]
-    most = max((s["percent_visible"] for s in judged), default=0.0)
-    split = sum(s["is_split"] for s in judged)
+    most = max((s["percent_visible"] for s in compared), default=0.0)
+    split = sum(s["is_split"] for s in compared)
     return Panel(
         "predictions",
         "Predicted visible pixels",
         "%",
         f"Visible pixels that the metric predicts for segment middles: at most {most:.1f} percent; "
-        f"{split} of {len(judged)} segments were split.",
+        f"{split} of {len(compared)} segments were split.",
         tuple(s for s in series if s.values),
         top=1.2 * max(most, split_percent or 0.1),
         level=None if split_percent is None else (split_percent, f"split above {split_percent:g} %"),

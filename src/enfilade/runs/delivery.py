@@ -21,7 +21,6 @@ ANALYSIS, CLIPS, VIDEO = Pass("analysis"), Pass("clips", reads=(FRAMES,)), Pass(
 ANALYZED_FRAMES = 16  # of an analysis task
 CLIP_FRAMES = 240  # of a clip; x264 starts anew after 250
 SKY_DEPTH = 1e10  # layer Z where nothing is hit, as in Blender
-HALF_LAYERS = frozenset({"N", "albedo"})
 
 
 def analysis_tasks(frames: int) -> list[Task]:

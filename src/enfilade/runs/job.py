@@ -20,7 +20,7 @@ from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
 from enfilade.methods.opener import open_method
 from enfilade.methods.walkthrough import viewing_of
-from enfilade.renderer import LobeRenderer, Renderer
+from enfilade.renderer import Renderer, why_inseparable
 from enfilade.scene.opener import Scene
 from enfilade.settings import (
     SECTIONS,
@@ -139,16 +139,13 @@ class Job:
             No usable LLVM or CUDA.
         """
         renderer = self.scene.open(self.settings)
-        if isinstance(renderer, LobeRenderer):
-            self._check_lobes(renderer.why_inseparable)
-        else:
-            self._check_lobes(f"{renderer.describe().renderer} does not separate lobes")
+        self._check_lobes(why_inseparable(renderer))
         return renderer
 
-    def _check_lobes(self, why_inseparable: str) -> None:
-        if why_inseparable and self.opened_method().needs_lobes:
+    def _check_lobes(self, reason: str) -> None:
+        if reason and self.opened_method().needs_lobes:
             raise SettingsError(
-                f"--method {self.method} can't render {self.scene.file}: {why_inseparable}; take --method "
+                f"--method {self.method} can't render {self.scene.file}: {reason}; take --method "
                 "paper or --method reference"
             )
 

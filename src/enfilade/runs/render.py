@@ -218,7 +218,7 @@ def _write_job(folder: Path, job: Job) -> None:
 def _video_notes(job: Job) -> list[str]:
     video = job.settings[VideoSettings]
     odd = odd_size_note(video.codec, job.path.width, job.path.height)
-    view = f"noise is judged as the sRGB curve shows it, clipped at 1, not by the view of {video.ocio}"
+    view = f"noise is measured after the sRGB curve, clipped at 1, not after the view of {video.ocio}"
     return [note for note in (odd, view if video.ocio else "") if note]
 
 

@@ -175,15 +175,18 @@ class _Loop:
             if not self._in_hand:  # until the next attempt at a failed task
                 time.sleep(delay_s or 0.0)
                 continue
+            damaged = None
             for ended in self._executor.wait(delay_s):
                 order = self._in_hand.pop(ended.slot)
                 if not isinstance(ended.result, Failure):
                     self._finish(order.task, ended.result)
                 elif isinstance(ended.result.error, DamagedFileError):
-                    return ended.result.error.file
+                    damaged = ended.result.error.file
                 else:
                     self._executor.discard(ended.slot)  # it may have left the device in a bad state
                     self._fail(order, ended.result)
+            if damaged is not None:
+                return damaged
         self._report()
         if left := self._graph.unfinished:
             names = shortened([self._name(task) for task in left])

@@ -16,7 +16,7 @@ from support.closed_room import opened_room, room_path
 from support.in_memory import run_passes, walk_of
 
 SEEDS = range(1, 7)
-JUDGED = (0, 3, 6)  # frames: a keyframe, and frames that are nearer to one or the other
+COMPARED = (0, 3, 6)  # frames: a keyframe, and frames that are nearer to one or the other
 PARTS, PART_SPP = 8, 24  # of the reference: independent images
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 PATHS = 18  # rays a pixel of the method, and paths a pixel of path tracing at equal cost
@@ -71,10 +71,10 @@ def measured(tmp_path_factory) -> Measured:
     walks = [walk_of(PATH, renderer, trace={"seed": seed}, decoupled={"spacing": 4}) for seed in SEEDS]
     runs = [run_passes(method, walk) for walk in walks]
     return Measured(
-        frames=np.stack([run.colors[list(JUDGED)] for run in runs]),
-        parts=np.stack([[traced(seed, frame) for frame in JUDGED] for seed in range(PARTS)]),
+        frames=np.stack([run.colors[list(COMPARED)] for run in runs]),
+        parts=np.stack([[traced(seed, frame) for frame in COMPARED] for seed in range(PARTS)]),
         rays_per_pixel=np.mean([run.rays() for run in runs]) / (len(pixels) * len(PATH)),
-        shape_index=np.stack([find_geometry(renderer, PATH.cameras[f]).shape_index for f in JUDGED]),
+        shape_index=np.stack([find_geometry(renderer, PATH.cameras[f]).shape_index for f in COMPARED]),
         names=renderer.describe().shapes,
     )
 

@@ -41,11 +41,11 @@ def two_panes():
 
 
 def traced_shapes(
-    jnd, shape_index=None, *, is_judged=EVERYWHERE, surface=SurfaceClass.GLOSSY, settings=SETTINGS
+    jnd, shape_index=None, *, is_compared=EVERYWHERE, surface=SurfaceClass.GLOSSY, settings=SETTINGS
 ):
     """Specular shapes that must be traced."""
     geometry = scene(two_panes() if shape_index is None else shape_index, surface)
-    reusable = reusable_specular_shapes(jnd.astype(np.float32), is_judged, geometry, settings)
+    reusable = reusable_specular_shapes(jnd.astype(np.float32), is_compared, geometry, settings)
     return frozenset(geometry.shape_index[specular_pixels(geometry, reusable)].tolist())
 
 
@@ -81,7 +81,7 @@ def test_pixels_have_one_provenance_in_the_papers_order(is_slow, is_specular, is
 
 
 def test_shapes_that_are_not_reusable_are_traced():
-    # Shape 4 is not visible in the frame that was judged.
+    # Shape 4 is not visible in the frame that was compared.
     shape_index = two_panes()
     shape_index[0:3, 0:3] = 4
     geometry = scene(shape_index)
@@ -154,20 +154,20 @@ def test_unjudged_pixels_do_not_count():
     group = differences((slice(6, 8), slice(4, 6), 2.5))
     hidden = EVERYWHERE.copy()
     hidden[6:8, 4:6] = False
-    assert traced_shapes(group, is_judged=hidden) == frozenset()
-    # A quarter is of the judged pixels: 20 of 60.
+    assert traced_shapes(group, is_compared=hidden) == frozenset()
+    # A quarter is of the compared pixels: 20 of 60.
     most = EVERYWHERE.copy()
     most[11:15] = False
-    assert traced_shapes(differences((slice(5, 7), slice(3, 13), 1.5)), is_judged=most) == {2}
+    assert traced_shapes(differences((slice(5, 7), slice(3, 13), 1.5)), is_compared=most) == {2}
 
 
-def test_shapes_of_which_less_than_half_is_judged_are_traced():
+def test_shapes_of_which_less_than_half_is_compared_are_traced():
     half = EVERYWHERE.copy()
     half[10:15, 3:13] = False
-    assert traced_shapes(differences(), is_judged=half) == frozenset()
+    assert traced_shapes(differences(), is_compared=half) == frozenset()
     half[9, 3] = False
-    assert traced_shapes(differences(), is_judged=half) == {2}
-    assert traced_shapes(differences(), is_judged=~EVERYWHERE) == {2, 3}
+    assert traced_shapes(differences(), is_compared=half) == {2}
+    assert traced_shapes(differences(), is_compared=~EVERYWHERE) == {2, 3}
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])

@@ -14,39 +14,31 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from enfilade.comparison.measures.aqm import AqmMeasure
 from enfilade.comparison.measures.base import Measure, Scale
 from enfilade.comparison.measures.colorvideovdp import ColorVideoVdp
 from enfilade.comparison.measures.displayed import DisplayedPair, display_pair
 from enfilade.comparison.measures.flip import Flip
 from enfilade.comparison.measures.psnr import Psnr
-from enfilade.comparison.measures.temporal import Temporal, visible_before
 from enfilade.errors import SettingsError
-from enfilade.metric import Pursuit
 from enfilade.viewing import Viewing
 
 __all__ = [
     "SCALES",
-    "AqmMeasure",
     "ColorVideoVdp",
     "DisplayedPair",
     "Flip",
     "Measure",
     "Psnr",
     "Scale",
-    "Temporal",
     "display_pair",
     "open_measure",
-    "visible_before",
     "why_missing",
 ]
 
-SCALES: dict[str, Scale] = {
-    of.SCALE.name: of.SCALE for of in (AqmMeasure, Flip, Psnr, Temporal, ColorVideoVdp)
-}
+SCALES: dict[str, Scale] = {of.SCALE.name: of.SCALE for of in (Flip, Psnr, ColorVideoVdp)}
 
 
-def open_measure(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> Measure:
+def open_measure(name: str, viewing: Viewing) -> Measure:
     """A measure for one pair of sequences.
 
     Parameters
@@ -55,8 +47,6 @@ def open_measure(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH
         One of :data:`SCALES`.
     viewing
         Viewing conditions.
-    pursuit
-        Eye movements that AQM assumes.
 
     Raises
     ------
@@ -64,14 +54,10 @@ def open_measure(name: str, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH
         There is no such measure, or it is not installed.
     """
     match name:
-        case "aqm":
-            return AqmMeasure(viewing, pursuit=pursuit)
         case "flip":
             return Flip(viewing)
         case "psnr":
             return Psnr()
-        case "temporal":
-            return Temporal()
         case "cvvdp":
             return ColorVideoVdp(viewing)
         case _:

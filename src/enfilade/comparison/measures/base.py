@@ -20,14 +20,12 @@ class Scale:
     name : str
         Short, for files and programs.
     title : str
-        For people.
+        For tables and charts.
     unit : str
     is_more_better : bool
     error_of : callable
         Maps a score to an error, 0 or more, 0 for identical sequences, which is interpolated on a
         logarithmic axis.
-    is_of_changes : bool
-        Whether a frame needs one before it in its shot.
     """
 
     name: str
@@ -35,7 +33,6 @@ class Scale:
     unit: str
     is_more_better: bool = False
     error_of: Callable[[float], float] = float
-    is_of_changes: bool = False
 
 
 class Measure(Protocol):

@@ -8,7 +8,7 @@ import numpy as np
 
 from enfilade.errors import InputError
 from enfilade.kernels.tone import display_luminance, srgb_encode
-from enfilade.records import F32, Flow, Mask
+from enfilade.records import F32
 from enfilade.viewing import Viewing
 
 __all__ = ["DisplayedPair", "display_pair"]
@@ -24,30 +24,15 @@ class DisplayedPair:
         Encoded for an sRGB display, 0..1; not rounded to 8 bits.
     test_cd_m2, reference_cd_m2 : (H, W) float32
         Luminance on the display.
-    flow : Flow or None
-        Motion vectors of the reference; None: nothing moves.
-    visible_before : (H, W) bool or None
-        Where the last frame shows the same surface, `flow.backward` away; None where this frame begins a
-        shot.
     """
 
     test: F32
     reference: F32
     test_cd_m2: F32
     reference_cd_m2: F32
-    flow: Flow | None = None
-    visible_before: Mask | None = None
 
 
-def display_pair(
-    test: F32,
-    reference: F32,
-    viewing: Viewing,
-    *,
-    exposure_ev: float = 0.0,
-    flow: Flow | None = None,
-    visible_before: Mask | None = None,
-) -> DisplayedPair:
+def display_pair(test: F32, reference: F32, viewing: Viewing, *, exposure_ev: float = 0.0) -> DisplayedPair:
     """Display a pair of frames.
 
     Parameters
@@ -58,8 +43,6 @@ def display_pair(
         Its size is that of the frames.
     exposure_ev
         In stops.
-    flow, visible_before
-        See :class:`DisplayedPair`.
 
     Raises
     ------
@@ -73,7 +56,7 @@ def display_pair(
         if not np.isfinite(image).all():
             raise InputError(f"the {name} holds pixels that are NaN or infinite; it can't be compared")
     of_test, of_reference = (_on_screen(image, viewing, exposure_ev) for image in (test, reference))
-    return DisplayedPair(of_test[0], of_reference[0], of_test[1], of_reference[1], flow, visible_before)
+    return DisplayedPair(of_test[0], of_reference[0], of_test[1], of_reference[1])
 
 
 def _on_screen(linear: F32, viewing: Viewing, exposure_ev: float) -> tuple[F32, F32]:

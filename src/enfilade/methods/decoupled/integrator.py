@@ -386,7 +386,11 @@ class Integrator:
         return Array3f(sample.direct + emitted), vertex
 
     def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
-        """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid."""
+        """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
+
+        Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
+        a finite ``--max-depth`` does not cut it shorter behind several mirrors.
+        """
         rng = PCG32(path.rng)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         width = path.width_at(point)

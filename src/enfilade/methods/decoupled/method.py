@@ -29,6 +29,8 @@ from enfilade.settings import (
     ViewingSettings,
 )
 
+SPACING = 8  # of keyframes, frames
+
 
 class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
@@ -68,13 +70,12 @@ class Decoupled(Method):
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Keyframes, which have irradiance images."""
-        spacing = analysis.settings[DecoupledSettings].spacing
-        return [frame for segments in analysis.segments(spacing) for frame in keyframes_of(segments)]
+        return [frame for segments in analysis.segments(SPACING) for frame in keyframes_of(segments)]
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""
         path, settings = analysis.path, analysis.settings[DecoupledSettings]
-        shots = zip(path.shots(), analysis.segments(settings.spacing), strict=True)
+        shots = zip(path.shots(), analysis.segments(SPACING), strict=True)
         for number, (shot, segments) in enumerate(shots):
             keyframes = keyframes_of(segments)
             for pass_name in ("prepass", "hash_grid", "irradiance"):
@@ -123,6 +124,6 @@ class Decoupled(Method):
             self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
             self._shot, self._frames = None, Frames()  # free memory before the next shot allocates
-            segments = inputs.analysis.segments(walk.settings[DecoupledSettings].spacing)[task.shot]
+            segments = inputs.analysis.segments(SPACING)[task.shot]
             self._shot = Shot(task.shot, segments, inputs, walk, *self._kernels[1:])
         return self._shot

@@ -48,7 +48,8 @@ def irradiance_spp(jnd: float, quality: float, keyframes: int) -> int:
     keyframes
         Of the shot.
     """
-    # Each image has half of the squared difference, which accumulation divides by the number of images.
+    # Each image has half of the squared difference. Accumulation divides it by the number of images, of which
+    # those farther away weigh less: half of them are counted.
     images = max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
     spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * images)
     return int(np.clip(4 * math.ceil(spp / 4), *IRRADIANCE_SPP))

@@ -7,8 +7,8 @@ import numpy as np
 from enfilade.records import F32, U8, Geometry, Mask, Provenance
 from enfilade.settings import MaskSettings
 
-MIN_JUDGED = 0.5  # of a shape's pixels: with fewer judged, it must be traced
-MIN_REGION = 0.05  # of a shape's judged pixels: the percentage above 1 JND is not taken of smaller regions
+MIN_COMPARED = 0.5  # of a shape's pixels: with fewer compared, it must be traced
+MIN_REGION = 0.05  # of a shape's compared pixels: the percentage above 1 JND is not taken of smaller regions
 MIN_GROUP = 4  # connected pixels that count as a group: fewer are outliers
 EIGHT_CONNECTED = np.ones((3, 3), bool)
 
@@ -19,20 +19,20 @@ def slow_pixels(speed_deg_s: F32, settings: MaskSettings) -> Mask:
 
 
 def reusable_specular_shapes(
-    jnd: F32, is_judged: Mask, geometry: Geometry, settings: MaskSettings
+    jnd: F32, is_compared: Mask, geometry: Geometry, settings: MaskSettings
 ) -> frozenset[int]:
     """Specular shapes whose reuse can't be seen (§4.3 step 4b, thresholds of §6).
 
-    Each connected region of a specular shape is judged separately. It is visible if a group of its pixels
+    Each connected region of a specular shape is compared separately. It is visible if a group of its pixels
     differs by more than 2 JND, or if more than a quarter of them differ by more than 1 JND. The latter is
     not applied to small regions, of which shapes behind foliage and railings have many. A shape of which
-    both keyframes show less than half can't be judged.
+    both keyframes show less than half can't be compared.
 
     Parameters
     ----------
     jnd : (H, W) float32
         Visible difference between the two warped keyframes.
-    is_judged : (H, W) bool
+    is_compared : (H, W) bool
         Pixels at which both keyframes show the surface.
     geometry
         G-buffer of the frame.
@@ -46,19 +46,19 @@ def reusable_specular_shapes(
     """
     import scipy.ndimage
 
-    is_candidate = geometry.is_specular & is_judged
+    is_candidate = geometry.is_specular & is_compared
     reusable: set[int] = set()
     for shape_index in np.unique(geometry.shape_index[is_candidate]).tolist():
-        # Skip shapes that can't be judged.
+        # Skip shapes that can't be compared.
         shown = geometry.is_specular & (geometry.shape_index == shape_index)
-        judged = shown & is_judged
-        if np.count_nonzero(judged) < MIN_JUDGED * np.count_nonzero(shown):
+        compared = shown & is_compared
+        if np.count_nonzero(compared) < MIN_COMPARED * np.count_nonzero(shown):
             continue
 
-        # Judge its connected regions.
-        regions, _ = scipy.ndimage.label(judged, EIGHT_CONNECTED)
+        # Compare its connected regions.
+        regions, _ = scipy.ndimage.label(compared, EIGHT_CONNECTED)
         boxes = enumerate(scipy.ndimage.find_objects(regions), 1)
-        least = MIN_REGION * np.count_nonzero(judged)
+        least = MIN_REGION * np.count_nonzero(compared)
         if not any(_is_visible(jnd[box], regions[box] == region, least, settings) for region, box in boxes):
             reusable.add(int(shape_index))
     return frozenset(reusable)

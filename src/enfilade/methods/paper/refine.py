@@ -21,7 +21,7 @@ from enfilade.metric import Aqm, Pursuit
 from enfilade.records import F32, Keyframe, Mask, Warped
 from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, ViewingSettings, WarpSettings
 
-MIN_JUDGED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
+MIN_COMPARED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
 GAIN = 0.9  # of its parent's visible pixels: a half with more is not split again
 FFT_THREADS = 2
 
@@ -37,7 +37,7 @@ class SegmentResult:
     depth : int
         Number of splits that led to the segment.
     middle : int or None
-        The frame that was judged; None for segments without in-betweens.
+        The frame that was compared; None for segments without in-betweens.
     reusable : frozenset of int
         Specular shapes whose reuse can't be seen; all others must be traced in the whole segment.
     percent_visible, percent_visible_no_pursuit : float
@@ -103,7 +103,7 @@ class Refinement:
         self._metric = Aqm.paper(walk.viewing, mask_slope=slope, workers=FFT_THREADS)
 
     def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
-        """Judge a segment, and its halves where it is split.
+        """Compare a segment, and its halves where it is split.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class Refinement:
         pending: list[tuple[Segment, float]] = [(initial, np.inf)]
         while pending:
             segment, parent_percent = pending.pop()
-            result = self.judge(segment, keyframe)
+            result = self.compare(segment, keyframe)
             if result.percent_visible >= GAIN * parent_percent:
                 result = replace(result, is_split=False)
             results.append(result)
@@ -124,7 +124,7 @@ class Refinement:
                 pending += [(half, result.percent_visible) for half in reversed(halves)]
         return results
 
-    def judge(self, segment: Segment, keyframe: Callable[[int], Keyframe]) -> SegmentResult:
+    def compare(self, segment: Segment, keyframe: Callable[[int], Keyframe]) -> SegmentResult:
         """Warp both keyframes to the middle of a segment and measure the visible difference (§4.3, 2-5)."""
         walk = self._walk
         middle = walk.path.middle(segment)
@@ -136,14 +136,14 @@ class Refinement:
 
         # Compare at the pixels at which both keyframes show the surface.
         tolerance = walk.settings[WarpSettings].depth_tolerance
-        is_judged = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
-        jnd, jnd_no_pursuit = self._differences(view, before, after, is_judged)
+        is_compared = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
+        jnd, jnd_no_pursuit = self._differences(view, before, after, is_compared)
 
         # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.
-        reusable = reusable_specular_shapes(jnd, is_judged, view.geometry, masks)
+        reusable = reusable_specular_shapes(jnd, is_compared, view.geometry, masks)
         is_slow = slow_pixels(view.speed_deg_s, masks)
-        unmasked = is_judged & ~is_slow & ~specular_pixels(view.geometry, reusable)
-        if (is_judged & ~unmasked).any() and unmasked.mean() >= MIN_JUDGED:
+        unmasked = is_compared & ~is_slow & ~specular_pixels(view.geometry, reusable)
+        if (is_compared & ~unmasked).any() and unmasked.mean() >= MIN_COMPARED:
             # Compare again without them: the metric's filters spread a difference over its neighbourhood.
             jnd, jnd_no_pursuit = self._differences(view, before, after, unmasked)
         percent, percent_no_pursuit = (_percent_visible(j, unmasked) for j in (jnd, jnd_no_pursuit))
@@ -156,7 +156,7 @@ class Refinement:
             is_split=percent > masks.split_percent,
         )
 
-    def _differences(self, view: View, before: Warped, after: Warped, is_judged: Mask) -> tuple[F32, F32]:
+    def _differences(self, view: View, before: Warped, after: Warped, is_compared: Mask) -> tuple[F32, F32]:
         """JND maps between two warped keyframes, with smooth pursuit and without.
 
         Both are filtered spatially as the delivered frame will be. The metric discounts differences within
@@ -177,7 +177,7 @@ class Refinement:
             self._metric.compare(
                 *shown,
                 velocity=view.velocity_deg_s,
-                valid=is_judged,
+                valid=is_compared,
                 noise_variance=noise,
                 noise_blur_px=support / np.float32(SIGMAS),
                 pursuit=pursuit,
@@ -201,6 +201,6 @@ def warped_pair(walk: Walkthrough, first: Keyframe, last: Keyframe, frame: int) 
 
 
 def _percent_visible(jnd: F32, where: Mask) -> float:
-    if where.mean() < MIN_JUDGED:
+    if where.mean() < MIN_COMPARED:
         return 0.0
     return 100.0 * float((jnd[where] > 1.0).mean())

@@ -1,22 +1,87 @@
-"""Flicker of the error: how much it changes from frame to frame along the reference's own motion."""
+"""Measures of the bench: those of ``enfilade compare``, the AQM, and the temporal error."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.comparison.measures.base import Scale
-from enfilade.comparison.measures.displayed import DisplayedPair
-from enfilade.records import F32, Mask
-
-__all__ = ["Temporal", "visible_before"]
+from enfilade.comparison import measures
+from enfilade.comparison.measures import DisplayedPair, Scale
+from enfilade.metric import Aqm, Pursuit, SequenceAqm, sequence_score
+from enfilade.records import F32, Flow, Mask
+from enfilade.viewing import Viewing
 
 PLANE_TOLERANCE = 0.01  # of the depth: distance from its plane within which a point is of the same surface
 SHAPE, POSITION, NORMAL, DEPTH = "shape_index", "P", "N", "Z"  # AOVs of a delivered frame
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedPair(DisplayedPair):
+    """A pair of frames with the motion of the reference.
+
+    Attributes
+    ----------
+    flow : Flow
+        Motion vectors of the reference.
+    visible_before : (H, W) bool or None
+        Where the last frame shows the same surface, `flow.backward` away; None where this frame begins a
+        shot.
+    """
+
+    flow: Flow
+    visible_before: Mask | None
+
+
+class Measure(Protocol):
+    """A :class:`enfilade.comparison.measures.Measure` that may use motion."""
+
+    def measure(self, pair: TrackedPair) -> float | None:
+        """Measure the next frame; None where it has no value of its own."""
+        ...
+
+    def pool(self, values: Sequence[float | None]) -> float:
+        """The result for the sequence, from the values of its frames."""
+        ...
+
+
+class AqmMeasure:
+    """The modern mode of the metric; see ``docs/metric.md``.
+
+    Parameters
+    ----------
+    viewing
+        Viewing conditions.
+    pursuit
+        Eye movements.
+    """
+
+    SCALE = Scale("aqm", "AQM", "JND")
+    name = SCALE.name
+
+    def __init__(self, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> None:
+        self._viewing = viewing
+        self._metric = SequenceAqm(Aqm.modern(viewing, pursuit=pursuit))
+
+    def measure(self, pair: TrackedPair) -> float:
+        """Score of the frame, JND."""
+        flow = pair.flow
+        found = self._metric.compare(
+            pair.test_cd_m2,
+            pair.reference_cd_m2,
+            velocity=self._viewing.velocity_deg_s(flow.motion),
+            backward_flow_px=flow.backward if flow.has_backward else None,
+            is_cut=pair.visible_before is None,
+        )
+        return found.score
+
+    def pool(self, values: Sequence[float | None]) -> float:
+        """(mean over frames of score^3.5)^(1/3.5), JND."""
+        return sequence_score(value for value in values if value is not None)
 
 
 class Temporal:
@@ -33,22 +98,17 @@ class Temporal:
     flatter those whose errors are noise.
     """
 
-    SCALE = Scale("temporal", "temporal", "RMS", is_of_changes=True)
+    SCALE = Scale("temporal", "temporal", "RMS")
     name = SCALE.name
 
     def __init__(self) -> None:
         self._before: F32 | None = None
 
-    def measure(self, pair: DisplayedPair) -> float | None:
+    def measure(self, pair: TrackedPair) -> float | None:
         """Change of the error; None where a shot begins, or no surface is in both frames."""
         error = pair.test - pair.reference
         before, self._before = self._before, error
-        if (
-            before is None
-            or pair.flow is None
-            or pair.visible_before is None
-            or not pair.visible_before.any()
-        ):
+        if before is None or pair.visible_before is None or not pair.visible_before.any():
             return None
         change = (error - _read(before, pair.flow.backward))[pair.visible_before]
         return math.sqrt(float(np.mean(np.square(change, dtype=np.float64))))
@@ -99,3 +159,26 @@ def _read(image: F32, flow: F32) -> F32:
     lower = image[below, left] * (1.0 - u) + image[below, right] * u
     values: F32 = (upper * (1.0 - v) + lower * v).astype(np.float32)
     return values
+
+
+SCALES = {
+    scale.name: scale
+    for scale in (
+        AqmMeasure.SCALE,
+        measures.SCALES["flip"],
+        measures.SCALES["psnr"],
+        Temporal.SCALE,
+        measures.SCALES["cvvdp"],
+    )
+}
+
+
+def open_measure(name: str, viewing: Viewing, pursuit: Pursuit) -> Measure:
+    """A measure for one pair of sequences; see :func:`enfilade.comparison.measures.open_measure`."""
+    match name:
+        case "aqm":
+            return AqmMeasure(viewing, pursuit=pursuit)
+        case "temporal":
+            return Temporal()
+        case _:
+            return measures.open_measure(name, viewing)
