@@ -168,6 +168,25 @@ class Method(ABC):
         del analysis
         return []
 
+    def cost_ratios(
+        self, settings: Settings, excerpt: Mapping[str, int], whole: Mapping[str, int]
+    ) -> Mapping[str, float]:
+        """Cost of a task in a walkthrough over that of one in an excerpt, for forecasts.
+
+        Parameters
+        ----------
+        settings
+        excerpt, whole
+            Number of tasks of each pass.
+
+        Returns
+        -------
+        mapping of str to float
+            By pass; 1 where left out.
+        """
+        del settings, excerpt, whole
+        return {}
+
     @abstractmethod
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """All tasks, in any order.

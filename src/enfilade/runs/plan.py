@@ -107,7 +107,9 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
         monitor.progress("dry run", 1, 1)
     pixels = path.width * path.height / (small.path.width * small.path.height)
     frames_each = len(path) / len(small.path)  # the excerpt has one task of these passes
-    wall_s, cpu_s = forecast(lines, {**counts, ANALYSIS.name: frames_each, CLIPS.name: frames_each})
+    ratios = method.cost_ratios(settings, Counter(line["pass"] for line in lines), counts)
+    weights = {name: count * ratios.get(name, 1.0) for name, count in counts.items()}
+    wall_s, cpu_s = forecast(lines, {**weights, ANALYSIS.name: frames_each, CLIPS.name: frames_each})
     return Plan(
         method=method.name,
         frames=path.numbers,

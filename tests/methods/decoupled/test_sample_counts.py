@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.sample_counts import (
     edge_spp,
     irradiance_spp,
@@ -12,7 +13,7 @@ from enfilade.methods.decoupled.sample_counts import (
 )
 from enfilade.records import Geometry
 from enfilade.renderer import Emitters
-from enfilade.settings import DecoupledSettings
+from enfilade.settings import DecoupledSettings, Settings
 
 H, W = 20, 30
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
@@ -76,3 +77,12 @@ def test_occluded_emitters_and_the_interior_of_large_ones_are_left_out():
     outline[6:14, 4:12] = False
     found = small_emitter_pixels(emitters(large, 1.0, shape_index=2), geometry)
     np.testing.assert_array_equal(found, outline)
+
+
+def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
+    excerpt, whole = {"irradiance": 2, "pilot": 1}, {"irradiance": 60, "pilot": 2}
+    ratios = Decoupled().cost_ratios(Settings(), excerpt, whole)
+    expected = irradiance_spp(112.0, 10.0, 30) / irradiance_spp(112.0, 10.0, 2)
+    assert ratios == pytest.approx({"irradiance": expected, "disocclusion": expected}, rel=0.05)
+    fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)
+    assert Decoupled().cost_ratios(fixed, excerpt, whole) == {}

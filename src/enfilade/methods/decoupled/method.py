@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, keyframes_of
@@ -14,7 +14,7 @@ from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
-from enfilade.methods.decoupled.sample_counts import run_pilot
+from enfilade.methods.decoupled.sample_counts import averaged_images, run_pilot
 from enfilade.methods.decoupled.shot import Shot
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.denoise import why_no_denoiser
@@ -71,6 +71,15 @@ class Decoupled(Method):
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Keyframes, which have irradiance images."""
         return [frame for segments in analysis.segments(SPACING) for frame in keyframes_of(segments)]
+
+    def cost_ratios(
+        self, settings: Settings, excerpt: Mapping[str, int], whole: Mapping[str, int]
+    ) -> Mapping[str, float]:
+        """Shots with fewer keyframes accumulate fewer irradiance images, which need more paths."""
+        if settings[DecoupledSettings].irradiance_spp:
+            return {}
+        ratio = averaged_images(excerpt["irradiance"]) / averaged_images(whole["irradiance"] / whole["pilot"])
+        return dict.fromkeys(("irradiance", "disocclusion"), ratio)
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""

@@ -48,11 +48,22 @@ def irradiance_spp(jnd: float, quality: float, keyframes: int) -> int:
     keyframes
         Of the shot.
     """
-    # Each image has half of the squared difference. Accumulation divides it by the number of images, of which
-    # those farther away weigh less: half of them are counted.
-    images = max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
-    spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * images)
+    # Each image has half of the squared difference. Accumulation divides it by the number of images.
+    spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * averaged_images(keyframes))
     return int(np.clip(4 * math.ceil(spp / 4), *IRRADIANCE_SPP))
+
+
+def averaged_images(keyframes: float) -> float:
+    """Number of irradiance images of equal weight whose mean has the noise of the accumulated ones.
+
+    Accumulation weighs distant images less: half of them count.
+
+    Parameters
+    ----------
+    keyframes
+        Of the shot.
+    """
+    return max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
 
 
 def edge_spp(settings: DecoupledSettings) -> int:
