@@ -15,7 +15,6 @@ def test_paper_conditions():
     # §6: half a metre from a 640x480 image of 0.25 m diagonal.
     viewing = Viewing(640, 480)
     assert viewing.pixels_per_degree == pytest.approx(27.93, abs=0.005)
-    assert viewing.nyquist_cpd == pytest.approx(13.96, abs=0.005)
     assert viewing.flow_px(0.15) == pytest.approx(0.14, abs=0.001)
 
 

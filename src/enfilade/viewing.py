@@ -15,8 +15,6 @@ __all__ = ["DISPLAYS", "Display", "Viewing", "display_named"]
 
 Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.float64])
 
-SAMPLES_PER_CYCLE = 2.0  # the sampling theorem
-
 
 @dataclass(frozen=True)
 class Viewing:
@@ -87,11 +85,6 @@ class Viewing:
     def pixels_per_degree(self) -> float:
         """Pixels in one degree of visual angle at the centre (27.93 for the paper's 640x480)."""
         return self.distance_m * math.tan(math.radians(1.0)) / self.pixel_pitch_m
-
-    @property
-    def nyquist_cpd(self) -> float:
-        """Highest frequency along rows and columns, cycles per degree (13.96 for 640x480)."""
-        return self.pixels_per_degree / SAMPLES_PER_CYCLE
 
     def velocity_deg_s(self, flow_px_per_frame: Quantity) -> Quantity:
         """Image velocity in degrees per second, from image flow in pixels per frame."""

@@ -81,6 +81,26 @@ def test_facts_that_the_ledger_can_not_keep(opened, monkeypatch, facts, words):
         Worker(job, run).do(Task("frames", 0))
 
 
+class Undeclared(Method):
+    """A pass that reads another without saying so."""
+
+    name = "undeclared"
+    passes = (Pass("mean"), Pass("frames"))
+
+    def tasks(self, _analysis):
+        return ()
+
+    def run(self, _task, inputs, _walk):
+        return Output(facts=inputs.facts("mean", 0))
+
+
+def test_a_pass_reads_what_it_declares(opened, monkeypatch):
+    job, run = opened
+    monkeypatch.setattr(Job, "opened_method", lambda _: Undeclared())
+    with pytest.raises(ValueError, match="'frames' does not declare that it reads 'mean'"):
+        Worker(job, run).do(Task("frames", 0))
+
+
 def test_facts_of_another_process_are_found_even_if_its_files_are_lost(opened):
     job, run = opened
     worker = Worker(job, RunFolder.read(run.folder))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from enfilade.cache import LruCache
 from enfilade.errors import RunFolderError
 from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis, analyze, to_table
-from enfilade.methods.base import FRAMES, Output, Task
+from enfilade.methods.base import FRAMES, Output, Pass, Task
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.runs.delivery import (
     ANALYSIS,
@@ -45,9 +45,8 @@ class Worker:
         self._job = job
         self._run = run
         self._method = job.opened_method()
-        self._records = {of.name: of.record for of in self._method.passes}
         self._stopwatch = Stopwatch()
-        self._inputs = _Inputs(job, run, self._records, self._stopwatch)
+        self._inputs = _Inputs(job, run, self._method.passes, self._stopwatch)
 
     def prepare(self, task: Task) -> None:
         """Load the scene, unless the task needs none."""
@@ -78,6 +77,7 @@ class Worker:
                 case VIDEO.name:
                     files = [write_video(self._run, self._job)]
                 case _:
+                    self._inputs.begin(task.pass_name)
                     facts, files = self._write(task, self._method.run(task, self._inputs, self._walk))
         if taken := RESERVED.intersection(facts):
             raise ValueError(f"these facts have names of the ledger's own: {', '.join(sorted(taken))}")
@@ -108,12 +108,11 @@ class Worker:
 class _Inputs:
     """Records and facts of earlier passes, from the run folder."""
 
-    def __init__(
-        self, job: Job, run: RunFolder, kinds: Mapping[str, type | None], stopwatch: Stopwatch
-    ) -> None:
+    def __init__(self, job: Job, run: RunFolder, passes: Iterable[Pass], stopwatch: Stopwatch) -> None:
         self._job = job
         self._run = run
-        self._kinds = kinds
+        self._passes = {of.name: of for of in passes}
+        self._reader: Pass | None = None
         self._stopwatch = stopwatch
         self._records: LruCache[tuple[str, int], Any] = LruCache(CACHED_RECORDS)
 
@@ -125,10 +124,12 @@ class _Inputs:
 
     def record(self, pass_name: str, frame: int) -> Any:
         """See :class:`enfilade.methods.base.Inputs`."""
+        self._check_reader(pass_name)
         return self._records.get((pass_name, frame), lambda: self._read(pass_name, frame))
 
     def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
         """See :class:`enfilade.methods.base.Inputs`."""
+        self._check_reader(pass_name)
         number = self._job.path.numbers[frame]
         line = self._run.recorded(pass_name, number)
         if line is None:  # finished by another process, perhaps
@@ -138,12 +139,20 @@ class _Inputs:
             raise KeyError(f"{pass_name} {number} is not finished")
         return line
 
+    def begin(self, pass_name: str) -> None:
+        """Note the pass whose tasks read from now on."""
+        self._reader = self._passes[pass_name]
+
     def keep(self, pass_name: str, frame: int, record: Any) -> None:
         """Cache a record that was just written."""
         self._records.put((pass_name, frame), record)
 
+    def _check_reader(self, pass_name: str) -> None:
+        if self._reader is not None and pass_name not in self._reader.reads:
+            raise ValueError(f"pass {self._reader.name!r} does not declare that it reads {pass_name!r}")
+
     def _read(self, pass_name: str, frame: int) -> Any:
-        kind = self._kinds[pass_name]
+        kind = self._passes[pass_name].record
         if kind is None:
             raise ValueError(f"pass {pass_name!r} writes no records")
         with self._stopwatch.timed("files"):
