@@ -3,7 +3,9 @@
 import os
 from pathlib import Path
 
+import drjit as dr
 import hypothesis
+import pytest
 
 from enfilade.device import activate
 
@@ -14,3 +16,14 @@ os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [TESTS, os.environ.get("
 activate("auto")
 hypothesis.settings.register_profile("enfilade", deadline=None)  # a busy machine is no failure
 hypothesis.settings.load_profile("enfilade")
+
+
+THREADS = dr.thread_count()
+
+
+@pytest.fixture(autouse=True)
+def own_thread_count():
+    """Undo what a test of ``--threads`` has set for the whole process."""
+    yield
+    if dr.thread_count() != THREADS:
+        dr.set_thread_count(THREADS)
