@@ -134,7 +134,7 @@ def undisturbed(folder: Path) -> Case:
     path = {"format": "enfilade-path", "fps": 24, "size": [32, 24], "keys": keys}
     (folder / "scene.xml").write_text(SCENE)
     (folder / "path.json").write_text(json.dumps(path))
-    settings = ("--set", "decoupled.spacing=4", *LIMITS)
+    settings = ("--set", "keyframes.spacing=4", *LIMITS)
     inputs = (str(folder / "scene.xml"), "--path", str(folder / "path.json"), *settings)
     out = folder / "whole"
     finish(render(inputs, out))  # compiles kernels, which others find in a cache

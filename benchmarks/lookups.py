@@ -54,13 +54,13 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     from enfilade.runs.job import Job
     from enfilade.runs.render import render
     from enfilade.scene.opener import Scene
-    from enfilade.settings import DecoupledSettings, Settings
+    from enfilade.settings import KeyframeSettings, Settings
     from studies.scenes import write_scene
 
     width, height = map(int, arguments.size.split("x"))
     files = write_scene(arguments.scene, folder / "scene", preset="small")
     path = load_path(files.path, size=(width, height), frames=tuple(range(FIRST, FIRST + SPACING + 1)))
-    job = Job(Scene(files.scene), path, Settings(DecoupledSettings(spacing=SPACING)))
+    job = Job(Scene(files.scene), path, Settings(KeyframeSettings(spacing=SPACING)))
     render(job, folder / "run", Silence())
     renderer, frame = job.open_renderer(), SPACING // 2
     walk = Walkthrough(path, job.rendering_settings(), renderer)

@@ -14,7 +14,7 @@ PATH = room_path(7, (48, 32))
 TABLES = {
     "sampling": {"spp": 16},
     "keyframes": {"spacing": 3},
-    "decoupled": {"spacing": 3, "quality": 100.0},  # few paths: as many in the pilot as in the keyframes
+    "decoupled": {"quality": 100.0},  # few paths: as many in the pilot as in the keyframes
     "masks": {"split_percent": 20.0},
 }
 

@@ -142,7 +142,7 @@ class Circular(Method):
 class Hasty(Circular):
     """A task that reads a record that no task has written."""
 
-    passes = (Pass("light", int), Pass("frames"))
+    passes = (Pass("light", int), Pass("frames", reads=("light",)))
 
     def tasks(self, _analysis):
         yield Task("frames", 0)

@@ -68,7 +68,7 @@ def measured(tmp_path_factory) -> Measured:
         return found.color.reshape(PATH.height, PATH.width, 3).astype(float)
 
     method = Decoupled()
-    walks = [walk_of(PATH, renderer, trace={"seed": seed}, decoupled={"spacing": 4}) for seed in SEEDS]
+    walks = [walk_of(PATH, renderer, trace={"seed": seed}, keyframes={"spacing": 4}) for seed in SEEDS]
     runs = [run_passes(method, walk) for walk in walks]
     return Measured(
         frames=np.stack([run.colors[list(COMPARED)] for run in runs]),
