@@ -149,7 +149,7 @@ class Shading:
     color : (..., 3) float32
         Linear Rec.709 radiance.
     variance : (...) float32
-        Variance of the mean of the luminance, from the spread of its paths; 0 where spp is 1.
+        Variance of the mean of the luminance, estimated from its paths; 0 where spp is 1.
     dropped : int
         Samples that were NaN or infinite and were left out.
     """
@@ -162,8 +162,8 @@ class Shading:
         _check(self.color, (*self.variance.shape, 3), np.float32, "color")
         _check(self.variance, self.color.shape[:-1], np.float32, "variance")
 
-    def spread(self, where: Mask) -> Shading:
-        """An image of what was traced for a list of its pixels: those of a mask, (H, W)."""
+    def to_image(self, where: Mask) -> Shading:
+        """Scatter the values of a list of pixels, those of a mask (H, W), into an image; 0 elsewhere."""
         color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
         color[where], variance[where] = self.color, self.variance
         return Shading(color, variance, self.dropped)

@@ -139,7 +139,7 @@ class _Quality:
 
     def _traced(self, walk: Walkthrough, frame: int, spp: int) -> Shading:
         purpose, pixel_filter = Purpose.REFERENCE, PixelFilter.GAUSSIAN
-        image = walk.trace(frame, self._where, purpose, spp=spp, pixel_filter=pixel_filter).spread(
+        image = walk.trace(frame, self._where, purpose, spp=spp, pixel_filter=pixel_filter).to_image(
             self._where
         )
         return Shading(self._cut(image.color), self._cut(image.variance), image.dropped)

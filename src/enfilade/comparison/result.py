@@ -142,7 +142,7 @@ class SequenceDifference:
             "meaning": self.meaning,
             "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
             "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
-            "percent_visible": _spread([f.percent_visible for f in self.frames]),
+            "percent_visible": _mean_and_most([f.percent_visible for f in self.frames]),
             "largest_jnd": max(f.largest_jnd for f in self.frames),
             "psnr_db": _finite(self.psnr_db),
             "scores": {name: _finite(score) for name, score in self.scores.items()},
@@ -186,7 +186,7 @@ def _short(name: str) -> str:
     return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
 
 
-def _spread(values: list[float]) -> dict[str, float]:
+def _mean_and_most(values: list[float]) -> dict[str, float]:
     return {"mean": sum(values) / len(values), "most": max(values)}
 
 
