@@ -104,8 +104,8 @@ class Placement(Enum):
     EQUAL_FLOW = "equal-flow"
 
 
-class Metering(Enum):
-    """Which retinal velocities the metric assumes (§3.3)."""
+class EyeMovement(Enum):
+    """Eye movements that the metric assumes (§3.3)."""
 
     PURSUIT = "pursuit"
     NONE = "none"
@@ -213,8 +213,8 @@ class MetricSettings(Section):
 
     table = "metric"
 
-    metering: Metering = option(
-        Metering.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
+    metering: EyeMovement = option(
+        EyeMovement.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
     mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)
 

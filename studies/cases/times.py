@@ -154,7 +154,7 @@ def _scaled(path_s: dict[str, float], paths: int) -> dict[str, float]:
 
 def _per_frame(summary: dict[str, Any]) -> dict[str, Any]:
     """Seconds of a frame, in total and by stage, as the ledger has them."""
-    count, spent = summary["frames"], summary["table2"]
+    count, spent = summary["frames"], summary["time_s"]
     stages = {
         name: {kind: seconds / count for kind, seconds in of.items()} for name, of in spent["stages"].items()
     }

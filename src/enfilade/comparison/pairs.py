@@ -135,7 +135,7 @@ class Pairs:
             ]
             if min(least) < 0.0 and not is_said:
                 first = (self.test, self.reference)[least.index(min(least))].name(index)
-                monitor.say(f"{first} holds negative values, which are shown as black")
+                monitor.message(f"{first} holds negative values, which are shown as black")
                 is_said = True
             yield self._pair(index, images, viewing)
 

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from enfilade.metric import sequence_score
+from enfilade.comparison.measures.psnr import psnr_db
+from enfilade.metric import Part, sequence_score
 from enfilade.viewing import Viewing
 
-__all__ = ["FrameDifference", "Part", "SequenceDifference", "psnr_db"]
+__all__ = ["FrameDifference", "SequenceDifference", "short_name"]
 
 WORDS = (  # for scores up to so many JND, of all pixels and frames taken together
     (0.0, "identical"),
@@ -20,22 +21,6 @@ WORDS = (  # for scores up to so many JND, of all pixels and frames taken togeth
     (3.0, "obvious overall"),
     (math.inf, "strong overall"),
 )
-
-
-@dataclass(frozen=True)
-class Part:
-    """Steady or transient errors of one frame.
-
-    Attributes
-    ----------
-    score : float
-        JND.
-    bands : tuple of float
-        Per radial band, finest first, JND.
-    """
-
-    score: float
-    bands: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -83,8 +68,8 @@ class FrameDifference:
             "transient_jnd": self.transient.score,
             "percent_visible": self.percent_visible,
             "largest_jnd": self.largest_jnd,
-            "steady_bands_jnd": list(self.steady.bands),
-            "transient_bands_jnd": list(self.transient.bands),
+            "steady_bands_jnd": list(self.steady.band_jnd),
+            "transient_bands_jnd": list(self.transient.band_jnd),
             "psnr_db": _finite(psnr_db(self.squared_error)),
             "velocity_deg_s": self.velocity_deg_s,
         }
@@ -127,7 +112,7 @@ class SequenceDifference:
         words, worst = words_of(self.score), max(self.frames, key=lambda f: f.largest_jnd)
         if not any(f.percent_visible for f in self.frames):
             return words
-        return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
+        return f"{words}; up to {worst.largest_jnd:.1f} JND in {short_name(worst.name)}"
 
     @property
     def psnr_db(self) -> float:
@@ -176,13 +161,8 @@ def words_of(score: float) -> str:
     return next(text for most, text in WORDS if score <= most)
 
 
-def psnr_db(squared_error: float) -> float:
-    """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
-    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
-
-
-def _short(name: str) -> str:
-    # "frame 3 of walk.mp4", or the path of an image
+def short_name(name: str) -> str:
+    """The name of a frame without its video, "frame 3 of walk.mp4", or without the folder of its image."""
     return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
 
 

@@ -1,4 +1,4 @@
-"""The seam between methods and runs: tasks, passes, and the base class of methods.
+"""The interface between methods and runs: tasks, passes, and the base class of methods.
 
 A method defines how frames are made from a scene and a camera path, as passes in order. A pass maps records
 of earlier passes to new records; most have one task a frame. A method contains no file, ledger, executor or

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import ComparedFrame, Terms, compare
+from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import encode_webp, resized
 from enfilade.images.view import View
@@ -119,8 +119,8 @@ class Film:
                     self._add(index, painted_difference(frame, absolute.map_percent))
 
         of = run.viewing_settings
-        terms = Terms(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
-        return compare(run.folder, reference, terms, Silence(), show=show).to_dict()
+        options = CompareOptions(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
+        return compare(run.folder, reference, options, Silence(), show=show).to_dict()
 
     def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
         layers = {**self._encoded(self._painted(index)), **self._encoded(differences or {})}

@@ -78,7 +78,7 @@ def write_report(
     if dropped := shown.summary["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
     for note in notes:
-        monitor.say(note)
+        monitor.message(note)
     variables = contents(shown, film, None if source is None else _summary(source))
     parts = {
         name: (files("enfilade.reports") / TEMPLATES / name).read_text()

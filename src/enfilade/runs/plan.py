@@ -118,7 +118,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
         tasks=dict(counts),
         seconds=pixels * wall_s,
         cpu_seconds=pixels * cpu_s,
-        traced_percent=summary["table1"],
+        traced_percent=summary["traced_percent"],
         rays=summary["rays"],
         excerpt_frames=len(small.path),
         excerpt_size=(small.path.width, small.path.height),
@@ -164,6 +164,6 @@ class _Quiet:
     def progress(self, name: str, done: int, total: int) -> None:
         """Show nothing: the dry run is one step."""
 
-    def say(self, text: str) -> None:
-        """Pass it on."""
-        self._monitor.say(text)
+    def message(self, text: str) -> None:
+        """Forward the message."""
+        self._monitor.message(text)

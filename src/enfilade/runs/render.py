@@ -71,10 +71,10 @@ def render(
     """
     with _created(job, folder, has_preflight=has_preflight) as run:
         for note in (*run.notes, *_video_notes(job)):
-            monitor.say(note)
+            monitor.message(note)
         for name in run.damaged() if is_verified else ():
             run.forget(name)
-            monitor.say(f"{name} is missing or damaged: its task is done again")
+            monitor.message(f"{name} is missing or damaged: its task is done again")
         work(job, run, workers or Workers(), monitor)
         run.sweep()  # of workers that were killed
         summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
@@ -153,7 +153,7 @@ def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers 
         )
     with RunFolder.share(folder) as run:
         for note in run.notes:
-            monitor.say(note)
+            monitor.message(note)
         work(job, run, workers or Workers(), monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
 
 
