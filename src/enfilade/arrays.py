@@ -96,7 +96,7 @@ def lanes(values: npt.NDArray[Any]) -> Any:
 def _aligned(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Flat values at an address as Dr.Jit's own memory has it; copied where they stand elsewhere.
 
-    Kernels differ by the alignment of what they read: NumPy's memory, aligned now and then, would have
+    Kernels differ by the alignment of their inputs: NumPy's memory, aligned now and then, would have
     the same kernel compiled anew in the middle of a run.
     """
     flat = np.ascontiguousarray(values).ravel()

@@ -97,7 +97,7 @@ class Section:
 
 
 class Placement(Enum):
-    """How initial keyframes are placed (§4.2)."""
+    """Placement of the initial keyframes (§4.2)."""
 
     ADAPTED = "adapted"
     UNIFORM = "uniform"
@@ -221,7 +221,7 @@ class MetricSettings(Section):
 
 @dataclass(frozen=True)
 class MaskSettings(Section):
-    """Which pixels must be traced, and when a segment is split (§4.1, §4.3, §6)."""
+    """Criteria by which pixels are traced and segments are split (§4.1, §4.3, §6)."""
 
     table = "masks"
 

@@ -20,7 +20,7 @@ SAMPLES_PER_CYCLE = 2.0  # the sampling theorem
 
 @dataclass(frozen=True)
 class Viewing:
-    """Where the viewer sits and what the screen shows; the defaults are the paper's (§6).
+    """Viewing conditions: screen, image and distance of the eye; the defaults are the paper's (§6).
 
     Angles are those at the centre of the screen, looked at straight on; towards the corners of a
     screen that is near, a pixel covers a smaller angle, which is left out.

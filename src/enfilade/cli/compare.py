@@ -206,7 +206,7 @@ def _is_folder(target: Path) -> bool:
 
 
 def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | None) -> None:
-    """Refuse to write over what is compared."""
+    """Refuse to write over the compared files."""
     if heatmap is None and graph is None:
         return
     from enfilade.images import files_of
@@ -226,7 +226,7 @@ def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | 
 
 
 def _place_on_disk(file: Path) -> tuple[int, int] | None:
-    """Device and number of a file, whatever names lead to it; None where there is none."""
+    """Device and inode of a file, the same under all its names; None where there is no file."""
     try:
         found = file.stat()
     except OSError:

@@ -59,7 +59,7 @@ class FrameDifference:
     largest_jnd: float
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, fit for JSON; the PSNR of identical images is None."""
+        """The difference as plain values, fit for JSON; the PSNR of identical images is None."""
         return {
             "name": self.name,
             "number": self.number,
@@ -120,7 +120,7 @@ class SequenceDifference:
         return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, fit for JSON."""
+        """The result as plain values, fit for JSON."""
         viewing = self.viewing
         return {
             "score_jnd": self.score,

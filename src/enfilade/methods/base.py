@@ -56,7 +56,7 @@ class Task:
 
     @property
     def id(self) -> TaskId:
-        """Its name."""
+        """The name of the task."""
         return TaskId(self.pass_name, self.frame)
 
 
@@ -106,7 +106,7 @@ class Inputs(Protocol):
 
     @property
     def analysis(self) -> Analysis:
-        """Of all frames of the path."""
+        """The statistics of all frames of the path."""
         ...
 
     def record(self, pass_name: str, frame: int) -> Any:

@@ -216,7 +216,7 @@ def _reduction(band: Band) -> int:
 
 
 def _reduced(values: F32, reduction: int) -> F32:
-    """From every second pixel to every `reduction`-th."""
+    """Reduce a map at every second pixel to every `reduction`-th."""
     for _ in range((reduction // FINEST_REDUCTION).bit_length() - 1):
         values = halve(values)
     return values

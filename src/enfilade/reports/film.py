@@ -130,7 +130,7 @@ class Film:
         return painted(self._run.frame(index), self._view, self._run.viewing)
 
     def _encoded(self, pictures: Mapping[str, U8]) -> dict[str, str]:
-        """As WebP in base64."""
+        """Pictures encoded as WebP in base64."""
         found = {}
         for layer in LAYERS:
             if layer.name in pictures:
@@ -152,12 +152,12 @@ class AbsoluteDifference:
     map_percent: F32
 
     def measure(self, pair: DisplayedPair) -> float:
-        """Of the next frame."""
+        """Mean difference of the next frame."""
         self.map_percent = np.float32(100.0) * np.abs(pair.test - pair.reference).mean(axis=2)
         return float(self.map_percent.mean())
 
     def pool(self, values: Sequence[float | None]) -> float:
-        """Of the whole sequence."""
+        """Mean difference of the whole sequence."""
         return float(np.mean([value for value in values if value is not None]))
 
 

@@ -1,4 +1,4 @@
-"""The report of a run: one HTML page that needs neither other files nor a network. The owner of Jinja2."""
+"""The report of a run: one HTML page that needs neither other files nor a network."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def write_report(
     max_mb
         Megabytes of pictures: larger ones are scaled, then frames are left out. At least 1.
     monitor
-        Receives progress, and the notes of the page: damage, and what was left out.
+        Receives progress, and the notes of the page: damage, and omissions.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Tables of a run, a plan and a comparison for a terminal, and their number formats. The owner of rich."""
+"""Tables of a run, a plan and a comparison for a terminal, and their number formats."""
 
 from __future__ import annotations
 

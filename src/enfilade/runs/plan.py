@@ -1,4 +1,4 @@
-"""What a walkthrough will take: its analysis, and a dry run of a short, small excerpt."""
+"""Forecast of the cost of a walkthrough, from its analysis and a dry run of a short, small excerpt."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EXCERPT_PIXELS = 40_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What rendering a walkthrough will take.
+    """Forecast of the rendering of a walkthrough.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Plan:
     excerpt_size: tuple[int, int]
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain tables, fit for JSON."""
+        """The plan as plain values, fit for JSON."""
         return asdict(self)
 
 

@@ -1,4 +1,4 @@
-"""From scene and camera path to frames, video and summary: begin a run, continue it, or share it out."""
+"""Rendering a scene along a camera path to frames, video and summary: begin, continue or shard a run."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedErr
 
 
 def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
-    """The run folder of a job, begun or continued; what is refused leaves nothing behind."""
+    """The run folder of a job, begun or continued; a refused job leaves no file."""
     job.check()
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
@@ -223,6 +223,6 @@ def _video_notes(job: Job) -> list[str]:
 
 
 def _peak_memory_bytes() -> int:
-    """Of this process or the largest of its children so far."""
+    """Peak memory of this process, or of the largest of its children so far."""
     whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     return 1024 * max(resource.getrusage(who).ru_maxrss for who in whom)
