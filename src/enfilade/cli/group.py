@@ -68,7 +68,7 @@ class EnfiladeGroup(click.Group):
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; an error of ours becomes one message and an exit code."""
+        """Run a command; an expected error becomes one message and an exit code."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
