@@ -45,7 +45,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     from enfilade.camera import load_path
     from enfilade.kernels.estimate import Estimate
     from enfilade.methods.decoupled.integrator import Integrator
-    from enfilade.methods.decoupled.shot import Shot
+    from enfilade.methods.decoupled.shot import ShotContext
     from enfilade.methods.decoupled.virtual_images import VirtualImages
     from enfilade.methods.walkthrough import Walkthrough
     from enfilade.monitor import Silence
@@ -67,7 +67,8 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     inputs = Results(job, RunFolder.read(folder / "run"))
     segments = inputs.analysis.segments(SPACING)[0]
     integrator = Integrator(renderer)
-    view, cache = Shot(0, segments, inputs, walk, integrator, VirtualImages(renderer)).caches(frame)
+    shot = ShotContext(0, segments, inputs, walk, integrator, VirtualImages(renderer))
+    reprojected, cache = shot.shading_caches(frame)
     times: list[float] = []
 
     def radiance(rays, rng):
@@ -75,7 +76,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
         dr.sync_thread()
         begin = time.perf_counter()
         found = integrator.diffuse_radiance(
-            view, cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle
+            reprojected, cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle
         )
         dr.eval(found)
         dr.sync_thread()
@@ -93,7 +94,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     )
     for _ in range(WARM_UP + arguments.repeats):
         rays.add(arguments.spp)
-    is_known = np.array(view.images[0].shape_indices) > 0
+    is_known = np.array(reprojected.images[0].shape_indices) > 0
     has_diffuse = walk.view(frame).geometry.has_diffuse.ravel()
     return times[WARM_UP:], len(pixels) * arguments.spp, float(is_known[has_diffuse].mean())
 

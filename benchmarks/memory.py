@@ -44,7 +44,7 @@ def main() -> None:
             peaks.append(summary["peak_memory_bytes"] / 2**20)
             print(
                 f"{count} frames of {arguments.size}: {peaks[-1]:.0f} MiB, "
-                f"{time.perf_counter() - begin:.0f} s, {summary['table1']['total']:.1f} % traced"
+                f"{time.perf_counter() - begin:.0f} s, {summary['traced_percent']['total']:.1f} % traced"
             )
     print(f"ratio of the last to the first: {peaks[-1] / peaks[0]:.3f}")
 

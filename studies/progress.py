@@ -29,6 +29,6 @@ class Prefixed:
         """Show how many of the items of a stage are done."""
         self.monitor.progress(f"{self.prefix}: {name}", done, total)
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Show a message."""
-        self.monitor.say(f"{self.prefix}: {text}")
+        self.monitor.message(f"{self.prefix}: {text}")

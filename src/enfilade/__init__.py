@@ -1,4 +1,4 @@
-"""Camera walkthroughs of static 3D scenes for a small part of the path tracing that every frame would take.
+"""Renders camera walkthroughs of static scenes; light is reused from frame to frame.
 
 >>> import enfilade
 >>> enfilade.render("scene.xml", "camera_path.json", "runs/walk", method="decoupled")  # doctest: +SKIP

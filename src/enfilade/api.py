@@ -112,7 +112,7 @@ def plan(
 
 
 def compare(
-    test: File, reference: File, *, monitor: Monitor | None = None, **terms: Any
+    test: File, reference: File, *, monitor: Monitor | None = None, **options: Any
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
 
@@ -121,8 +121,8 @@ def compare(
     test, reference
         Run folders, videos, folders of images, or patterns such as ``frames/%04d.exr``.
     monitor
-    terms
-        Fields of :class:`enfilade.comparison.Terms`.
+    options
+        Fields of :class:`enfilade.comparison.CompareOptions`.
 
     Returns
     -------
@@ -133,10 +133,10 @@ def compare(
     ImageError
         A sequence can't be read, or the two can't be compared.
     """
-    from enfilade.comparison import Terms
+    from enfilade.comparison import CompareOptions
     from enfilade.comparison import compare as compare_sequences
 
-    return compare_sequences(test, reference, Terms(**terms), monitor or Silence())
+    return compare_sequences(test, reference, CompareOptions(**options), monitor or Silence())
 
 
 def report(run: File, *, reference: File | None = None, out: File | None = None) -> Path:

@@ -42,7 +42,6 @@ __all__ = [
     "Matrix3f",
     "UInt",
     "UInt64",
-    "halves",
     "image",
     "lanes",
     "matrix3",
@@ -50,8 +49,9 @@ __all__ = [
     "pixel_grid",
     "release_memory",
     "rows",
+    "to_float",
+    "to_half",
     "vector3",
-    "widened",
 ]
 
 
@@ -96,7 +96,7 @@ def lanes(values: npt.NDArray[Any]) -> Any:
 def _aligned(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Flat values at an address as Dr.Jit's own memory has it; copied where they stand elsewhere.
 
-    Kernels differ by the alignment of what they read: NumPy's memory, aligned now and then, would have
+    Kernels differ by the alignment of their inputs: NumPy's memory, aligned now and then, would have
     the same kernel compiled anew in the middle of a run.
     """
     flat = np.ascontiguousarray(values).ravel()
@@ -125,7 +125,7 @@ def rows(vectors: Any) -> npt.NDArray[Any]:
     return np.stack([np.array(axis) for axis in vectors], axis=1)
 
 
-def halves(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float16]:
+def to_half(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float16]:
     """Half floats nearest to the values, of their shape; those beyond the range become its ends.
 
     Several times as fast as NumPy's own.
@@ -134,8 +134,8 @@ def halves(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float16]:
     return np.array(narrow).reshape(values.shape)
 
 
-def widened(values: npt.NDArray[np.float16]) -> npt.NDArray[np.float32]:
-    """The same numbers as half floats, of their shape."""
+def to_float(values: npt.NDArray[np.float16]) -> npt.NDArray[np.float32]:
+    """Half floats as 32-bit floats, of their shape."""
     return np.array(Float(Float16(_aligned(values)))).reshape(values.shape)
 
 

@@ -1,4 +1,4 @@
-"""Which processor the kernels run on: the CPU through LLVM, or an NVIDIA GPU through CUDA.
+"""The processor that runs the kernels: the CPU through LLVM, or an NVIDIA GPU through CUDA.
 
 The choice is made once, before the first kernel: Dr.Jit binds its array types at import.
 """
@@ -30,7 +30,7 @@ Choice = Literal["auto", "cpu", "gpu"]
 
 @dataclass(frozen=True)
 class Device:
-    """What will run the kernels.
+    """The backend that runs the kernels.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Device:
     version : tuple of int
         Version of LLVM, or of CUDA.
     note : str
-        Why a GPU that is there is not taken; empty where none is, or it is.
+        Reason why a GPU that is present is not used; empty otherwise.
     """
 
     backend: Literal["llvm", "cuda"]
@@ -80,7 +80,7 @@ def activate(choice: Choice = "auto") -> Device:
 
 
 def why_no_gpu(dr: Any) -> str:
-    """Why Dr.Jit can't trace rays on a GPU here; empty where it can."""
+    """Reason why Dr.Jit can't trace rays on a GPU here; empty where it can."""
     if not dr.has_backend(dr.JitBackend.CUDA):
         return NO_GPU
     library = os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1")

@@ -1,4 +1,4 @@
-"""What is installed on this machine, which variant will run, and how to get what is missing."""
+"""Check of an installation: requirements found, the variant that will run, and remedies for missing parts."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def _codecs() -> Iterator[Check]:
 
 
 def _library_file(stem: str) -> str:
-    """Where a loaded library lies, ``", /usr/lib/..."``; empty where the system doesn't tell."""
+    """Path of a loaded library, ``", /usr/lib/..."``; empty where the system doesn't tell."""
     maps = Path("/proc/self/maps")
     if not maps.exists():
         return ""

@@ -1,4 +1,4 @@
-"""Progress of a long job: the seam between the work and a screen."""
+"""Progress of a long job: the interface between the work and a screen."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class Monitor(Protocol):
         """Show how many of the items of a stage are done."""
         ...
 
-    def say(self, text: str) -> None:
-        """Show a message."""
+    def message(self, text: str) -> None:
+        """Show a message, one line or several."""
         ...
 
 
@@ -23,5 +23,5 @@ class Silence:
     def progress(self, name: str, done: int, total: int) -> None:
         """Show nothing."""
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Show nothing."""

@@ -1,4 +1,4 @@
-"""What crosses a stage border: small frozen types that say what is in them and check their shapes.
+"""Records passed between stages: frozen dataclasses of arrays, which check their shapes.
 
 Images are NumPy arrays of shape (H, W) or (H, W, C), row 0 at the top. Validity is a mask beside the
 values, never a NaN.
@@ -22,7 +22,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 class SurfaceClass(IntEnum):
-    """What a surface does to light, from its material; of two that apply, the later one."""
+    """Class of a surface by the lobes of its material; of two that apply, the later one."""
 
     NONE = 0
     DIFFUSE = 1
@@ -48,7 +48,7 @@ class Provenance(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What each pixel's centre sees (the G-buffer of one frame).
+    """The G-buffer of one frame: the surfaces visible at the pixels' centres.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """Image flow of one frame (§3.3, Fig. 5): where each pixel's surface point goes, pixels per frame.
+    """Image flow of one frame (§3.3, Fig. 5): motion of each pixel's surface point, pixels per frame.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Shading:
     color : (..., 3) float32
         Linear Rec.709 radiance.
     variance : (...) float32
-        Variance of the mean of the luminance, from the spread of its paths; 0 where spp is 1.
+        Variance of the mean of the luminance, estimated from its paths; 0 where spp is 1.
     dropped : int
         Samples that were NaN or infinite and were left out.
     """
@@ -162,8 +162,8 @@ class Shading:
         _check(self.color, (*self.variance.shape, 3), np.float32, "color")
         _check(self.variance, self.color.shape[:-1], np.float32, "variance")
 
-    def spread(self, where: Mask) -> Shading:
-        """An image of what was traced for a list of its pixels: those of a mask, (H, W)."""
+    def to_image(self, where: Mask) -> Shading:
+        """Scatter the values of a list of pixels, those of a mask (H, W), into an image; 0 elsewhere."""
         color, variance = np.zeros((*where.shape, 3), np.float32), np.zeros(where.shape, np.float32)
         color[where], variance[where] = self.color, self.variance
         return Shading(color, variance, self.dropped)

@@ -97,15 +97,15 @@ class Section:
 
 
 class Placement(Enum):
-    """How initial keyframes are placed (§4.2)."""
+    """Placement of the initial keyframes (§4.2)."""
 
     ADAPTED = "adapted"
     UNIFORM = "uniform"
     EQUAL_FLOW = "equal-flow"
 
 
-class Metering(Enum):
-    """Which retinal velocities the metric assumes (§3.3)."""
+class EyeMovement(Enum):
+    """Eye movements that the metric assumes (§3.3)."""
 
     PURSUIT = "pursuit"
     NONE = "none"
@@ -213,15 +213,15 @@ class MetricSettings(Section):
 
     table = "metric"
 
-    metering: Metering = option(
-        Metering.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
+    metering: EyeMovement = option(
+        EyeMovement.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
     mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)
 
 
 @dataclass(frozen=True)
 class MaskSettings(Section):
-    """Which pixels must be traced, and when a segment is split (§4.1, §4.3, §6)."""
+    """Criteria by which pixels are traced and segments are split (§4.1, §4.3, §6)."""
 
     table = "masks"
 

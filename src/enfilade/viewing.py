@@ -18,7 +18,7 @@ Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.fl
 
 @dataclass(frozen=True)
 class Viewing:
-    """Where the viewer sits and what the screen shows; the defaults are the paper's (§6).
+    """Viewing conditions: screen, image and distance of the eye; the defaults are the paper's (§6).
 
     Angles are those at the centre of the screen, looked at straight on; towards the corners of a
     screen that is near, a pixel covers a smaller angle, which is left out.

@@ -25,7 +25,7 @@ from enfilade.cli.progress import watch
 from enfilade.device import Choice, activate
 from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.files import read_json, write_json
-from enfilade.kernels.estimate import PASS
+from enfilade.kernels.estimate import SPP_PER_SUM
 from enfilade.monitor import Silence
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 from enfilade.runs.folder import RunFolder
@@ -268,7 +268,7 @@ def _excerpt(job: Job) -> Job:
     path = job.path
     count = min(WARM_FRAMES, len(path))
     frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
-    spp = min(job.settings[SamplingSettings].spp, PASS)  # more make no other kernel
+    spp = min(job.settings[SamplingSettings].spp, SPP_PER_SUM)  # more make no other kernel
     cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
     settings = job.settings.replace(SamplingSettings, spp=spp)
     return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)

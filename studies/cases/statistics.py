@@ -51,7 +51,7 @@ def shares(case: Case) -> dict[str, Any]:
     """
     summary, frames = case.rendered("paper"), case.analysis.frames
     return {
-        "table1": summary["table1"],
+        "table1": summary["traced_percent"],
         "specular_seen": sum(of.specular_percent for of in frames) / len(frames),
         "slow_seen": sum(of.slow_percent for of in frames) / len(frames),
         "frames": len(frames),

@@ -139,7 +139,7 @@ class _Quality:
 
     def _traced(self, walk: Walkthrough, frame: int, spp: int) -> Shading:
         purpose, pixel_filter = Purpose.REFERENCE, PixelFilter.GAUSSIAN
-        image = walk.trace(frame, self._where, purpose, spp=spp, pixel_filter=pixel_filter).spread(
+        image = walk.trace(frame, self._where, purpose, spp=spp, pixel_filter=pixel_filter).to_image(
             self._where
         )
         return Shading(self._cut(image.color), self._cut(image.variance), image.dropped)
@@ -154,7 +154,7 @@ def _scaled(path_s: dict[str, float], paths: int) -> dict[str, float]:
 
 def _per_frame(summary: dict[str, Any]) -> dict[str, Any]:
     """Seconds of a frame, in total and by stage, as the ledger has them."""
-    count, spent = summary["frames"], summary["table2"]
+    count, spent = summary["frames"], summary["time_s"]
     stages = {
         name: {kind: seconds / count for kind, seconds in of.items()} for name, of in spent["stages"].items()
     }

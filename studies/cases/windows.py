@@ -198,7 +198,7 @@ def probes_of(analysis: Analysis, count: int) -> list[int]:
 
 def _trace(walk: Walkthrough, frame: int, spp: int, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
     everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
-    return walk.trace(frame, everywhere, purpose, spp=spp, pixel_filter=pixel_filter).spread(everywhere)
+    return walk.trace(frame, everywhere, purpose, spp=spp, pixel_filter=pixel_filter).to_image(everywhere)
 
 
 def _with_variance_as_color(warped: Warped) -> Warped:

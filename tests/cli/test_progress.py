@@ -40,8 +40,8 @@ def test_items_done_before_are_not_part_of_the_pace():
 
 def test_messages_are_lines():
     lines = []
-    LineMonitor(lines.append).say("continued")
-    OpenJdMonitor(lines.append).say("continued")
+    LineMonitor(lines.append).message("continued")
+    OpenJdMonitor(lines.append).message("continued")
     assert lines == ["continued", "continued"]
 
 
@@ -52,7 +52,7 @@ def test_bars():
         monitor.progress("frames", 3, 4)
         monitor.progress("clips", 1, 1)
         monitor.progress("frames", 4, 4)
-        monitor.say("a message")
+        monitor.message("a message")
         assert [(task.description, task.completed, task.total) for task in bars.tasks] == [
             ("frames", 4, 4),
             ("clips", 1, 1),

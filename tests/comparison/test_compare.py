@@ -23,7 +23,7 @@ def test_equal_sequences_have_exactly_no_difference(sequence, mode, flow):
     found = compared(folder, folder, mode=mode, flow=flow)
     assert found.score == 0.0
     assert [f.percent_visible for f in found.frames] == [0.0] * 4
-    assert not any(any(part.bands) for f in found.frames for part in (f.steady, f.transient))
+    assert not any(any(part.band_jnd) for f in found.frames for part in (f.steady, f.transient))
     assert found.psnr_db == math.inf
     as_json = found.to_dict()
     assert (as_json["psnr_db"], as_json["meaning"]) == (None, "identical")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import Float, UInt, lanes
-from enfilade.kernels.random import Leading, stratified, stratified4, streams
+from enfilade.kernels.random import PrefixedRng, stratified, stratified4, streams
 from enfilade.renderer import RandomKey
 
 COUNT = 1 << 16
@@ -135,7 +135,7 @@ def test_the_paths_of_a_pixel_are_stratified_in_four_dimensions():
 def test_given_numbers_lead():
     pixel = lanes(np.arange(8, dtype=np.uint32))
     rng, alone = (streams(pixel, UInt(0), RandomKey(1, 2, 3)) for _ in "ab")
-    leading = Leading([Float(0.25), Float(0.5)], rng)
-    assert np.array(leading.next_float32()).tolist() == [0.25]
-    assert np.array(leading.next_float32()).tolist() == [0.5]
-    np.testing.assert_array_equal(np.array(leading.next_float32()), np.array(alone.next_float32()))
+    prefixed = PrefixedRng([Float(0.25), Float(0.5)], rng)
+    assert np.array(prefixed.next_float32()).tolist() == [0.25]
+    assert np.array(prefixed.next_float32()).tolist() == [0.5]
+    np.testing.assert_array_equal(np.array(prefixed.next_float32()), np.array(alone.next_float32()))

@@ -22,7 +22,9 @@ def table():
 
 def sensitivity(table, velocity):
     one = Pyramid(np.ones((), np.float32))
-    return ChannelSensitivity(table, SHAPE, light=one, contrast=one, velocity=velocity, eyes=(Pursuit.NONE,))
+    return ChannelSensitivity(
+        table, SHAPE, adapting=one, contrast=one, velocity=velocity, eyes=(Pursuit.NONE,)
+    )
 
 
 def test_table_is_the_formula(table):

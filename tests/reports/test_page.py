@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import enfilade
-from enfilade.comparison import Terms, compare
+from enfilade.comparison import CompareOptions, compare
 from enfilade.errors import DamagedFileError, ImageError, RunFolderError, SettingsError
 from enfilade.images import read_exr
 from enfilade.images.view import open_view
@@ -33,7 +33,7 @@ from support.synthetic_runs import synthetic_run
 class Notes(Silence, list):
     """A monitor that keeps messages."""
 
-    say = list.append
+    message = list.append
 
 
 def written(folder, tmp_path, **terms):
@@ -71,7 +71,7 @@ def test_charts_and_tables_have_the_figures_of_the_run(runs, page_file):
     summary = statistics(RunFolder.read(runs / "run"))
     assert "finished</span> all 10 frames and the video" in text
     for name in ("slow", "specular", "occlusion", "keyframes"):
-        assert f"<td>{percent(summary['table1'][name])}</td>" in text
+        assert f"<td>{percent(summary['traced_percent'][name])}</td>" in text
     for stage in ("gbuffer", "analysis", "probe", "frames", "video"):
         assert f'<th scope="row">{stage}</th>' in text
     series = series_of(text, data_of(text))
@@ -95,7 +95,7 @@ def test_nothing_comes_from_elsewhere(page_file):
 
 
 def test_the_score_is_that_of_compare(runs, page_file):
-    found = compare(runs / "run", runs / "reference", Terms(), Silence()).to_dict()
+    found = compare(runs / "run", runs / "reference", CompareOptions(), Silence()).to_dict()
     text = page_file.read_text()
     scores = [row["score_jnd"] for row in found["per_frame"]]
     assert series_of(text, data_of(text))["quality"]["score"] == pytest.approx(scores, abs=1e-3)

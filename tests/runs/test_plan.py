@@ -54,7 +54,7 @@ def test_a_dry_run_is_multiplied(tmp_path, monkeypatch):
 
     job = toy_job(tmp_path, path=slide(18, cuts=(9,), size=(400, 400)))
     monkeypatch.setattr(module, "RunFolder", Run)
-    monkeypatch.setattr(module, "render", lambda *_: {"table1": {}, "rays": {}})
+    monkeypatch.setattr(module, "render", lambda *_: {"traced_percent": {}, "rays": {}})
     made = plan(job, Stages())
     expected = 3.0 * 18 / 9 + 5.0 * 18 + 7.0 * 2 + 11.0 * 18 + 13.0 * 18 / 9 + 1.0
     assert made.excerpt_size == (200, 200)

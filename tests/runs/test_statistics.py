@@ -35,14 +35,14 @@ def test_statistics_of_a_running_run(run):
         run.finish({"pass": name, "frame": frame, **facts, "files": {}, "cost": cost})
     found = statistics(run)
     assert (found["method"], found["frames"], found["size"], found["fps"]) == ("paper", 3, [10, 10], 24.0)
-    assert found["table1"] == {
+    assert found["traced_percent"] == {
         "slow": 5.0,
         "specular": 3.0,
         "occlusion": 2.0,
         "keyframes": 50.0,
         "total": 60.0,
     }
-    table = found["table2"]
+    table = found["time_s"]
     assert (table["total_s"], table["per_frame_s"], table["cpu_s"]) == (7.5, 2.5, 11.25)
     assert table["stages"]["frames"] == {"wall_s": 2.0, "cpu_s": 4.0}
     assert [(row["frame"], row["velocity_deg_s"], row["traced"]) for row in found["per_frame"]] == [
@@ -56,7 +56,12 @@ def test_statistics_of_a_running_run(run):
 
 def test_statistics_of_a_run_that_has_just_begun(run):
     found = statistics(run)
-    assert (found["per_frame"], found["rays"], found["table1"]["total"], found["table2"]["total_s"]) == (
+    assert (
+        found["per_frame"],
+        found["rays"],
+        found["traced_percent"]["total"],
+        found["time_s"]["total_s"],
+    ) == (
         [],
         {},
         0,

@@ -100,8 +100,8 @@ def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> li
     estimate = Estimate(
         camera,
         pixels_of(camera),
-        lambda rays, rng, square: integrator_of(renderer).specular_radiance(
-            IrradianceCache(), rays, rng, square, pixel_angle=PIXEL_ANGLE
+        lambda rays, rng, qmc_point: integrator_of(renderer).specular_radiance(
+            IrradianceCache(), rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE
         ),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
@@ -128,7 +128,7 @@ def traced_irradiance(
     )
     estimate.add(spp)
     everywhere = np.ones((camera.height, camera.width), bool)
-    direct, indirect = (shading.spread(everywhere) for shading in estimate.shadings)
+    direct, indirect = (shading.to_image(everywhere) for shading in estimate.shadings)
     return find_geometry(renderer, camera), IrradianceImage(direct, indirect, everywhere)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import FlowChoice, SequenceDifference, Terms, compare
+from enfilade.comparison import CompareOptions, FlowChoice, SequenceDifference, compare
 from enfilade.images import write_exr
 from enfilade.monitor import Silence
 from enfilade.runs.identity import FORMAT
@@ -24,7 +24,7 @@ class Notes(Silence):
     def __init__(self) -> None:
         self.said: list[str] = []
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         self.said.append(text)
 
 
@@ -80,9 +80,9 @@ def terms(
     metering: str = "both",
     mask_slope: float = 0.7,
     **fields: Any,
-) -> Terms:
+) -> CompareOptions:
     metric = MetricSettings.from_table({"metering": metering, "mask_slope": mask_slope})
-    return Terms(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
+    return CompareOptions(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
 
 
 def compared(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:

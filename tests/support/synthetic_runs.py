@@ -31,8 +31,14 @@ def synthetic_summary(count=120, *, spacing=20, method="paper"):
         "size": [640, 480],
         "fps": 30.0,
         "video": "video.mp4",
-        "table1": {"slow": 20.0, "specular": 7.9, "occlusion": 0.43, "keyframes": 5.8, "total": 34.13},
-        "table2": {
+        "traced_percent": {
+            "slow": 20.0,
+            "specular": 7.9,
+            "occlusion": 0.43,
+            "keyframes": 5.8,
+            "total": 34.13,
+        },
+        "time_s": {
             "total_s": 240.0,
             "per_frame_s": 2.0,
             "cpu_s": 430.0,

@@ -121,7 +121,7 @@ class Recorder:
         if len(self.done) == self._after:
             self._act()
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         self.said.append(text)
 
 

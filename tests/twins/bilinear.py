@@ -1,4 +1,4 @@
-"""Twin of `enfilade.kernels.gather`: one position at a time, float64."""
+"""Twin of `enfilade.kernels.bilinear`: one position at a time, float64."""
 
 import math
 

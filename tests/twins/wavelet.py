@@ -10,7 +10,7 @@ def smooth(color, variance, depth, normal, shape_index, direction_from_pixel, *,
     seen = depth, normal, shape_index, direction_from_pixel
     related = np.ones_like(variance)
     for level in range(levels):
-        color, variance, share = _pass(color, variance, seen, step=1 << level, **limits)
+        color, variance, share = _filter_level(color, variance, seen, step=1 << level, **limits)
         related *= share ** (_independent(level) - 1.0)
     return color, variance * related
 
@@ -26,14 +26,14 @@ def _independent(level):
     return np.log(after / before) / np.log(np.sum(SPLINE**2) ** 2)
 
 
-def _pass(color, variance, seen, *, step, deviations, plane, exponent):
+def _filter_level(color, variance, seen, *, step, deviations, plane, exponent):
     depth, normal, shape_index, p = seen
     height, width = variance.shape
-    spread = np.zeros_like(variance)
+    blurred = np.zeros_like(variance)
     padded = np.pad(variance, 1, mode="edge")
     for j, wy in enumerate((0.25, 0.5, 0.25)):
         for i, wx in enumerate((0.25, 0.5, 0.25)):
-            spread += wy * wx * padded[j : j + height, i : i + width]
+            blurred += wy * wx * padded[j : j + height, i : i + width]
     luminance = color @ LUMINANCE
     out, out_variance, shares = np.zeros_like(color), np.zeros_like(variance), np.zeros_like(variance)
     for y in range(height):
@@ -57,7 +57,7 @@ def _pass(color, variance, seen, *, step, deviations, plane, exponent):
                     cosine = np.clip(normal[y, x] @ normal[v, u], 0.0, 1.0)
                     surface *= np.exp(-away) * cosine**exponent
                     apart = abs(luminance[v, u] - luminance[y, x])
-                    apart /= deviations * np.sqrt(spread[v, u] + spread[y, x]) + 1e-8
+                    apart /= deviations * np.sqrt(blurred[v, u] + blurred[y, x]) + 1e-8
                     share = surface * np.exp(-apart)
                     total += share * color[v, u]
                     total_variance += share**2 * variance[v, u]

@@ -16,7 +16,7 @@ from enfilade.errors import SettingsError
 from enfilade.settings import SECTIONS, MetricSettings, ViewingSettings
 
 if TYPE_CHECKING:
-    from enfilade.comparison import ComparedFrame, Show, Terms
+    from enfilade.comparison import ComparedFrame, CompareOptions, Show
     from enfilade.reports.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
@@ -122,12 +122,12 @@ def command(
     check_png("--graph", graph)
     show = None if heatmap is None else _painted(heatmap)
     _check_apart(test, reference, heatmap, graph)
-    terms = _terms(ctx, **choices)
+    options = _options(ctx, **choices)
     from enfilade.cli.progress import watch
     from enfilade.comparison import compare
 
     with watch(quiet=quiet) as monitor:
-        found = compare(test, reference, terms, monitor, show=show).to_dict()
+        found = compare(test, reference, options, monitor, show=show).to_dict()
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:
@@ -141,7 +141,7 @@ def command(
             click.echo(f"{name:<9} {file}")
 
 
-def _terms(
+def _options(
     ctx: click.Context,
     *,
     display: str | None,
@@ -150,14 +150,14 @@ def _terms(
     measures: tuple[str, ...],
     flow: str,
     layers: tuple[str, ...],
-) -> Terms:
-    from enfilade.comparison import FlowChoice, Terms
+) -> CompareOptions:
+    from enfilade.comparison import CompareOptions, FlowChoice
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx, SECTIONS)
     viewing = settings[ViewingSettings]
-    return Terms(
+    return CompareOptions(
         viewing=viewing,
         metric=settings[MetricSettings],
         display=None if display is None else _display(ctx, display, viewing),
@@ -206,7 +206,7 @@ def _is_folder(target: Path) -> bool:
 
 
 def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | None) -> None:
-    """Refuse to write over what is compared."""
+    """Refuse to write over the compared files."""
     if heatmap is None and graph is None:
         return
     from enfilade.images import files_of
@@ -226,7 +226,7 @@ def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | 
 
 
 def _place_on_disk(file: Path) -> tuple[int, int] | None:
-    """Device and number of a file, whatever names lead to it; None where there is none."""
+    """Device and inode of a file, the same under all its names; None where there is no file."""
     try:
         found = file.stat()
     except OSError:

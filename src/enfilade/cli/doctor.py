@@ -1,4 +1,4 @@
-"""``enfilade doctor``: what is installed, which variant will run, and how to get what is missing."""
+"""``enfilade doctor``: check of the installation: requirements, the variant that will run, and remedies."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from enfilade.installation import Check
 
 
-@click.command("doctor", short_help="What is installed, what is missing and how to get it.")
+@click.command("doctor", short_help="Check the installation, with remedies for missing parts.")
 @device_option
 @json_option
 @debug_option
 @click.pass_context
 def command(ctx: click.Context, /, *, device: Choice, as_json: bool) -> None:
-    """Say what is installed, which variant will run, what is missing and how to get it."""
+    """List the installed requirements, the variant that will run, and remedies for missing parts."""
     from enfilade.installation import examine
 
     checks = examine(device)

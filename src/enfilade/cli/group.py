@@ -1,4 +1,4 @@
-"""The ``enfilade`` command: its sub-commands, loaded when used, and what becomes of errors."""
+"""The ``enfilade`` command: its sub-commands, loaded when used, and the messages and exit codes of errors."""
 
 from __future__ import annotations
 
@@ -63,16 +63,16 @@ class EnfiladeGroup(click.Group):
         return command
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Keep what was typed: it is the line that continues the job."""
+        """Keep the arguments as typed: the same line continues the job."""
         ctx.meta[_ARGUMENTS] = tuple(args)
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; an error of ours becomes one message and an exit code."""
+        """Run a command; an expected error becomes one message and an exit code."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            click.echo(_farewell(ctx), err=True)
+            click.echo(_interruption(ctx), err=True)
             ctx.exit(INTERRUPTED)
         except BrokenPipeError:
             raise
@@ -84,7 +84,7 @@ class EnfiladeGroup(click.Group):
 
 
 def mark_resumable(ctx: click.Context) -> None:
-    """Say that the command now running goes on where it stopped when it is typed again."""
+    """Mark the running command as resumable: typed again, it continues where it stopped."""
     ctx.meta[_RESUMABLE] = True
 
 
@@ -96,7 +96,7 @@ def _message(error: Exception) -> str:
     return str(error)
 
 
-def _farewell(ctx: click.Context) -> str:
+def _interruption(ctx: click.Context) -> str:
     if not ctx.meta.get(_RESUMABLE):
         return "\nInterrupted."
     line = f"{ctx.find_root().info_name} {shlex.join(ctx.meta[_ARGUMENTS])}"
@@ -125,4 +125,4 @@ debug_option = click.option(
 @click.version_option(__version__, prog_name="enfilade", help="Show the version and exit.")
 @debug_option
 def main() -> None:
-    """Render a camera walkthrough of a 3D scene at a small part of the cost of path tracing every frame."""
+    """Render camera walkthroughs of static scenes; light is reused from frame to frame."""

@@ -44,7 +44,7 @@ class BarMonitor:
             self._tasks[name] = self._bars.add_task(name, total=total, completed=max(done - 1, 0))
         self._bars.update(self._tasks[name], completed=done, total=total)
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Print a line above the bars."""
         self._bars.console.print(text, markup=False, highlight=False)
 
@@ -97,7 +97,7 @@ class LineMonitor:
             times = f"{clock_time(passed)} passed, about {clock_time(left)} left"
             self._write(f"{name}: {done}/{total}, {times}")
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Write a line."""
         self._write(text)
 
@@ -122,7 +122,7 @@ class OpenJdMonitor:
             self._write(f"openjd_status: {name}")
         self._write(f"openjd_progress: {100.0 * done / max(total, 1):.1f}")
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Write a line."""
         self._write(text)
 

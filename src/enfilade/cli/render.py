@@ -1,4 +1,4 @@
-"""``enfilade render``: from scene and camera path to frames and video."""
+"""``enfilade render``: frames and video of a scene along a camera path."""
 
 from __future__ import annotations
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from enfilade.comparison.compare import ComparedFrame, Show, Terms, compare
+from enfilade.comparison.compare import ComparedFrame, CompareOptions, Show, compare
+from enfilade.comparison.measures.psnr import psnr_db
 from enfilade.comparison.motion import FlowChoice
-from enfilade.comparison.result import FrameDifference, SequenceDifference, psnr_db
+from enfilade.comparison.result import FrameDifference, SequenceDifference, short_name
 
 __all__ = [
+    "CompareOptions",
     "ComparedFrame",
     "FlowChoice",
     "FrameDifference",
     "SequenceDifference",
     "Show",
-    "Terms",
     "compare",
     "psnr_db",
+    "short_name",
 ]

@@ -13,7 +13,7 @@ import numpy as np
 from enfilade.comparison.measures import Measure, open_measure
 from enfilade.comparison.motion import FlowChoice, Moved, open_motion
 from enfilade.comparison.pairs import Pair, open_pairs
-from enfilade.comparison.result import FrameDifference, Part, SequenceDifference
+from enfilade.comparison.result import FrameDifference, SequenceDifference
 from enfilade.errors import ImageError, InputError
 from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Aqm, Comparison, Pursuit, SequenceAqm
@@ -22,7 +22,7 @@ from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
-__all__ = ["ComparedFrame", "Show", "Terms", "compare"]
+__all__ = ["CompareOptions", "ComparedFrame", "Show", "compare"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +55,8 @@ Show = Callable[[Iterator[ComparedFrame], Viewing], object]
 
 
 @dataclass(frozen=True)
-class Terms:
-    """Assumptions of a comparison.
+class CompareOptions:
+    """Options of a comparison: viewing conditions, mode of the metric, and inputs.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Terms:
 def compare(
     test: Path | str,
     reference: Path | str,
-    terms: Terms,
+    options: CompareOptions,
     monitor: Monitor,
     *,
     show: Show | None = None,
@@ -122,7 +122,7 @@ def compare(
     ----------
     test, reference
         Sources of :func:`enfilade.images.open_sequence`.
-    terms
+    options
     monitor
     show
         Receives the compared frames and the viewing conditions, and must iterate over all of them.
@@ -135,21 +135,23 @@ def compare(
     SettingsError
         There is no such measure, or it is not installed.
     """
-    pairs = open_pairs(test, reference, fps=terms.fps, exposure_ev=terms.exposure_ev, layers=terms.layers)
-    conditions = terms.conditions(pairs.size, pairs.fps)
-    motion = open_motion(pairs.test, pairs.reference, terms.flow, pairs.starts)
+    pairs = open_pairs(
+        test, reference, fps=options.fps, exposure_ev=options.exposure_ev, layers=options.layers
+    )
+    conditions = options.conditions(pairs.size, pairs.fps)
+    motion = open_motion(pairs.test, pairs.reference, options.flow, pairs.starts)
     notes = [motion.text, pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note))]
     if pairs.exposure_ev:
         notes.append(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
-    if terms.display is None:
+    if options.display is None:
         notes.append(
             f"display: the image fills a diagonal of {conditions.diagonal_m:g} m, seen from "
             f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; --display "
             "chooses another"
         )
     for note in filter(None, notes):
-        monitor.say(note)
-    comparer = _Comparer(conditions, terms)
+        monitor.message(note)
+    comparer = _Comparer(conditions, options)
     found: list[FrameDifference] = []
 
     def compared() -> Iterator[ComparedFrame]:
@@ -164,20 +166,20 @@ def compare(
     else:
         show(compared(), conditions)
     bands = comparer.bands_cpd
-    return SequenceDifference(tuple(found), conditions, bands, terms.mode, motion.kind, comparer.scores())
+    return SequenceDifference(tuple(found), conditions, bands, options.mode, motion.kind, comparer.scores())
 
 
 class _Comparer:
-    def __init__(self, viewing: Viewing, terms: Terms) -> None:
+    def __init__(self, viewing: Viewing, options: CompareOptions) -> None:
         self._viewing = viewing
-        pursuit = Pursuit(terms.metric.metering.value)
-        if terms.mode == "paper":
-            aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=terms.metric.mask_slope)
+        pursuit = Pursuit(options.metric.metering.value)
+        if options.mode == "paper":
+            aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=options.metric.mask_slope)
         else:
             aqm = Aqm.modern(viewing, pursuit=pursuit)
         self._aqm = SequenceAqm(aqm)
         self.bands_cpd = aqm.bands_cpd
-        opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in terms.measures]
+        opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in options.measures]
         self._measures: list[tuple[Measure, list[float | None]]] = [(measure, []) for measure in opened]
 
     def compare(self, pair: Pair, moved: Moved) -> ComparedFrame:
@@ -203,14 +205,13 @@ class _Comparer:
 
 
 def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
-    steady, transient = (Part(part.score, part.band_jnd) for part in (found.steady, found.transient))
     return FrameDifference(
         pair.name,
         pair.number,
         found.percent_visible,
         found.score,
-        steady,
-        transient,
+        found.steady,
+        found.transient,
         pair.squared_error,
         speed_deg_s,
         largest_jnd=float(found.jnd.max()),

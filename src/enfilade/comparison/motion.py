@@ -1,4 +1,4 @@
-"""Where the image flow of a compared sequence comes from: layers of its frames, an estimate, or nowhere."""
+"""Sources of the image flow of a compared sequence: layers of its frames, an estimate, or none."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BLOCK_PX = 8  # over which it is averaged: noise is no cut
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """How the image moves at one frame.
+    """The motion of the image at one frame.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Moved:
 
 
 class FlowChoice(Enum):
-    """Which image flow to use."""
+    """Choice of the image flow."""
 
     AUTO = "auto"
     LAYERS = "layers"
@@ -71,7 +71,7 @@ class Motion(Protocol):
     text: str
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
-        """Pairs in order, each with how it moves."""
+        """Pairs in order, each with its motion."""
         ...
 
 
@@ -278,6 +278,6 @@ class _Still:
         self._starts = starts
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
-        """Pairs of which nothing moves."""
+        """Pairs without motion."""
         for pair in pairs:
             yield pair, Moved(is_cut=pair.index in self._starts)

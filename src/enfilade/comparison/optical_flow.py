@@ -1,4 +1,4 @@
-"""Image flow estimated from the images alone: dense inverse search (Kroeger et al. 2016). OpenCV's owner.
+"""Image flow estimated from the images alone: dense inverse search (Kroeger et al. 2016), by OpenCV.
 
 For sequences that come without flow: videos, PNG, OpenEXR of a renderer that writes no motion vectors.
 OpenCV's implementation takes 0.04 s of CPU time a flow at 640x480, where scikit-image's TV-L1 and
@@ -122,7 +122,7 @@ def _is_cut(image: U8, other: U8, compensated: U8) -> bool:
 
 
 def _trust(image: U8, other: U8, compensated: U8) -> F32:
-    """From 0, where compensation changes nothing, to 1, where it explains the difference; (H, W)."""
+    """Confidence of the flow, (H, W): 0 where it explains none of the difference, 1 where it explains all."""
     height, width = image.shape
     sigma = max(WINDOW * width / BLOCK_PX, 1.0)
     before, after = (

@@ -1,4 +1,4 @@
-"""Two sequences side by side: what has to be alike, and each pair of frames as the screen shows it."""
+"""Two sequences side by side: checks that they match, and their pairs of frames as displayed."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Pairs:
     fps
         Frames per second that are shown; None takes the reference's, the test's, or 30.
     exposure_ev
-        Stops, of OpenEXR frames; others are as shown. None takes what the run folders say, else 0.
+        Stops, of OpenEXR frames; others are as shown. None takes that of the run folders, else 0.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Pairs:
         Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
         says so.
     note : str
-        What to know of how the frames are paired, or of what they can show; empty where there is nothing.
+        Remark on the pairing of the frames, or on their content; empty where there is none.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class Pairs:
             ]
             if min(least) < 0.0 and not is_said:
                 first = (self.test, self.reference)[least.index(min(least))].name(index)
-                monitor.say(f"{first} holds negative values, which are shown as black")
+                monitor.message(f"{first} holds negative values, which are shown as black")
                 is_said = True
             yield self._pair(index, images, viewing)
 
@@ -181,7 +181,7 @@ def open_pairs(
     fps, exposure_ev
         See :class:`Pairs`.
     layers
-        Of the test and the reference, where they are OpenEXR frames: what is the picture.
+        Layer of the picture in the OpenEXR frames of the test and of the reference.
 
     Raises
     ------

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from enfilade.metric import sequence_score
+from enfilade.comparison.measures.psnr import psnr_db
+from enfilade.metric import Part, sequence_score
 from enfilade.viewing import Viewing
 
-__all__ = ["FrameDifference", "Part", "SequenceDifference", "psnr_db"]
+__all__ = ["FrameDifference", "SequenceDifference", "short_name"]
 
 WORDS = (  # for scores up to so many JND, of all pixels and frames taken together
     (0.0, "identical"),
@@ -20,22 +21,6 @@ WORDS = (  # for scores up to so many JND, of all pixels and frames taken togeth
     (3.0, "obvious overall"),
     (math.inf, "strong overall"),
 )
-
-
-@dataclass(frozen=True)
-class Part:
-    """Steady or transient errors of one frame.
-
-    Attributes
-    ----------
-    score : float
-        JND.
-    bands : tuple of float
-        Per radial band, finest first, JND.
-    """
-
-    score: float
-    bands: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -74,7 +59,7 @@ class FrameDifference:
     largest_jnd: float
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, fit for JSON; the PSNR of identical images is None."""
+        """The difference as plain values, fit for JSON; the PSNR of identical images is None."""
         return {
             "name": self.name,
             "number": self.number,
@@ -83,8 +68,8 @@ class FrameDifference:
             "transient_jnd": self.transient.score,
             "percent_visible": self.percent_visible,
             "largest_jnd": self.largest_jnd,
-            "steady_bands_jnd": list(self.steady.bands),
-            "transient_bands_jnd": list(self.transient.bands),
+            "steady_bands_jnd": list(self.steady.band_jnd),
+            "transient_bands_jnd": list(self.transient.band_jnd),
             "psnr_db": _finite(psnr_db(self.squared_error)),
             "velocity_deg_s": self.velocity_deg_s,
         }
@@ -127,7 +112,7 @@ class SequenceDifference:
         words, worst = words_of(self.score), max(self.frames, key=lambda f: f.largest_jnd)
         if not any(f.percent_visible for f in self.frames):
             return words
-        return f"{words}; up to {worst.largest_jnd:.1f} JND in {_short(worst.name)}"
+        return f"{words}; up to {worst.largest_jnd:.1f} JND in {short_name(worst.name)}"
 
     @property
     def psnr_db(self) -> float:
@@ -135,14 +120,14 @@ class SequenceDifference:
         return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, fit for JSON."""
+        """The result as plain values, fit for JSON."""
         viewing = self.viewing
         return {
             "score_jnd": self.score,
             "meaning": self.meaning,
             "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
             "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
-            "percent_visible": _spread([f.percent_visible for f in self.frames]),
+            "percent_visible": _mean_and_most([f.percent_visible for f in self.frames]),
             "largest_jnd": max(f.largest_jnd for f in self.frames),
             "psnr_db": _finite(self.psnr_db),
             "scores": {name: _finite(score) for name, score in self.scores.items()},
@@ -176,17 +161,12 @@ def words_of(score: float) -> str:
     return next(text for most, text in WORDS if score <= most)
 
 
-def psnr_db(squared_error: float) -> float:
-    """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
-    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
-
-
-def _short(name: str) -> str:
-    # "frame 3 of walk.mp4", or the path of an image
+def short_name(name: str) -> str:
+    """The name of a frame without its video, "frame 3 of walk.mp4", or without the folder of its image."""
     return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
 
 
-def _spread(values: list[float]) -> dict[str, float]:
+def _mean_and_most(values: list[float]) -> dict[str, float]:
     return {"mean": sum(values) / len(values), "most": max(values)}
 
 

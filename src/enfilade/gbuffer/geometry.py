@@ -1,4 +1,4 @@
-"""The G-buffer of a frame: range, shape and material of what each pixel's centre sees (§1)."""
+"""The G-buffer of a frame: depth, shape and material of the surfaces visible at the pixels' centres (§1)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from enfilade.renderer import Renderer
 
 
 def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
-    """Find what each pixel's centre sees.
+    """Find the surfaces visible at the pixels' centres.
 
     Costs one ray a pixel (more where masked surfaces are looked through), and no shading.
     """
@@ -38,7 +38,7 @@ def find_geometry(renderer: Renderer, camera: Camera) -> Geometry:
 
 
 def positions(geometry: Geometry) -> F32:
-    """World position of what each pixel sees, (H, W, 3) scene units; 0 where nothing is hit."""
+    """World positions of the visible surfaces, (H, W, 3) scene units; 0 where nothing is hit."""
     camera = geometry.camera
     x = np.arange(camera.width, dtype=np.float64) + 0.5
     y = np.arange(camera.height, dtype=np.float64) + 0.5

@@ -15,7 +15,7 @@ from enfilade.records import F32, Flow, Geometry
 
 
 def image_flow(geometry: Geometry, previous: Camera | None, following: Camera | None) -> Flow:
-    """Where each pixel's surface point was, and where it will be.
+    """Motion vectors of each pixel's surface point to the previous and the next frame.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from enfilade.viewing import Viewing
 
 
 class View:
-    """What one frame shows, and how it moves.
+    """The G-buffer of one frame, with its motion vectors and velocities.
 
     Parameters
     ----------

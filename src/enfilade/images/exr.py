@@ -119,7 +119,7 @@ def color_layers(file: Path) -> tuple[str, ...]:
 
 
 def is_exr(file: Path) -> bool:
-    """Whether a file begins as OpenEXR files do, whatever its name; OSError if it can't be read."""
+    """Whether a file begins as OpenEXR files do, under any name; OSError if it can't be read."""
     with file.open("rb") as raw:
         return raw.read(len(MAGIC)) == MAGIC
 

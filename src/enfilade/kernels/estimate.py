@@ -18,7 +18,7 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, RandomKey, Rays
 
-PASS = 64  # paths of a pixel that are summed in float32; fixed, so that no chunk size changes a rounding
+SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no chunk size changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
 
 Radiance = Callable[..., Any]
@@ -60,8 +60,8 @@ class Estimate:
     layers
         Number of layers of the samples.
     is_stratified
-        Whether ``radiance`` receives an Array4f as a third argument: points of the unit cube, evenly spread
-        over the paths of a pixel.
+        Whether ``radiance`` receives an Array4f as a third argument: quasi-Monte Carlo points in [0, 1)^4,
+        a sequence for each pixel.
     """
 
     def __init__(
@@ -100,8 +100,8 @@ class Estimate:
         """
         everyone = np.ones(len(self._pixels), bool) if where is None else where
         chosen = np.flatnonzero(everyone).astype(np.uint32)
-        for first in range(self._next, self._next + spp, PASS):
-            count = min(PASS, self._next + spp - first)
+        for first in range(self._next, self._next + spp, SPP_PER_SUM):
+            count = min(SPP_PER_SUM, self._next + spp - first)
             step = max(self._chunk // count, 1)
             for start in range(0, len(chosen), step):
                 # Generate camera rays, `count` neighbouring lanes a pixel.
@@ -135,10 +135,10 @@ class Estimate:
         dropped = self._traced - round(dr.sum(self._sums[0])[0])
         found = []
         for first in range(2, len(self._sums), 4):
-            *mean, square = (total / count for total in self._sums[first : first + 4])
+            *mean, mean_square = (total / count for total in self._sums[first : first + 4])
             luminance = sum(weight * channel for weight, channel in zip(REC709_LUMINANCE, mean, strict=True))
-            spread = dr.maximum(square - luminance * luminance, 0.0)
-            variance = dr.select(count > 1.0, spread / dr.maximum(count - 1.0, 1.0), 0.0)
+            sample_variance = dr.maximum(mean_square - luminance * luminance, 0.0)
+            variance = dr.select(count > 1.0, sample_variance / dr.maximum(count - 1.0, 1.0), 0.0)
             found.append((Array3f(*map(Float, mean)), Float(variance)))
         dr.eval(found)
         n = len(self._pixels)
@@ -156,8 +156,8 @@ class Estimate:
             case PixelFilter.BOX:
                 at += box_offsets(stratified(pixel, path, self._random))
             case PixelFilter.GAUSSIAN:
-                square = stratified(pixel, path, self._random)
-                at += gaussian_offsets(square, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
+                sample_point = stratified(pixel, path, self._random)
+                at += gaussian_offsets(sample_point, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
         return camera_rays(self._camera, at)
 
 

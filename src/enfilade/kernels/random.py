@@ -37,7 +37,7 @@ def streams(pixel: Any, path: Any, random: RandomKey) -> Any:
 def stratified(pixel: Any, path: Any, random: RandomKey) -> Any:
     """A Cranley-Patterson rotated R2 sequence for each pixel: points of the unit square, Array2f in [0, 1).
 
-    Each point is uniform by itself, and the points of any run of paths are spread evenly over the square
+    Each point is uniform by itself, and the points of any run of paths cover the square evenly
     (Roberts 2018; Cranley and Patterson 1976).
 
     Parameters
@@ -55,7 +55,7 @@ def stratified4(pixel: Any, path: Any, random: RandomKey) -> Any:
     return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
 
 
-class Leading:
+class PrefixedRng:
     """A random number generator whose first numbers are given.
 
     Parameters

@@ -53,12 +53,12 @@ def pinhole_directions(x: Any, y: Any, *, direction_from_pixel: Any) -> Any:
     return direction_from_pixel @ Array3f(x, y, 1)
 
 
-def box_offsets(square: Any) -> Any:
+def box_offsets(sample_point: Any) -> Any:
     """Offsets from a pixel's centre, uniform over the pixel, of points of the unit square; Array2f."""
-    return square - 0.5
+    return sample_point - 0.5
 
 
-def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
+def gaussian_offsets(sample_point: Any, *, sigma: float, radius: float) -> Any:
     """Offsets from a pixel's centre, distributed as a Gaussian pixel filter (Ernst et al. 2006); Array2f.
 
     Filter importance sampling: each path contributes to a single pixel with weight one, so that no result
@@ -66,7 +66,7 @@ def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
 
     Parameters
     ----------
-    square : Array2f
+    sample_point : Array2f
         Points of the unit square.
     sigma
         Standard deviation, pixels.
@@ -75,4 +75,4 @@ def gaussian_offsets(square: Any, *, sigma: float, radius: float) -> Any:
     """
     scale = sigma * math.sqrt(2.0)
     kept = math.erf(radius / scale)
-    return scale * dr.erfinv((2.0 * square - 1.0) * kept)
+    return scale * dr.erfinv((2.0 * sample_point - 1.0) * kept)

@@ -1,1 +1,1 @@
-"""Methods: how frames are made from a scene and a camera path. One folder, or one file, a method."""
+"""Methods, which make frames from a scene and a camera path. One folder, or one file, a method."""

@@ -1,4 +1,4 @@
-"""The seam between methods and runs: tasks, passes, and the base class of methods.
+"""The interface between methods and runs: tasks, passes, and the base class of methods.
 
 A method defines how frames are made from a scene and a camera path, as passes in order. A pass maps records
 of earlier passes to new records; most have one task a frame. A method contains no file, ledger, executor or
@@ -56,7 +56,7 @@ class Task:
 
     @property
     def id(self) -> TaskId:
-        """Its name."""
+        """The name of the task."""
         return TaskId(self.pass_name, self.frame)
 
 
@@ -106,7 +106,7 @@ class Inputs(Protocol):
 
     @property
     def analysis(self) -> Analysis:
-        """Of all frames of the path."""
+        """The statistics of all frames of the path."""
         ...
 
     def record(self, pass_name: str, frame: int) -> Any:

@@ -112,7 +112,7 @@ class Aqm:
         change: F32 | None = None,
         pursuit: Pursuit | None = None,
     ) -> Comparison:
-        """Find where a viewer sees a difference between two images, and how surely.
+        """Predict the visible differences between two images, and their probabilities of detection.
 
         Parameters
         ----------

@@ -213,7 +213,7 @@ class CortexTransform:
         return self._crop(spectra, band) * self._doms[band.level - 1]
 
     def fan(self, ring: Complex64, band: Band, orientation: int | None) -> F32:
-        """One channel of what `ring` gave for the band, back in the image plane.
+        """One channel of a band's `ring`, back in the image plane.
 
         Parameters
         ----------

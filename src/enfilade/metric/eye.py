@@ -1,4 +1,4 @@
-"""Eye movements: how fast an image moves over the retina (§3.3, Eq. 5, Daly 1998).
+"""Eye movements: the velocity of an image over the retina (§3.3, Eq. 5, Daly 1998).
 
 Velocities are (2, ...) float32 arrays, to the right and down, degrees per second. A direction theta is that
 of a channel's frequency vector (the normal of its bars), degrees from x (right) towards y (down), one or a

@@ -82,11 +82,11 @@ class ModernMetric:
         """Compare two images; the most sensitive of several eye movements counts."""
         # Adapt to the luminance around each pixel.
         luminance = adapting_luminance(pair.reference, self.viewing.pixels_per_degree)
-        light = Pyramid(luminance)
+        adapting = Pyramid(luminance)
         sensitivity = ChannelSensitivity(
             self._table,
             pair.valid.shape,
-            light=light,
+            adapting=adapting,
             contrast=Pyramid(np.float32(1.0) / luminance),
             velocity=pair.velocity,
             eyes=eyes,
@@ -108,7 +108,7 @@ class ModernMetric:
             for band in self.bands:
                 change = self._aperture.coarse(np.square(self._bank.ring(spectrum, band)), band.reduction)
                 energy = self._aperture.integrate(change, band.reduction)
-                energy *= np.square(self._flicker.at(band, light.at(self._aperture.reduction)))
+                energy *= np.square(self._flicker.at(band, adapting.at(self._aperture.reduction)))
                 jnd = self._transducer.difference(np.stack((np.zeros_like(energy), energy, energy))[:, None])
                 pool.add(band.level, jnd[0], self._aperture.reduction, is_transient=True)
         return pool.comparison()

@@ -1,4 +1,4 @@
-"""Monte Carlo noise in the images compared: how much of a difference it explains.
+"""Monte Carlo noise in the images compared: its part in their difference.
 
 The variance of the noise is known at every pixel and propagates linearly. A channel with the impulse
 response h_kl responds to independent noise with the variance

@@ -75,7 +75,7 @@ class PaperMetric:
         sensitivity = ChannelSensitivity(
             self._table,
             pair.valid.shape,
-            light=Pyramid(np.asarray(adapting, dtype=np.float32)),
+            adapting=Pyramid(np.asarray(adapting, dtype=np.float32)),
             contrast=Pyramid(np.asarray(contrast, dtype=np.float32)),
             velocity=pair.velocity,
             eyes=eyes,

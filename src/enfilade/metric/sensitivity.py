@@ -106,7 +106,7 @@ class ChannelSensitivity:
         The CSF.
     image_shape : tuple of int
         Height and width, pixels.
-    light, contrast : Pyramid
+    adapting, contrast : Pyramid
         Adapting luminance, cd/m2, and contrast of a response of one.
     velocity : (2, h, w) float32 or None
         Image velocity at every second pixel (`coarse_velocity`), deg/s; None where nothing moves.
@@ -121,7 +121,7 @@ class ChannelSensitivity:
         table: SensitivityTable,
         image_shape: tuple[int, int],
         *,
-        light: Pyramid,
+        adapting: Pyramid,
         contrast: Pyramid,
         velocity: F32 | None,
         eyes: Sequence[Pursuit],
@@ -129,7 +129,7 @@ class ChannelSensitivity:
     ) -> None:
         self._is_still = velocity is None
         self._table, self._image_shape = table, image_shape
-        self._light, self._contrast = light, contrast
+        self._adapting, self._contrast = adapting, contrast
         self._eyes, self._hold_s = eyes, hold_s
         self._motions = [] if velocity is None else [self._motion(velocity, eye) for eye in eyes]
         self._reduction = 0
@@ -190,7 +190,7 @@ class ChannelSensitivity:
 
     def _luminance(self, reduction: int) -> Indices:
         if reduction not in self._luminances:
-            self._luminances[reduction] = self._table.luminance_index(self._light.at(reduction))
+            self._luminances[reduction] = self._table.luminance_index(self._adapting.at(reduction))
         return self._luminances[reduction]
 
     def _weight(self, sensitivity: F32, band: Band) -> F32:
@@ -216,7 +216,7 @@ def _reduction(band: Band) -> int:
 
 
 def _reduced(values: F32, reduction: int) -> F32:
-    """From every second pixel to every `reduction`-th."""
+    """Reduce a map at every second pixel to every `reduction`-th."""
     for _ in range((reduction // FINEST_REDUCTION).bit_length() - 1):
         values = halve(values)
     return values

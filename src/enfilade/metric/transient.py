@@ -113,7 +113,7 @@ def flicker_sensitivity(frequency_cpd: float, fps: float, luminance_cd_m2: F64) 
 
 
 class FlickerWeight:
-    """From the change of the error, cd/m2, to units of its threshold, by band and luminance.
+    """Weights that convert the change of the error, cd/m2, to units of its threshold, by band and luminance.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Tables and plots of a run; they read what a run has written and compute nothing of it."""
+"""Tables, plots and pages of a run, made from its files without rendering."""

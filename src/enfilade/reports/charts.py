@@ -1,4 +1,4 @@
-"""Charts over frame numbers, as PNG files and as SVG inside a page. The owner of matplotlib.
+"""Charts over frame numbers, as PNG files and as SVG inside a page.
 
 Colours are those of Okabe and Ito (2008), for readers with colour vision deficiencies; series also differ in
 shape, line style or place.

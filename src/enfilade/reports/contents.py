@@ -14,7 +14,7 @@ from enfilade.reports.film import Film
 from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
-from enfilade.reports.tables import TRACED, percent, seconds, spoken
+from enfilade.reports.tables import TRACED_COLUMNS, percent, seconds, spoken
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -85,9 +85,9 @@ def _glance(run: ReportedRun) -> list[tuple[str, str, str]]:
     if summary["rays"]:
         rows.append(("rays per pixel", f"{sum(summary['rays'].values()):.1f}", ""))
     elif summary["per_frame"]:
-        rows.append(("pixels traced", percent(summary["table1"]["total"]), "%"))
+        rows.append(("pixels traced", percent(summary["traced_percent"]["total"]), "%"))
     if run.is_finished:
-        value, unit = seconds(summary["table2"]["cpu_s"] / summary["frames"]).split()
+        value, unit = seconds(summary["time_s"]["cpu_s"] / summary["frames"]).split()
         rows.append(("CPU time per frame", value, unit))
     return rows
 
@@ -101,9 +101,9 @@ def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
         text = "Rays of all tasks so far, divided by the number of pixels of the whole path."
         tables.append({"title": "Rays per pixel and frame", "columns": columns, "text": text})
     if summary["per_frame"]:
-        columns = [(title, percent(summary["table1"][key])) for key, title in TRACED.items()]
+        columns = [(title, percent(summary["traced_percent"][key])) for key, title in TRACED_COLUMNS.items()]
         if rays:
-            columns[-1] = ("reused", percent(100.0 - summary["table1"]["total"]))
+            columns[-1] = ("reused", percent(100.0 - summary["traced_percent"]["total"]))
         title = "Pixels by provenance, %" if rays else "Pixels traced, %"
         text = f"Mean of {len(summary['per_frame'])} frames (Table 1 of the paper). {REASONS}"
         tables.append({"title": title, "columns": columns, "text": text})
@@ -112,7 +112,7 @@ def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _stages(run: ReportedRun) -> list[dict[str, str]]:
     """Rows of Table 2, with the number of tasks of the stages that are passes."""
-    times, tasks = run.summary["table2"], Counter(line["pass"] for line in run.lines)
+    times, tasks = run.summary["time_s"], Counter(line["pass"] for line in run.lines)
     rows = [(name, tasks.get(name), of["wall_s"], of["cpu_s"]) for name, of in times["stages"].items()]
     rows.append(("total", sum(tasks.values()), times["total_s"], times["cpu_s"]))
     return [
@@ -143,7 +143,7 @@ def _difference(
         ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
     ]
     if reference is not None and summary["video"] and reference["video"]:
-        own, other = (of["table2"]["cpu_s"] / of["frames"] for of in (summary, reference))
+        own, other = (of["time_s"]["cpu_s"] / of["frames"] for of in (summary, reference))
         rows += [
             ("CPU time per frame", seconds(own), f"{100.0 * own / max(other, 1e-9):.0f} % of the reference"),
             ("", seconds(other), "the reference; comparable on the same machine"),

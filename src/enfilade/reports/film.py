@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import ComparedFrame, Terms, compare
+from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import encode_webp, resized
 from enfilade.images.view import View
@@ -119,8 +119,8 @@ class Film:
                     self._add(index, painted_difference(frame, absolute.map_percent))
 
         of = run.viewing_settings
-        terms = Terms(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
-        return compare(run.folder, reference, terms, Silence(), show=show).to_dict()
+        options = CompareOptions(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
+        return compare(run.folder, reference, options, Silence(), show=show).to_dict()
 
     def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
         layers = {**self._encoded(self._painted(index)), **self._encoded(differences or {})}
@@ -130,7 +130,7 @@ class Film:
         return painted(self._run.frame(index), self._view, self._run.viewing)
 
     def _encoded(self, pictures: Mapping[str, U8]) -> dict[str, str]:
-        """As WebP in base64."""
+        """Pictures encoded as WebP in base64."""
         found = {}
         for layer in LAYERS:
             if layer.name in pictures:
@@ -152,12 +152,12 @@ class AbsoluteDifference:
     map_percent: F32
 
     def measure(self, pair: DisplayedPair) -> float:
-        """Of the next frame."""
+        """Mean difference of the next frame."""
         self.map_percent = np.float32(100.0) * np.abs(pair.test - pair.reference).mean(axis=2)
         return float(self.map_percent.mean())
 
     def pool(self, values: Sequence[float | None]) -> float:
-        """Of the whole sequence."""
+        """Mean difference of the whole sequence."""
         return float(np.mean([value for value in values if value is not None]))
 
 

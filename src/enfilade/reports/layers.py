@@ -48,7 +48,7 @@ class Layer:
 
     @property
     def quality(self) -> int | None:
-        """Of WebP; None: lossless."""
+        """Quality of the WebP encoding; None: lossless."""
         return None if self.is_overlay else QUALITY
 
 

@@ -1,4 +1,4 @@
-"""The report of a run: one HTML page that needs neither other files nor a network. The owner of Jinja2."""
+"""The report of a run: one HTML page that needs neither other files nor a network."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def write_report(
     max_mb
         Megabytes of pictures: larger ones are scaled, then frames are left out. At least 1.
     monitor
-        Receives progress, and the notes of the page: damage, and what was left out.
+        Receives progress, and the notes of the page: damage, and omissions.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def write_report(
     if dropped := shown.summary["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
     for note in notes:
-        monitor.say(note)
+        monitor.message(note)
     variables = contents(shown, film, None if source is None else _summary(source))
     parts = {
         name: (files("enfilade.reports") / TEMPLATES / name).read_text()

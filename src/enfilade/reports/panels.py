@@ -116,7 +116,7 @@ def _rays_panel(summary: Mapping[str, Any]) -> Panel:
 
 
 def _traced_panel(summary: Mapping[str, Any]) -> Panel:
-    rows, mean = summary["per_frame"], summary["table1"]["total"]
+    rows, mean = summary["per_frame"], summary["traced_percent"]["total"]
     series = [
         Series(name, color, {row["frame"]: row[name] for row in rows}, "bar")
         for name, color in PROVENANCE_COLORS.items()

@@ -15,7 +15,7 @@ __all__ = ["plot_plan", "plot_run", "split_percent_of", "walkthrough_figure"]
 
 
 def plot_run(folder: Path) -> list[Path]:
-    """Draw what a run has done so far into its folder ``plots``.
+    """Draw the charts of a run, as far as it is finished, into its folder ``plots``.
 
     Returns
     -------

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import Terms
+from enfilade.comparison import CompareOptions
 from enfilade.errors import ImageError, RunFolderError
 from enfilade.files import read_json
 from enfilade.images import read_exr
@@ -90,7 +90,9 @@ class ReportedRun:
         self._starts = {self.numbers[0], *path["cuts"]}
         self.there = tuple(i for i, number in enumerate(self.numbers) if self._run.line(FRAMES, number))
         self.viewing_settings, self.video = _settings(folder)
-        self.viewing = Terms(viewing=self.viewing_settings).conditions(tuple(path["size"]), path["fps"])
+        self.viewing = CompareOptions(viewing=self.viewing_settings).conditions(
+            tuple(path["size"]), path["fps"]
+        )
         self.holder = holder_of(folder)
         ledger = folder / LEDGER_FILE
         changed = ledger if ledger.exists() else folder / RUN_FILE

@@ -1,4 +1,4 @@
-"""Tables of a run, a plan and a comparison for a terminal, and their number formats. The owner of rich."""
+"""Tables of a run, a plan and a comparison for a terminal, and their number formats."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 __all__ = [
-    "TRACED",
+    "TRACED_COLUMNS",
     "comparison_table",
     "percent",
     "plan_tables",
@@ -20,7 +20,7 @@ __all__ = [
     "spoken",
 ]
 
-TRACED = {  # columns of Table 1, by key of the summary
+TRACED_COLUMNS = {  # titles of the columns of Table 1, by key of the summary
     "slow": "slow",
     "specular": "specular",
     "occlusion": "disoccluded",
@@ -55,6 +55,8 @@ def result_line(found: Mapping[str, Any]) -> str:
 
 def comparison_table(found: Mapping[str, Any]) -> Table:
     """Frames with the largest differences, and the whole sequence; of ``SequenceDifference.to_dict()``."""
+    from enfilade.comparison import short_name
+
     rows = found["per_frame"]
     width, height = found["size"]
     table = _table(
@@ -63,7 +65,7 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
         ("frame", "JND", "steady", "transient", "visible, %", "PSNR, dB", "deg/s"),
     )
     for row in sorted(rows, key=lambda r: -r["score_jnd"])[:WORST_FRAMES]:
-        table.add_row(Text(_short(row["name"])), *_difference(row, row["percent_visible"]))
+        table.add_row(Text(short_name(row["name"])), *_difference(row, row["percent_visible"]))
     if len(rows) > WORST_FRAMES:
         table.caption = f"the {WORST_FRAMES} frames with the largest score; --json lists all"
     table.add_section()
@@ -100,13 +102,13 @@ def _rays_table(summary: Mapping[str, Any]) -> Table:
 
 
 def _traced_table(summary: Mapping[str, Any]) -> Table:
-    table = _table("Pixels traced, percent (Table 1)", ("method", *TRACED.values()))
-    table.add_row(summary["method"], *(percent(summary["table1"][key]) for key in TRACED))
+    table = _table("Pixels traced, percent (Table 1)", ("method", *TRACED_COLUMNS.values()))
+    table.add_row(summary["method"], *(percent(summary["traced_percent"][key]) for key in TRACED_COLUMNS))
     return table
 
 
 def _time_table(summary: Mapping[str, Any]) -> Table:
-    times = summary["table2"]
+    times = summary["time_s"]
     total = max(times["total_s"], 1e-9)
     table = _table("Time (Table 2)", ("stage", "wall", "CPU", "wall per frame", "%"))
     for name, spent in times["stages"].items():
@@ -147,7 +149,9 @@ def _forecast_table(plan: Mapping[str, Any]) -> Table:
     else:
         traced = plan["traced_percent"]
         table.add_row("pixels traced, %", percent(traced["total"]))
-        _add_parts(table, ((title, percent(traced[key])) for key, title in TRACED.items() if key != "total"))
+        _add_parts(
+            table, ((title, percent(traced[key])) for key, title in TRACED_COLUMNS.items() if key != "total")
+        )
     table.add_row("tasks", str(sum(plan["tasks"].values())))
     _add_parts(table, ((spoken(name), str(count)) for name, count in plan["tasks"].items()))
     table.add_row("time", seconds(plan["seconds"]))
@@ -160,11 +164,6 @@ def _forecast_table(plan: Mapping[str, Any]) -> Table:
 def _add_parts(table: Table, parts: Iterable[tuple[str, str]]) -> None:
     for name, value in parts:
         table.add_row(f"  {name}", value)
-
-
-def _short(name: str) -> str:
-    # "frame 3 of walk.mp4", or the path of an image
-    return name.partition(" of ")[0] if name.startswith("frame ") else name.rpartition("/")[2]
 
 
 def _difference(row: Mapping[str, Any], visible: float) -> list[str]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WorkerTerms:
-    """What a worker process needs to begin.
+    """Arguments with which a worker process is started.
 
     Attributes
     ----------

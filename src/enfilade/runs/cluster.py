@@ -89,7 +89,7 @@ class Cluster:
         """Nothing: after a failure a Ray worker opens the run anew."""
 
     def close(self) -> None:
-        """Cancel what is in hand and leave the cluster; a local one ends."""
+        """Cancel the tasks in hand and leave the cluster; a local one ends."""
         for reference in self._in_hand:
             with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
                 self._ray.cancel(reference, force=True)
@@ -125,7 +125,7 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Share:
-    """What Ray is asked for.
+    """Resources requested from Ray.
 
     Attributes
     ----------

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.arrays import halves
+from enfilade.arrays import to_half
 from enfilade.gbuffer import View, positions
 from enfilade.images import encode_video, exact_fps, join_videos, read_exr, video_suffix, write_exr
 from enfilade.methods.base import FRAMES, Pass, Task, TaskId
@@ -58,8 +58,8 @@ def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:
     layers: dict[str, Callable[[], Any]] = {
         "Z": lambda: np.where(geometry.is_hit, geometry.depth, np.float32(SKY_DEPTH)),
         "P": lambda: positions(geometry),
-        "N": lambda: halves(geometry.normal),
-        "albedo": lambda: halves(geometry.albedo),
+        "N": lambda: to_half(geometry.normal),
+        "albedo": lambda: to_half(geometry.albedo),
         "shape_index": lambda: geometry.shape_index,
         "forward": lambda: view.flow.forward,
         "backward": lambda: view.flow.backward,
@@ -69,7 +69,7 @@ def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:
     file = stem.with_name(f"{stem.name}.exr")
     write_exr(
         file,
-        {"RGB": halves(frame.color), **{name: layer() for name, layer in layers.items() if name in chosen}},
+        {"RGB": to_half(frame.color), **{name: layer() for name, layer in layers.items() if name in chosen}},
         attributes={"framesPerSecond": exact_fps(job.path.fps)},
         is_portable=True,
     )

@@ -76,7 +76,7 @@ def encode(
     _check_free(run, file, suffix, is_replaced=is_replaced)
     numbers = _finished(run, path.numbers, is_partial=is_partial)
     if note := odd_size_note(video.codec, path.width, path.height):
-        monitor.say(note)
+        monitor.message(note)
     encode_video(
         file,
         _images(run, numbers, monitor),

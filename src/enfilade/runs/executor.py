@@ -1,4 +1,4 @@
-"""The seam between the scheduler and the workers, and the worker that is this process."""
+"""The interface between the scheduler and the workers, and the worker that is this process."""
 
 from __future__ import annotations
 

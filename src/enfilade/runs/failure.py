@@ -1,4 +1,4 @@
-"""Why a task was not finished, and what that means for the run."""
+"""Failures of tasks, and their consequences for the run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FailureKind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """Why a task was not finished.
+    """The reason why a task was not finished.
 
     Attributes
     ----------

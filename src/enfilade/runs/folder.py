@@ -164,7 +164,7 @@ class RunFolder:
         return iter(self._ledger)
 
     def refresh(self) -> None:
-        """Read what other commands have finished since."""
+        """Read the tasks that other commands have finished since."""
         self._ledger.refresh()
 
     def finish(self, line: Mapping[str, Any]) -> None:
@@ -256,7 +256,7 @@ class RunFolder:
             raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
 
     def digest(self) -> str:
-        """Checksum of the results: of all lines but their times, in whatever order they were finished."""
+        """Checksum of the results: of all lines but their times, independent of their order."""
         text = "\n".join(sorted(digest_line(line) for line in self.lines()))
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -1,4 +1,4 @@
-"""Which tasks are finished, which may begin, and which one a worker takes next."""
+"""The task graph of a run: finished tasks, ready tasks, and the order in which workers take them."""
 
 from __future__ import annotations
 

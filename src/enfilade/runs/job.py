@@ -150,7 +150,7 @@ class Job:
             )
 
     def to_json(self) -> dict[str, Any]:
-        """All of it, fit for JSON; read back by :meth:`from_json`."""
+        """The whole job, fit for JSON; read back by :meth:`from_json`."""
         path = self.path
         return {
             "scene": self.scene.to_json(),

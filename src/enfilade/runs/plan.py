@@ -1,4 +1,4 @@
-"""What a walkthrough will take: its analysis, and a dry run of a short, small excerpt."""
+"""Forecast of the cost of a walkthrough, from its analysis and a dry run of a short, small excerpt."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EXCERPT_PIXELS = 40_000
 
 @dataclass(frozen=True)
 class Plan:
-    """What rendering a walkthrough will take.
+    """Forecast of the rendering of a walkthrough.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Plan:
     excerpt_size: tuple[int, int]
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain tables, fit for JSON."""
+        """The plan as plain values, fit for JSON."""
         return asdict(self)
 
 
@@ -120,7 +120,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
         tasks=dict(counts),
         seconds=pixels * wall_s,
         cpu_seconds=pixels * cpu_s,
-        traced_percent=summary["table1"],
+        traced_percent=summary["traced_percent"],
         rays=summary["rays"],
         excerpt_frames=len(small.path),
         excerpt_size=(small.path.width, small.path.height),
@@ -166,6 +166,6 @@ class _Quiet:
     def progress(self, name: str, done: int, total: int) -> None:
         """Show nothing: the dry run is one step."""
 
-    def say(self, text: str) -> None:
-        """Pass it on."""
-        self._monitor.say(text)
+    def message(self, text: str) -> None:
+        """Forward the message."""
+        self._monitor.message(text)

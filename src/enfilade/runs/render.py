@@ -1,4 +1,4 @@
-"""From scene and camera path to frames, video and summary: begin a run, continue it, or share it out."""
+"""Rendering a scene along a camera path to frames, video and summary: begin, continue or shard a run."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def render(
     """
     with _created(job, folder, has_preflight=has_preflight) as run:
         for note in (*run.notes, *_video_notes(job)):
-            monitor.say(note)
+            monitor.message(note)
         for name in run.damaged() if is_verified else ():
             run.forget(name)
-            monitor.say(f"{name} is missing or damaged: its task is done again")
+            monitor.message(f"{name} is missing or damaged: its task is done again")
         work(job, run, workers or Workers(), monitor)
         run.sweep()  # of workers that were killed
         summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
@@ -153,7 +153,7 @@ def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers 
         )
     with RunFolder.share(folder) as run:
         for note in run.notes:
-            monitor.say(note)
+            monitor.message(note)
         work(job, run, workers or Workers(), monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
 
 
@@ -186,7 +186,7 @@ def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedErr
 
 
 def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
-    """The run folder of a job, begun or continued; what is refused leaves nothing behind."""
+    """The run folder of a job, begun or continued; a refused job leaves no file."""
     job.check()
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
@@ -223,6 +223,6 @@ def _video_notes(job: Job) -> list[str]:
 
 
 def _peak_memory_bytes() -> int:
-    """Of this process or the largest of its children so far."""
+    """Peak memory of this process, or of the largest of its children so far."""
     whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     return 1024 * max(resource.getrusage(who).ru_maxrss for who in whom)

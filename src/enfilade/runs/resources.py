@@ -1,4 +1,4 @@
-"""What this machine has for workers: cores that this process may use, GPUs, memory that ran out."""
+"""Resources of this machine for workers: usable cores and GPUs, and kills for lack of memory."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def gpus() -> list[str]:
 
 
 def oom_kills() -> int:
-    """How many processes the kernel has killed for lack of memory since it began; 0 where it doesn't say."""
+    """Number of processes killed by the kernel for lack of memory since boot; 0 where it does not tell."""
     try:
         counts = dict(line.split(" ", 1) for line in COUNTS.read_text().splitlines())
         return int(counts.get("oom_kill", 0))

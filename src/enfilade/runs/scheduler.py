@@ -104,7 +104,7 @@ def work(
                     f"{run.folder / damaged} was damaged {ATTEMPTS} times during the run; check its disk"
                 )
             run.forget(damaged)
-            monitor.say(f"{damaged} is missing or damaged: its task is done again")
+            monitor.message(f"{damaged} is missing or damaged: its task is done again")
             run.refresh()
     finally:
         if executor is not None:
@@ -226,7 +226,7 @@ class _Loop:
         failures = self._failures.setdefault(task.id, [])
         failures.append(failure)
         if len(failures) < ATTEMPTS:
-            self._monitor.say(f"{self._name(task)}: {failure.text}; it is tried again{fewer}")
+            self._monitor.message(f"{self._name(task)}: {failure.text}; it is tried again{fewer}")
             until = time.monotonic() + DELAYS_S[len(failures) - 1]
             heapq.heappush(self._delayed, (until, task.id, task))
             return
@@ -234,7 +234,7 @@ class _Loop:
         self._set_aside.append(task)
         self._in_a_row += 1
         self._write_log(task, failures)
-        self._monitor.say(f"{self._name(task)}: {failure.text}; it is set aside")
+        self._monitor.message(f"{self._name(task)}: {failure.text}; it is set aside")
         if self._in_a_row >= SET_ASIDE_IN_A_ROW:
             self._report()
 
@@ -258,7 +258,7 @@ class _Loop:
             with whole_file(self._run.folder / FAILED / f"{name}.log") as beside:
                 beside.write_text(text, encoding="utf-8")
         except EnfiladeError as error:  # the run goes on without the log
-            self._monitor.say(str(error))
+            self._monitor.message(str(error))
 
     def _name(self, task: Task) -> str:
         return f"{task.pass_name} {self._job.path.numbers[task.frame]}"

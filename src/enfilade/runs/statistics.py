@@ -1,4 +1,4 @@
-"""What a run has done and spent so far, from its ledger alone: Tables 1 and 2, Figs. 12 and 13 (§6)."""
+"""Work and cost of a run so far, from its ledger alone: Tables 1 and 2, Figs. 12 and 13 (§6)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ from enfilade.methods.base import FRAMES
 from enfilade.runs.delivery import ANALYSIS, VIDEO
 from enfilade.runs.folder import RunFolder
 
-__all__ = ["TRACED", "add_costs", "speeds_deg_s", "statistics"]
+__all__ = ["add_costs", "speeds_deg_s", "statistics"]
 
-TRACED = {"slow": "slow", "specular": "specular", "occlusion": "disoccluded", "keyframes": "keyframe"}
+TRACED_PROVENANCE = {
+    "slow": "slow",
+    "specular": "specular",
+    "occlusion": "disoccluded",
+    "keyframes": "keyframe",
+}
 
 
 def statistics(run: RunFolder) -> dict[str, Any]:
@@ -20,19 +25,19 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``table1``: pixels traced, percent
-        of those of the finished frames, by reason. ``table2``: wall and CPU seconds, in total, by frame of
-        the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of the
-        pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
+        ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``traced_percent``: pixels traced,
+        percent of those of the finished frames, by reason. ``time_s``: wall and CPU seconds, in total, by
+        frame of the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of
+        the pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
         frame of the path, by kind; ``rays_per_frame``: of each frame. ``segments``: the metric's result for
         each segment. ``dropped_samples``: NaN or infinite samples that were left out.
     """
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
     per_frame = _per_frame(path, lines, speeds_deg_s(path, lines))
-    table1 = {
+    traced_percent = {
         name: sum(row[provenance] for row in per_frame) / max(len(per_frame), 1)
-        for name, provenance in TRACED.items()
+        for name, provenance in TRACED_PROVENANCE.items()
     }
     rays = _rays(path, lines)
     kinds = dict.fromkeys(kind for row in rays for kind in row if kind != "frame")
@@ -44,8 +49,8 @@ def statistics(run: RunFolder) -> dict[str, Any]:
         "size": list(path["size"]),
         "fps": path["fps"],
         "video": next((name for line in lines if line["pass"] == VIDEO.name for name in line["files"]), ""),
-        "table1": {**table1, "total": sum(table1.values())},
-        "table2": {"total_s": wall, "per_frame_s": wall / count, "cpu_s": cpu, "stages": stages},
+        "traced_percent": {**traced_percent, "total": sum(traced_percent.values())},
+        "time_s": {"total_s": wall, "per_frame_s": wall / count, "cpu_s": cpu, "stages": stages},
         "per_frame": per_frame,
         "rays": {kind: sum(row.get(kind, 0.0) for row in rays) / count for kind in kinds},
         "rays_per_frame": rays,
@@ -84,7 +89,7 @@ def _per_frame(
     rows = []
     for index, number in enumerate(path["frames"]):
         if number in counts:
-            row = {name: 100.0 * counts[number][name] / pixels for name in TRACED.values()}
+            row = {name: 100.0 * counts[number][name] / pixels for name in TRACED_PROVENANCE.values()}
             speed = speed_deg_s.get(index)
             rows.append({"frame": number, "velocity_deg_s": speed, **row, "traced": sum(row.values())})
     return rows

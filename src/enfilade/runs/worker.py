@@ -118,7 +118,7 @@ class _Inputs:
 
     @cached_property
     def analysis(self) -> Analysis:
-        """Of all frames."""
+        """The statistics of all frames."""
         self._run.refresh()
         return analysis_of(self._job, self._run)
 

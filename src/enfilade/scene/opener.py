@@ -116,20 +116,20 @@ class Scene:
         DeviceError
             No usable LLVM or CUDA.
         """
-        terms = {
+        options = {
             "max_depth": settings[TraceSettings].max_depth,
             "chunk": settings[LimitSettings].paths_in_flight,
         }
         if self.renderer:
-            opened: Renderer = _imported(self.renderer)(self.file, **terms)
+            opened: Renderer = _imported(self.renderer)(self.file, **options)
             return opened
         self._check_suffix()
         from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
-        return MitsubaRenderer(self.file, **terms)
+        return MitsubaRenderer(self.file, **options)
 
     def to_json(self) -> dict[str, Any]:
-        """Fit for JSON; read back by :meth:`from_json`."""
+        """The scene, fit for JSON; read back by :meth:`from_json`."""
         return {"file": str(self.file.resolve()), "renderer": self.renderer}
 
     @staticmethod

@@ -29,10 +29,10 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
     """Diffuse and specular radiance together."""
     integrator = integrator_of(renderer)
 
-    def radiance(rays, rng, square):
+    def radiance(rays, rng, qmc_point):
         at = {"pixel_angle": PIXEL_ANGLE}
         diffuse = integrator.diffuse_radiance(irradiance, irradiance, rays, rng, **at).layers[0]
-        specular = integrator.specular_radiance(irradiance, rays, rng, square, **at)
+        specular = integrator.specular_radiance(irradiance, rays, rng, qmc_point, **at)
         return diffuse + sum(specular.layers)
 
     return estimated(radiance, camera, spp, **more)[0]
@@ -41,8 +41,8 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
 def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> list[Shading]:
     """Irradiance by final gathering, direct and indirect."""
 
-    def radiance(rays, rng, square):
-        return integrator_of(renderer).final_gather(irradiance, rays, rng, square, pixel_angle=PIXEL_ANGLE)
+    def radiance(rays, rng, qmc_point):
+        return integrator_of(renderer).final_gather(irradiance, rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE)
 
     return estimated(radiance, camera, spp, layers=2, **more)
 

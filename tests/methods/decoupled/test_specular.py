@@ -71,7 +71,7 @@ def test_total_internal_reflection_is_transmission(tmp_path):
     renderer, camera = opened_scene(tmp_path, {"ball": ball}), front_camera()
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
     where = seen.shape_index == renderer.describe().shapes.index("block") + 1
-    reflected, transmitted = (aov.spread(where | True) for aov in specular_aovs(renderer, camera, 64))
+    reflected, transmitted = (aov.to_image(where | True) for aov in specular_aovs(renderer, camera, 64))
     assert where.mean() > 0.1
     # Much of the transmission is reflected totally by the second face. Fresnel reflection is 4 to 8 %.
     shares = (aov.color[where].mean() for aov in (reflected, transmitted))
@@ -83,7 +83,7 @@ def test_total_internal_reflection_is_transmission(tmp_path):
 def test_reflections_in_a_pane_are_smoothed_and_keep_their_energy(pane_scene, spp):
     renderer, camera, seen, virtual = pane_scene
     where = np.ones(seen.shape_index.shape, bool)
-    aovs = [aov.spread(where) for aov in specular_aovs(renderer, camera, spp)]
+    aovs = [aov.to_image(where) for aov in specular_aovs(renderer, camera, spp)]
     reflection, _ = filter_spatially(virtual, aovs, where)
     front = seen.shape_index == renderer.describe().shapes.index("front") + 1
     filtered, unfiltered = (aov.color[front].mean(dtype=float) for aov in (reflection, aovs[0]))

@@ -10,9 +10,9 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled.wavelet import (
     Guide,
     firefly_weights,
+    redistribute_fireflies,
     smooth,
     soften_edges,
-    spread_fireflies,
 )
 from twins import wavelet as twin
 
@@ -155,21 +155,21 @@ def test_fireflies_are_clamped_to_their_brightest_neighbour():
     np.testing.assert_allclose(color * weights[..., None], expected, rtol=1e-5)
 
 
-def spread(light, variance, **options):
+def redistributed(light, variance, **options):
     options = {"times": 2.0, "levels": 4, **options}
-    color, variance = spread_fireflies(
+    color, variance = redistribute_fireflies(
         lanes(grey(light)), lanes(variance.astype(np.float32)), wall(*light.shape), **options
     )
     return image(color, *light.shape)[..., 0], image(variance, *light.shape)
 
 
-def test_fireflies_are_spread_and_keep_their_energy():
+def test_fireflies_are_redistributed_and_keep_their_energy():
     """One pixel in a hundred is a firefly: alone, in pairs, at the border."""
     rng = np.random.default_rng(11)
     light = np.ones((96, 128))
     light.ravel()[rng.choice(light.size, light.size // 100, replace=False)] = 60.0
     variance = np.where(light > 1.0, 900.0, 0.0)
-    got, left = spread(light, variance)
+    got, left = redistributed(light, variance)
     assert got.mean() == pytest.approx(light.mean(), rel=0.02)
     assert np.percentile(got, 99.9) < 4.0
     assert left.max() < 0.01 * variance.max()
@@ -178,7 +178,7 @@ def test_fireflies_are_spread_and_keep_their_energy():
 def test_bright_lines_and_spots_are_not_fireflies():
     light = np.ones((24, 32))
     light[10, 4:20] = light[15:17, 9:11] = 50.0  # a thin line, and a spot of four pixels
-    got, _ = spread(light, np.zeros_like(light))
+    got, _ = redistributed(light, np.zeros_like(light))
     line, spot = got[10, 5:19], got[15:17, 9:11]
     np.testing.assert_allclose(line, 50.0, rtol=0.02)
     np.testing.assert_allclose(spot, 50.0, rtol=0.02)

@@ -65,7 +65,7 @@ def open_measure(name: str, viewing: Viewing) -> Measure:
 
 
 def why_missing(name: str) -> str:
-    """Why a measure is not available, and how to get it; empty where it is."""
+    """Reason why a measure is not available, with the remedy; empty where it is."""
     if name == "flip" and find_spec("flip_evaluator") is None:
         return "FLIP is left out; install it with: pip install 'enfilade[measures]'"
     if name == "cvvdp" and find_spec("pycvvdp") is None:

@@ -10,11 +10,16 @@ import numpy as np
 from enfilade.comparison.measures.base import Scale
 from enfilade.comparison.measures.displayed import DisplayedPair
 
-__all__ = ["Psnr"]
+__all__ = ["Psnr", "psnr_db"]
 
 
-def _rms(psnr_db: float) -> float:
-    return float(10.0 ** (-psnr_db / 20.0))
+def psnr_db(squared_error: float) -> float:
+    """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""
+    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
+
+
+def _rms(ratio_db: float) -> float:
+    return float(10.0 ** (-ratio_db / 20.0))
 
 
 class Psnr:
@@ -29,13 +34,9 @@ class Psnr:
     def measure(self, pair: DisplayedPair) -> float:
         """PSNR of the next frame, dB."""
         difference = (pair.test - pair.reference).ravel()
-        return _db(float(np.vdot(difference, difference)) / difference.size)
+        return psnr_db(float(np.vdot(difference, difference)) / difference.size)
 
     def pool(self, values: Sequence[float | None]) -> float:
         """PSNR of the whole sequence: of the mean squared error over all frames."""
         squared = [_rms(value) ** 2 for value in values if value is not None]
-        return _db(sum(squared) / len(squared))
-
-
-def _db(squared_error: float) -> float:
-    return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
+        return psnr_db(sum(squared) / len(squared))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import halves, widened
+from enfilade.arrays import to_float, to_half
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
@@ -21,7 +21,7 @@ from enfilade.methods.decoupled.sample_counts import (
     small_emitter_pixels,
     specular_spp,
 )
-from enfilade.methods.decoupled.shot import Shot
+from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import accumulate_temporally, filter_spatially, upload_aov
 from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
@@ -41,27 +41,27 @@ class Frames:
         self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 2)
         self._last: LruCache[int, Frame] = LruCache(1)
 
-    def shade(self, shot: Shot, frame: int) -> Output:
+    def shade(self, shot: ShotContext, frame: int) -> Output:
         """Shade a frame, without the temporal accumulation."""
         geometry = shot.walk.view(frame).geometry
 
         # Trace camera rays, then specular rays where they meet specular lobes.
-        view, cache = shot.caches(frame)
-        diffuse = _shade_diffuse(shot, frame, view, cache)
+        reprojected, cache = shot.shading_caches(frame)
+        diffuse = _shade_diffuse(shot, frame, reprojected, cache)
         where = _dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         aovs, specular = self._shade_specular(shot, frame, cache, where)
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
-        provenance = _provenance(geometry, view, diffuse.is_marked, is_keyframe=is_keyframe)
+        provenance = _provenance(geometry, reprojected, diffuse.is_marked, is_keyframe=is_keyframe)
         color = diffuse.shading.color.reshape(*where.shape, 3)
         transmission = aovs[1] if len(aovs) > 1 else None
-        shaded = ShadedFrame(halves(color), aovs[0], transmission, provenance)
+        shaded = ShadedFrame(to_half(color), aovs[0], transmission, provenance)
         rays = {"camera": diffuse.paths, "specular": 0 if specular is None else specular.paths}
         dropped = diffuse.shading.dropped + (0 if specular is None else specular.shading.dropped)
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
 
-    def finish(self, shot: Shot, frame: int) -> Output:
+    def finish(self, shot: ShotContext, frame: int) -> Output:
         """Deliver a frame; the frames of its window are shaded. Repeated poses are copies."""
         static = shot.walk.path.static_frame(frame)
         made = self._last.get(static, lambda: self._accumulated(shot, static))
@@ -69,10 +69,10 @@ class Frames:
             made = Frame(made.color, np.full_like(made.provenance, Provenance.REUSED))
         return Output({frame: made})
 
-    def _accumulated(self, shot: Shot, frame: int) -> Frame:
+    def _accumulated(self, shot: ShotContext, frame: int) -> Frame:
         """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
-        color = widened(shaded.diffuse)
+        color = to_float(shaded.diffuse)
         if np.any(shaded.provenance == Provenance.SPECULAR):
             others = [f for f in window(path, path.shots()[shot.number], frame) if f != frame]
             weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
@@ -83,7 +83,7 @@ class Frames:
         # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
 
-    def _aovs(self, shot: Shot, frame: int) -> list[UploadedImage]:
+    def _aovs(self, shot: ShotContext, frame: int) -> list[UploadedImage]:
         """Specular AOVs of a shaded frame, on the device."""
 
         def make() -> list[UploadedImage]:
@@ -95,12 +95,12 @@ class Frames:
         return self._uploaded.get(frame, make)
 
     @staticmethod
-    def _record(shot: Shot, frame: int) -> ShadedFrame:
+    def _record(shot: ShotContext, frame: int) -> ShadedFrame:
         record: ShadedFrame = shot.inputs.record("shading", frame)
         return record
 
     def _shade_specular(
-        self, shot: Shot, frame: int, cache: IrradianceCache, where: Mask
+        self, shot: ShotContext, frame: int, cache: IrradianceCache, where: Mask
     ) -> tuple[list[SpecularAov], Estimate | None]:
         """Specular AOVs, filtered spatially, without an empty transmission; and their estimate, if any.
 
@@ -117,8 +117,8 @@ class Frames:
         estimate = Estimate(
             camera,
             np.flatnonzero(where).astype(np.uint32),
-            lambda rays, rng, square: shot.integrator.specular_radiance(
-                cache, rays, rng, square, pixel_angle=camera.pixel_angle
+            lambda rays, rng, qmc_point: shot.integrator.specular_radiance(
+                cache, rays, rng, qmc_point, pixel_angle=camera.pixel_angle
             ),
             chunk=walk.settings[LimitSettings].paths_in_flight,
             pixel_filter=PixelFilter.GAUSSIAN,
@@ -129,12 +129,12 @@ class Frames:
         estimate.add(specular_spp(shot.settings))
 
         # Filter the AOVs along the surfaces that are seen in them.
-        reflection, *more = (shading.spread(where) for shading in estimate.shadings)
+        reflection, *more = (shading.to_image(where) for shading in estimate.shadings)
         aovs = [reflection, *(aov for aov in more if aov.color.any())]
         virtual = self._virtual_geometry(shot, frame, len(aovs))
         return filter_spatially(virtual, aovs, where), estimate
 
-    def _virtual_geometry(self, shot: Shot, frame: int, count: int) -> list[Geometry]:
+    def _virtual_geometry(self, shot: ShotContext, frame: int, count: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its first AOVs."""
 
         def make() -> list[Geometry]:
@@ -146,7 +146,9 @@ class Frames:
         return found[:count]
 
 
-def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: IrradianceCache) -> Estimate:
+def _shade_diffuse(
+    shot: ShotContext, frame: int, reprojected: IrradianceCache, cache: IrradianceCache
+) -> Estimate:
     """Emission and diffuse reflection, with more camera rays at edges and fine textures."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
@@ -154,7 +156,7 @@ def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: Irradia
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
         lambda rays, rng: shot.integrator.diffuse_radiance(
-            view, cache, rays, rng, pixel_angle=camera.pixel_angle
+            reprojected, cache, rays, rng, pixel_angle=camera.pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.GAUSSIAN,
@@ -175,10 +177,10 @@ def _shade_diffuse(shot: Shot, frame: int, view: IrradianceCache, cache: Irradia
 
 
 def _provenance(
-    geometry: Geometry, view: IrradianceCache, is_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
+    geometry: Geometry, reprojected: IrradianceCache, is_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
 ) -> U8:
     """Provenance of the pixels of a shaded frame, (H, W)."""
-    is_known = np.array(view.images[0].shape_indices) > 0
+    is_known = np.array(reprojected.images[0].shape_indices) > 0
     base = Provenance.KEYFRAME if is_keyframe else Provenance.REUSED
     provenance = np.full(is_specular.shape, base, np.uint8)
     provenance[geometry.has_diffuse.ravel() & ~is_known] = Provenance.DISOCCLUDED

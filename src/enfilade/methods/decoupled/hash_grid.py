@@ -32,14 +32,14 @@ class HashGrid:
     ----------
     keys : UInt64
         Rising.
-    light : Array3f
+    irradiance : Array3f
         Irradiance over pi.
     last : UInt
         Lane of the last key.
     """
 
     keys: Any
-    light: Any
+    irradiance: Any
     last: Any
 
     def lookup(
@@ -59,18 +59,20 @@ class HashGrid:
 
         Returns
         -------
-        light : Array3f
+        irradiance : Array3f
         is_found : Bool
         """
-        light, is_found = Array3f(0), Bool(False)
+        irradiance, is_found = Array3f(0), Bool(False)
         for level in range(LEVELS):
             for moved in (offset, 0.5):
                 key = entry_key(position, normal, shape_index, width, level, moved)
                 lane = self._search(key)
                 is_here = dr.gather(UInt64, self.keys, lane) == key
-                light = dr.select(is_here & ~is_found, dr.gather(Array3f, self.light, lane), light)
+                irradiance = dr.select(
+                    is_here & ~is_found, dr.gather(Array3f, self.irradiance, lane), irradiance
+                )
                 is_found |= is_here
-        return light, is_found
+        return irradiance, is_found
 
     def _search(self, key: Any) -> Any:
         """Lane of the first key that is not less, or the last one, by binary search."""
@@ -108,9 +110,9 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
 
     # Hash shape, size and direction of the normal, then the coordinates.
     x, y, z = (UInt(Int(dr.floor(coordinate))) for coordinate in cell)
-    key = _mixed(_packed(shape_index, UInt(exponent << 3) | _nearest_axis(normal)))
-    key = _mixed(key ^ _packed(x, y))
-    return _mixed(key ^ UInt64(z))
+    key = _splitmix64(_packed(shape_index, UInt(exponent << 3) | _nearest_axis(normal)))
+    key = _splitmix64(key ^ _packed(x, y))
+    return _splitmix64(key ^ UInt64(z))
 
 
 def _packed(high: Any, low: Any) -> Any:
@@ -118,8 +120,8 @@ def _packed(high: Any, low: Any) -> Any:
     return (UInt64(high) << 32) | UInt64(low)
 
 
-def _mixed(key: Any) -> Any:
-    """A bijection of 64 bits in which every bit depends on all others (SplitMix64, Steele et al. 2014)."""
+def _splitmix64(key: Any) -> Any:
+    """SplitMix64 (Steele et al. 2014): a bijection of 64 bits that makes every bit depend on all others."""
     key = key + UInt64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> 30)) * UInt64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> 27)) * UInt64(0x94D049BB133111EB)
@@ -152,13 +154,13 @@ class Entries:
     counts: npt.NDArray[np.int64]
 
     @staticmethod
-    def of(keys: npt.NDArray[np.uint64], light: npt.NDArray[np.floating[Any]]) -> Entries:
+    def of(keys: npt.NDArray[np.uint64], irradiance: npt.NDArray[np.floating[Any]]) -> Entries:
         """Sum up estimates; those that are not finite are left out.
 
         They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
         """
-        is_finite = np.isfinite(light).all(axis=1)
-        rounded = np.rint(light[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
+        is_finite = np.isfinite(irradiance).all(axis=1)
+        rounded = np.rint(irradiance[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
         return Entries._summed(keys[is_finite], rounded, np.ones(int(is_finite.sum()), np.int64))
 
     @staticmethod
@@ -184,7 +186,7 @@ class Entries:
             return None
         if len(chosen) > MAX_ENTRIES:
             chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
-        light = (self.sums[chosen] / self.counts[chosen, None]).astype(np.float32)
-        grid = HashGrid(lanes(self.keys[chosen]), lanes(light[None]), opaque(len(chosen) - 1, UInt))
+        irradiance = (self.sums[chosen] / self.counts[chosen, None]).astype(np.float32)
+        grid = HashGrid(lanes(self.keys[chosen]), lanes(irradiance[None]), opaque(len(chosen) - 1, UInt))
         dr.eval(grid)
         return grid

@@ -8,7 +8,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
-from enfilade.methods.decoupled.shot import Shot
+from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
@@ -16,7 +16,7 @@ SPECULAR_SPP = 4  # specular rays of each pixel of the frame
 GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
 
 
-def fill_hash_grid(shot: Shot, frame: int) -> Output:
+def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
@@ -27,8 +27,8 @@ def fill_hash_grid(shot: Shot, frame: int) -> Output:
     specular = Estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng, square: shot.integrator.specular_radiance(
-            cache, rays, rng, square, parts.append, pixel_angle=camera.pixel_angle
+        lambda rays, rng, qmc_point: shot.integrator.specular_radiance(
+            cache, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
         ),
         chunk=chunk,
         pixel_filter=PixelFilter.BOX,
@@ -42,8 +42,8 @@ def fill_hash_grid(shot: Shot, frame: int) -> Output:
     gathered = Estimate(
         geometry.camera,
         np.flatnonzero(geometry.has_diffuse).astype(np.uint32),
-        lambda rays, rng, square: shot.integrator.final_gather(
-            cache, rays, rng, square, parts.append, pixel_angle=camera.pixel_angle
+        lambda rays, rng, qmc_point: shot.integrator.final_gather(
+            cache, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
         ),
         chunk=chunk,
         pixel_filter=PixelFilter.CENTRE,

@@ -16,7 +16,7 @@ import numpy as np
 
 from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
-from enfilade.kernels.random import Leading
+from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import padded, recorded
 from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
@@ -110,16 +110,22 @@ class Integrator:
         self._terminate = recorded(self._terminate_kernel, state)
 
     def diffuse_radiance(
-        self, view: IrradianceCache, cache: IrradianceCache, rays: Rays, rng: Any, *, pixel_angle: float
+        self,
+        reprojected: IrradianceCache,
+        cache: IrradianceCache,
+        rays: Rays,
+        rng: Any,
+        *,
+        pixel_angle: float,
     ) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
 
         Parameters
         ----------
-        view
-            Queried first: irradiance accumulated for this very view.
+        reprojected
+            Queried first: irradiance reprojected to the view of these rays.
         cache
-            Queried where `view` misses.
+            Queried where `reprojected` misses.
         rays
             From the camera, one a lane.
         rng : PCG32
@@ -132,7 +138,7 @@ class Integrator:
         Samples
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
-        vertex = self._see(view, spawn(rays, rng, ENTRY_PX * pixel_angle))
+        vertex = self._see(reprojected, spawn(rays, rng, ENTRY_PX * pixel_angle))
         radiance = Array3f(vertex.radiance)
         self._add_missed(radiance, cache, vertex, jitter=1.0, is_queried=False)
         return Samples((radiance,), vertex.has_specular)
@@ -142,7 +148,7 @@ class Integrator:
         cache: IrradianceCache,
         rays: Rays,
         rng: Any,
-        square: Any,
+        qmc_point: Any,
         on_miss: OnMiss | None = None,
         *,
         pixel_angle: float,
@@ -156,8 +162,8 @@ class Integrator:
             From the camera, one a lane.
         rng : PCG32
             One generator a lane.
-        square : Array4f
-            In [0, 1): chooses the first lobe and its direction.
+        qmc_point : Array4f
+            Quasi-Monte Carlo point in [0, 1)^4: chooses the first lobe and its direction.
         on_miss
             Receives the irradiance that was not cached and had to be estimated.
         pixel_angle
@@ -172,7 +178,7 @@ class Integrator:
         count = dr.width(rng.state)
         radiance = dr.zeros(Array3f, SPECULAR_AOVS * count)  # one AOV after the other
         path = spawn(rays, rng, ENTRY_PX * pixel_angle)
-        self._trace_specular(radiance, cache, path, 0, on_miss, square, transmitted_at=count)
+        self._trace_specular(radiance, cache, path, 0, on_miss, qmc_point, transmitted_at=count)
         lane = dr.arange(UInt, count)
         return Samples(
             tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
@@ -183,7 +189,7 @@ class Integrator:
         cache: IrradianceCache,
         rays: Rays,
         rng: Any,
-        square: Any,
+        qmc_point: Any,
         on_miss: OnMiss | None = None,
         *,
         pixel_angle: float,
@@ -194,16 +200,16 @@ class Integrator:
         ----------
         cache, rays, rng, on_miss, pixel_angle
             As of :meth:`specular_radiance`.
-        square : Array4f
-            In [0, 1): chooses the point on an emitter, and the direction of the bounce.
+        qmc_point : Array4f
+            Quasi-Monte Carlo point in [0, 1)^4: chooses a point on an emitter, and a direction.
 
         Returns
         -------
         Samples
             Two layers: by light straight from emitters, and by all other.
         """
-        dr.eval(square)  # see `spawn`
-        direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), square)
+        dr.eval(qmc_point)  # see `spawn`
+        direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), qmc_point)
         # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
         indirect = Array3f(vertex.radiance) if cache.images else dr.zeros(Array3f, dr.width(rng.state))
         self._add_missed(indirect, cache, vertex, on_miss=on_miss)
@@ -218,7 +224,7 @@ class Integrator:
         path: Path,
         bounces: int,
         on_miss: OnMiss | None,
-        square: Any = None,
+        qmc_point: Any = None,
         transmitted_at: int = 0,
     ) -> None:
         """Add the contributions of paths from specular lobe to specular lobe.
@@ -231,8 +237,8 @@ class Integrator:
         bounces
             Made so far.
         on_miss
-        square
-            Random numbers of the first bounce, by lane.
+        qmc_point
+            Of the first bounce, by lane; None: pseudorandom.
         transmitted_at
             Offset of the lanes that receive transmission through clear surfaces.
         """
@@ -242,9 +248,9 @@ class Integrator:
             # The first bounce off the visible surface always survives; Russian roulette begins with the
             # second.
             survival = 1.0 if bounces == 0 else MIN_SURVIVAL
-            first = None if square is None else dr.gather(Array4f, square, path.lane)
+            first = None if qmc_point is None else dr.gather(Array4f, qmc_point, path.lane)
             dr.eval(first)
-            square = None
+            qmc_point = None
 
             # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
             direct, vertex = self._extend(cache, path, opaque(survival), first, opaque(transmitted_at))
@@ -299,10 +305,10 @@ class Integrator:
 
         # Path trace what is still missing.
         unknown = compact(path, missing)
-        weight, light, keys, rng = self._estimate(unknown)
-        scatter_add(radiance, weight * light, unknown.lane)
+        weight, irradiance, keys, rng = self._estimate(unknown)
+        scatter_add(radiance, weight * irradiance, unknown.lane)
         if on_miss:
-            _report(on_miss, keys, light, dr.width(missing))
+            _report(on_miss, keys, irradiance, dr.width(missing))
 
         # Advance the generators of these paths, whose numbers the estimates have used.
         lanes, is_real = padded(missing)
@@ -332,14 +338,16 @@ class Integrator:
         return Array3f(emitted), vertex
 
     def _extend_kernel(
-        self, cache: IrradianceCache, path: Path, min_survival: Any, square: Any, transmitted_at: Any
+        self, cache: IrradianceCache, path: Path, min_survival: Any, qmc_point: Any, transmitted_at: Any
     ) -> tuple[Any, _Vertex]:
         """Scatter off a specular lobe at the next surface, and intersect the one after."""
         rng = PCG32(path.rng)
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        sample = self._renderer.sample_specular(point, rng if square is None else Leading(square, rng))
+        sample = self._renderer.sample_specular(
+            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng)
+        )
 
         # Play Russian roulette.
         throughput = path.throughput * sample.throughput
@@ -362,13 +370,13 @@ class Integrator:
         emitted, vertex = self._intersect(cache, extended)
         return Array3f(path.throughput * sample.direct), replace(vertex, radiance=emitted + vertex.radiance)
 
-    def _gather_kernel(self, cache: IrradianceCache, path: Path, square: Any) -> tuple[Any, _Vertex]:
+    def _gather_kernel(self, cache: IrradianceCache, path: Path, qmc_point: Any) -> tuple[Any, _Vertex]:
         """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""
         rng = PCG32(path.rng)
 
         # Intersect, and sample the diffuse lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
-        sample = self._renderer.sample_diffuse(point, Leading(square, rng))
+        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng))
 
         # Extend the path.
         extended = Path(
@@ -395,10 +403,10 @@ class Integrator:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         width = path.width_at(point)
         direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
-        light = Array3f(direct + indirect)
+        irradiance = Array3f(direct + indirect)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
         keys = tuple(entry_key(*at, level) for level in range(LEVELS))
-        return Array3f(path.throughput * point.surfaces.albedo), light, keys, rng
+        return Array3f(path.throughput * point.surfaces.albedo), irradiance, keys, rng
 
     def _terminate_kernel(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
@@ -408,8 +416,8 @@ class Integrator:
         return Array3f(path.throughput * (direct + indirect))
 
 
-def _report(on_miss: OnMiss, keys: tuple[Any, ...], light: Any, count: int) -> None:
-    values = rows(light)[:count]
+def _report(on_miss: OnMiss, keys: tuple[Any, ...], irradiance: Any, count: int) -> None:
+    values = rows(irradiance)[:count]
     for key in keys:
         on_miss(Entries.of(np.array(key)[:count], values))
 
@@ -446,9 +454,9 @@ def _query_kernel(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: A
         offset = 0.5 + jitter * (offset - 0.5)
 
         # Look up where the images miss.
-        light, is_found = cache.hash_grid.lookup(
+        irradiance, is_found = cache.hash_grid.lookup(
             query.position, query.normal, query.shape_index, query.width, offset
         )
-        reflected = dr.select(is_miss & is_found, query.weight * light, reflected)
+        reflected = dr.select(is_miss & is_found, query.weight * irradiance, reflected)
         is_miss &= ~is_found
     return reflected, is_miss

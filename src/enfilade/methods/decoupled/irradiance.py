@@ -12,16 +12,18 @@ from enfilade.methods.base import Output
 from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
-from enfilade.methods.decoupled.shot import Shot, either_side
+from enfilade.methods.decoupled.shot import ShotContext, either_side
 from enfilade.records import Mask
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-NOISE_SHARE = 0.25  # of the samples' variance: low-discrepancy samples have less noise than their spread
+NOISE_SHARE = 0.25  # of the samples' variance: low-discrepancy samples have less noise than it tells
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
-def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> tuple[IrradianceImage, int]:
+def gather(
+    shot: ShotContext, frame: int, where: Mask, spp: int, purpose: Purpose
+) -> tuple[IrradianceImage, int]:
     """Gather the irradiance of some pixels of a frame, at their centres.
 
     Parameters
@@ -40,13 +42,13 @@ def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> t
         Its variance is that between images of independent random numbers.
     paths : int
     """
-    walk, cache = shot.walk, shot.rough_cache(frame)
+    walk, cache = shot.walk, shot.final_gather_cache(frame)
     camera = walk.path.cameras[frame]
     estimate = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
-        lambda rays, rng, square: shot.integrator.final_gather(
-            cache, rays, rng, square, pixel_angle=camera.pixel_angle
+        lambda rays, rng, qmc_point: shot.integrator.final_gather(
+            cache, rays, rng, qmc_point, pixel_angle=camera.pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
@@ -55,19 +57,19 @@ def gather(shot: Shot, frame: int, where: Mask, spp: int, purpose: Purpose) -> t
         is_stratified=True,
     )
     estimate.add(spp)
-    spread = [shading.spread(where) for shading in estimate.shadings]
-    direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in spread)
+    layers = [shading.to_image(where) for shading in estimate.shadings]
+    direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in layers)
     return IrradianceImage(direct, indirect, where), estimate.paths
 
 
-def gather_keyframe(shot: Shot, frame: int, spp: int) -> Output:
+def gather_keyframe(shot: ShotContext, frame: int, spp: int) -> Output:
     """The irradiance image of a keyframe."""
     where = shot.walk.view(frame).geometry.has_diffuse
     image, paths = gather(shot, frame, where, spp, Purpose.IRRADIANCE)
     return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
 
 
-def fill_disocclusions(shot: Shot, segment: Segment, spp: int) -> Output:
+def fill_disocclusions(shot: ShotContext, segment: Segment, spp: int) -> Output:
     """Disocclusion images: irradiance of surfaces between two keyframes that no keyframe shows.
 
     The segment is halved until no further surface comes into view. An image contains all surfaces of its

@@ -14,18 +14,18 @@ from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
 from enfilade.methods.decoupled.records import IrradianceImage
-from enfilade.methods.decoupled.wavelet import Guide, smooth, spread_fireflies
+from enfilade.methods.decoupled.wavelet import Guide, redistribute_fireflies, smooth
 from enfilade.records import F32, U32, Geometry, Mask
 
 PLANE_TOLERANCE = 0.01  # of the depth
 MIN_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
 FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are fireflies
-FIREFLY_LEVELS = 5  # of the wavelet that spreads them
+FIREFLY_LEVELS = 5  # of the wavelet that distributes their energy
 SMOOTHING_LEVELS = 4
 SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
 NORMAL_EXPONENT = 64.0  # of the cosine: normals 12 degrees apart have a weight of a quarter
 
-Layer = tuple[Any, Any]  # Array3f: light, Float: variance of its luminance
+Layer = tuple[Any, Any]  # Array3f: values, Float: variance of its luminance
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class IrradianceCache:
 
         Returns
         -------
-        light : Array3f
+        irradiance : Array3f
             0 where none is found.
         is_found : Bool
         """
@@ -77,7 +77,7 @@ class IrradianceCache:
 
 
 def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
-    """Upload an irradiance image in two layers, direct and indirect; spreads the fireflies of the latter.
+    """Upload an irradiance image in two layers, direct and indirect, whose fireflies are redistributed.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
     """
     guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
     indirect = lanes(irradiance.indirect.color), lanes(irradiance.indirect.variance)
-    indirect = spread_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
+    indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
     direct = lanes(irradiance.direct.color), lanes(irradiance.direct.variance)
     return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
 
@@ -114,7 +114,7 @@ def upload_layers(
         depths=dr.select(is_known, lanes(geometry.depth), 0.0),
         shape_indices=dr.select(is_known, lanes(geometry.shape_index), 0),
         normals=packed(lanes(geometry.normal)) if has_normals else None,
-        values=tuple(dr.select(is_known, light, 0.0) for light, _ in layers),
+        values=tuple(dr.select(is_known, value, 0.0) for value, _ in layers),
         variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
         eye=vector3(camera.eye),
         direction_from_pixel=matrix3(camera.direction_from_pixel),
@@ -157,12 +157,12 @@ def accumulate(
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
     if denoise is None:
         groups = np.where(is_known, geometry.shape_index, np.uint32(0))
-        smoothed = [smooth_along(geometry, groups, light, variance) for light, variance in layers]
+        smoothed = [smooth_along(geometry, groups, value, variance) for value, variance in layers]
     else:
-        smoothed = [(lanes(denoise(image(light, *is_known.shape))), variance) for light, variance in layers]
-    light = sum((light for light, _ in smoothed), Array3f(0))
+        smoothed = [(lanes(denoise(image(value, *is_known.shape))), variance) for value, variance in layers]
+    irradiance = sum((value for value, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
-    return upload_layers(geometry, lanes(is_known), [(light, variance)])
+    return upload_layers(geometry, lanes(is_known), [(irradiance, variance)])
 
 
 def reproject_to(
@@ -179,32 +179,32 @@ def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
     return image(is_known, *geometry.shape_index.shape)
 
 
-def light_of(uploaded: UploadedImage) -> F32:
+def total_irradiance(uploaded: UploadedImage) -> F32:
     """The sum of all layers, (H, W, 3); 0 where there is no irradiance."""
     return image(sum(uploaded.values, Array3f(0)), uploaded.height, uploaded.width)
 
 
-def smooth_along(geometry: Geometry, groups: U32, light: Any, variance: Any) -> Layer:
-    """Smooth light along surfaces by the wavelet filter.
+def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> Layer:
+    """Smooth an image along its surfaces by the wavelet filter.
 
     Parameters
     ----------
     geometry
     groups : (H, W) uint32
         Only pixels of the same group mix.
-    light : Array3f
+    color : Array3f
         Image, width * height lanes.
     variance : Float
         Of its luminance.
 
     Returns
     -------
-    light : Array3f
+    color : Array3f
     variance : Float
         Of the result.
     """
     guide = guide_of(geometry, groups)
-    return smooth(light, variance, guide, levels=SMOOTHING_LEVELS, deviations=SMOOTHING_DEVIATIONS)
+    return smooth(color, variance, guide, levels=SMOOTHING_LEVELS, deviations=SMOOTHING_DEVIATIONS)
 
 
 def guide_of(geometry: Geometry, groups: U32) -> Guide:
@@ -240,23 +240,23 @@ def _averaged(
     totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
     weight, valid = Float(0), Float(0)
     dr.eval(position, own)
-    for one, of_image in zip(images, weights, strict=True):
+    for one, given in zip(images, weights, strict=True):
         # Look up the image; coarser ones weigh less.
         found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
         its = footprint(position, normal, one.eye, one.direction_from_pixel)
-        counts = opaque(float(of_image)) * dr.minimum(own / its, 1.0)
+        image_weight = opaque(float(given)) * dr.minimum(own / its, 1.0)
 
         # Accumulate its layers.
         for layer in layers:
-            totals[layer] += counts * found.totals[layer]
-            variances[layer] += counts * counts * found.variances[layer] * found.weight
-        weight += counts * found.weight
+            totals[layer] += image_weight * found.totals[layer]
+            variances[layer] += image_weight * image_weight * found.variances[layer] * found.weight
+        weight += image_weight * found.weight
         valid += found.weight
         dr.eval(totals, variances, weight, valid)  # so that one kernel serves any number of images
 
     # Normalize.
     is_known = valid > MIN_WEIGHT
-    light = [dr.select(is_known, total / weight, 0.0) for total in totals]
+    values = [dr.select(is_known, total / weight, 0.0) for total in totals]
     variance = [dr.select(is_known, v / (weight * weight), 0.0) for v in variances]
-    dr.eval(light, variance, is_known)
-    return list(zip(light, variance, strict=True)), is_known
+    dr.eval(values, variance, is_known)
+    return list(zip(values, variance, strict=True)), is_known

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 
 from enfilade.arrays import Array3f, Float, UInt
-from enfilade.kernels.gather import taps_around
+from enfilade.kernels.bilinear import taps_around
 
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts

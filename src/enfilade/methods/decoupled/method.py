@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_key
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import averaged_images, run_pilot
-from enfilade.methods.decoupled.shot import Shot
+from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.methods.walkthrough import Walkthrough
@@ -55,7 +55,7 @@ class Decoupled(Method):
 
     def __init__(self) -> None:
         self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
-        self._shot: Shot | None = None
+        self._shot: ShotContext | None = None
         self._frames = Frames()
 
     def check(self, settings: Settings) -> None:
@@ -102,7 +102,7 @@ class Decoupled(Method):
 
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
         """Do a task."""
-        shot, frame = self._shot_of(task, inputs, walk), task.frame
+        shot, frame = self._context_of(task, inputs, walk), task.frame
         match task.pass_name:
             case "prepass":
                 return trace_prepass(walk, shot.renderer, frame)
@@ -121,18 +121,18 @@ class Decoupled(Method):
                 return self._frames.finish(shot, frame)
 
     @staticmethod
-    def _spp(shot: Shot) -> int:
+    def _spp(shot: ShotContext) -> int:
         """Paths a pixel of irradiance images: as set, or as the pilot has chosen."""
         chosen = shot.settings.irradiance_spp
         return chosen or int(shot.inputs.facts("pilot", shot.keyframes[0])["spp"])
 
-    def _shot_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Shot:
-        """The shot of a task, which is kept until the next one begins."""
+    def _context_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> ShotContext:
+        """The context of a task, which is kept until the next one begins."""
         if self._kernels is None or self._kernels[0] is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
             self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
             self._shot, self._frames = None, Frames()  # free memory before the next shot allocates
             segments = inputs.analysis.segments(SPACING)[task.shot]
-            self._shot = Shot(task.shot, segments, inputs, walk, *self._kernels[1:])
+            self._shot = ShotContext(task.shot, segments, inputs, walk, *self._kernels[1:])
         return self._shot

@@ -46,7 +46,7 @@ def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Outp
         layers=2,
     )
     estimate.add(SPP)
-    direct, indirect = (shading.spread(where) for shading in estimate.shadings)
+    direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
     facts = {
         "rays": {"prepass": estimate.paths},
         "diffuse_pixels": int(where.sum()),

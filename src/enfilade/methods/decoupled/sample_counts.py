@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.irradiance import gather
-from enfilade.methods.decoupled.irradiance_cache import accumulate, light_of, upload
-from enfilade.methods.decoupled.shot import ACCUMULATED, Shot
+from enfilade.methods.decoupled.irradiance_cache import accumulate, total_irradiance, upload
+from enfilade.methods.decoupled.shot import ACCUMULATED, ShotContext
 from enfilade.metric import Aqm
 from enfilade.records import Geometry, Mask
 from enfilade.renderer import Emitters, Purpose
@@ -19,13 +20,27 @@ PILOT_SPP = 4  # of each of the two images that the pilot compares
 IRRADIANCE_SPP = 4, 256  # fewest and most
 MIN_DIFFUSE = 0.5  # of the largest number of diffuse pixels of a keyframe: the pilot uses none with fewer
 EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel has more camera rays
-EDGE_SPP = 256.0, 8, 64  # of a pixel at an edge, at a quality of one JND; fewest and most
-SPECULAR_SPP = 34.0, 2, 34  # of a pixel with specular lobes; the same, by the root of the quality
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 FFT_THREADS = 2
 
 
-def run_pilot(shot: Shot) -> Output:
+class SppRange(NamedTuple):
+    """Samples per pixel as a function of the quality, between bounds."""
+
+    at_one_jnd: float
+    least: int
+    most: int
+
+    def at(self, quality: float) -> int:
+        """Samples per pixel, in inverse proportion to the quality, JND."""
+        return min(max(round(self.at_one_jnd / quality), self.least), self.most)
+
+
+EDGE_SPP = SppRange(256.0, least=8, most=64)  # of a pixel at an edge
+SPECULAR_SPP = SppRange(34.0, least=2, most=34)  # of a pixel with specular lobes, by the root of the quality
+
+
+def run_pilot(shot: ShotContext) -> Output:
     """Choose the paths a pixel of irradiance images by the visible difference of two rough ones."""
     settings = shot.settings
     frame = _pilot_frame(shot)
@@ -68,12 +83,12 @@ def averaged_images(keyframes: float) -> float:
 
 def edge_spp(settings: DecoupledSettings) -> int:
     """Camera rays of a pixel at an edge."""
-    return settings.edge_spp or _by_quality(EDGE_SPP, settings.quality)
+    return settings.edge_spp or EDGE_SPP.at(settings.quality)
 
 
 def specular_spp(settings: DecoupledSettings) -> int:
     """Rays of a pixel with specular lobes."""
-    return settings.specular_spp or _by_quality(SPECULAR_SPP, math.sqrt(settings.quality))
+    return settings.specular_spp or SPECULAR_SPP.at(math.sqrt(settings.quality))
 
 
 def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
@@ -113,7 +128,7 @@ def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     return mask
 
 
-def _pilot_frame(shot: Shot) -> int:
+def _pilot_frame(shot: ShotContext) -> int:
     """The middle keyframe, or the one with most diffuse pixels where the middle one has few."""
     counts = {k: shot.inputs.facts("prepass", k)["diffuse_pixels"] for k in shot.keyframes}
     middle = shot.keyframes[len(shot.keyframes) // 2]
@@ -121,7 +136,7 @@ def _pilot_frame(shot: Shot) -> int:
     return most if counts[middle] < MIN_DIFFUSE * counts[most] else middle
 
 
-def _pilot_jnd(shot: Shot, frame: int, where: Mask) -> float:
+def _pilot_jnd(shot: ShotContext, frame: int, where: Mask) -> float:
     """Visible difference between two irradiance images of a keyframe, as its surfaces show them.
 
     Their random numbers are not those of the keyframe's own irradiance image, whose error would then depend
@@ -132,12 +147,7 @@ def _pilot_jnd(shot: Shot, frame: int, where: Mask) -> float:
     shown = []
     for purpose in (Purpose.PILOT, Purpose.SECOND_PILOT):
         image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
-        light = light_of(accumulate(geometry, where, [upload(geometry, image)]))
-        shown.append(walk.display_luminance(geometry.albedo * light))
+        irradiance = total_irradiance(accumulate(geometry, where, [upload(geometry, image)]))
+        shown.append(walk.display_luminance(geometry.albedo * irradiance))
     metric = Aqm.modern(walk.viewing, workers=FFT_THREADS)
     return metric.compare(shown[0], shown[1], valid=where).score
-
-
-def _by_quality(samples: tuple[float, int, int], quality: float) -> int:
-    at_one, least, most = samples
-    return min(max(round(at_one / quality), least), most)

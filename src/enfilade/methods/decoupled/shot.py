@@ -36,8 +36,8 @@ DISOCCLUSION_IMAGES = 2  # that are looked up: before and after a frame
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 
 
-class Shot:
-    """The irradiance of a shot, on the device.
+class ShotContext:
+    """The context of the tasks of a shot: its keyframes, and their irradiance on the device.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class Shot:
         weights = [*[1.0] * len(images), *[0.0] * missing]
         return IrradianceCache.of([*images, *[images[0]] * missing], weights)
 
-    def rough_cache(self, frame: int) -> IrradianceCache:
+    def final_gather_cache(self, frame: int) -> IrradianceCache:
         """Prepass images and hash grid near a frame, for final gathering."""
         cache = self.prepass_cache(frame)
         return IrradianceCache(cache.images, cache.weights, self.hash_grid(frame))
@@ -110,18 +110,20 @@ class Shot:
             self._hash_grid = near, Entries.joined(parts).upload()
         return self._hash_grid[1]
 
-    def caches(self, frame: int) -> tuple[IrradianceCache, IrradianceCache]:
-        """Irradiance reprojected to the view of a frame, and the images near it.
+    def shading_caches(self, frame: int) -> tuple[IrradianceCache, IrradianceCache]:
+        """Caches for shading a frame: irradiance reprojected to its view, and the images near it.
 
         The weights change continuously along the path.
         """
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
         images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
-        view = reproject_to(self.walk.view(frame).geometry, images, own)
+        reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
         # Fill up to a fixed number of images, so that one kernel serves all frames.
         missing = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES - len(images)
         images, own = [*images, *[images[0]] * missing], [*own, *[0.0] * missing]
-        return IrradianceCache.of([view], [1.0]), IrradianceCache.of(images, own, self.hash_grid(frame))
+        return IrradianceCache.of([reprojected], [1.0]), IrradianceCache.of(
+            images, own, self.hash_grid(frame)
+        )
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
         """Diffuse pixels of a frame that neither the nearest keyframes nor other images show, (H, W)."""
@@ -172,10 +174,10 @@ class Shot:
 
         return self._accumulated.get(frame, make)
 
-    def _denoised(self, geometry: Geometry, light: F32) -> F32:
+    def _denoised(self, geometry: Geometry, irradiance: F32) -> F32:
         has_diffuse = geometry.has_diffuse[..., None].astype(np.float32)
-        white = np.broadcast_to(has_diffuse, light.shape)  # irradiance is without albedo
-        return denoise(light, white, geometry.normal, quality=self.settings.denoiser)
+        white = np.broadcast_to(has_diffuse, irradiance.shape)  # irradiance is without albedo
+        return denoise(irradiance, white, geometry.normal, quality=self.settings.denoiser)
 
     def _keyframe_weights(self, frame: int) -> dict[int, float]:
         """Weights of the nearest keyframes, which fall to zero where the next one replaces them."""

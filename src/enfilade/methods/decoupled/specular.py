@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, halves, image, lanes, opaque, vector3, widened
+from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -25,7 +25,7 @@ from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
 from enfilade.records import F32, Geometry, Mask, Shading
 
-NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than their spread
+NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
 FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 
@@ -62,15 +62,15 @@ def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> Sp
     # Smooth along surfaces.
     noise = NOISE_SHARE * lanes(aov.variance)
     groups = np.where(where, geometry.shape_index, np.uint32(0))
-    light, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
+    color, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
 
     # Antialias edges.
     height, width = aov.variance.shape
-    light = soften_edges(
-        light, lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
+    color = soften_edges(
+        color, lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
     )
     deviation = np.sqrt(image(variance, height, width))
-    return SpecularAov(halves(image(light, height, width)), halves(deviation))
+    return SpecularAov(to_half(image(color, height, width)), to_half(deviation))
 
 
 def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:
@@ -84,7 +84,7 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
     where : (H, W) bool
         Pixels that were sampled.
     """
-    layers = [(lanes(widened(aov.color)), lanes(np.square(widened(aov.deviation))))]
+    layers = [(lanes(to_float(aov.color)), lanes(np.square(to_float(aov.deviation))))]
     return upload_layers(geometry, lanes(where), layers, has_normals=False)
 
 
@@ -119,7 +119,7 @@ def accumulate_temporally(
     total, weight = Array3f(color), dr.ones(Float, dr.width(color))
     luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, luminance)
-    for other, of_frame in others:
+    for other, given in others:
         # Reproject.
         found = lookup(position, normal, here.shape_indices, other, plane_tolerance=PLANE_TOLERANCE)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
@@ -127,11 +127,11 @@ def accumulate_temporally(
 
         # Weight by the difference, in units of the noise.
         difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - luminance)
-        counts = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
-        counts = dr.select(found.weight > MIN_WEIGHT, opaque(of_frame) * counts, 0.0)
+        frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
+        frame_weight = dr.select(found.weight > MIN_WEIGHT, opaque(given) * frame_weight, 0.0)
 
         # Accumulate.
-        total += counts * value
-        weight += counts
+        total += frame_weight * value
+        weight += frame_weight
         dr.eval(total, weight)  # so that one kernel serves any number of frames
     return image(total / weight, here.height, here.width)

@@ -69,16 +69,16 @@ class VirtualImages:
         first = geometry.depth.ravel() * _lengths(geometry.camera)
         count = len(pixels)  # of paths, without the padding at the end
         for _ in range(MAX_INTERFACES):
-            path, found, turned, distance, is_image, is_sharp = self._extend(path, opaque(choice))
+            path, next_shape, next_normal, distance, is_image, is_sharp = self._extend(path, opaque(choice))
             choice = TRANSMIT  # a pane seen in a mirror shows the surface behind it
 
             # Replace the surface by the next one where the interface forms an image; rough glass forms none.
             shown = np.array(is_image)[:count]
             lane = pixels[np.array(path.lane)[:count][shown]]
-            shape_index[lane] = np.array(found)[:count][shown] + IN_VIRTUAL_IMAGE
-            normal[lane] = rows(turned)[:count][shown]
-            far = np.array(distance)[:count][shown] / first[lane]
-            length[lane] = np.minimum(length[lane] + far, SKY_DISTANCE)
+            shape_index[lane] = np.array(next_shape)[:count][shown] + IN_VIRTUAL_IMAGE
+            normal[lane] = rows(next_normal)[:count][shown]
+            added = np.array(distance)[:count][shown] / first[lane]
+            length[lane] = np.minimum(length[lane] + added, SKY_DISTANCE)
 
             # Keep the paths whose next surface is another interface.
             onward: Any = dr.compress(is_sharp)

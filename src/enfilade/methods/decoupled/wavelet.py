@@ -72,21 +72,23 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
     """
     related = Float(1)  # variance of the result over that of independent pixels
     for level in range(levels):
-        color, variance, fraction = _pass(color, variance, guide, opaque(1 << level, Int), deviations)
+        color, variance, fraction = _filter_level(color, variance, guide, opaque(1 << level, Int), deviations)
         part = INDEPENDENT[level] if level < len(INDEPENDENT) else INDEPENDENT_BEYOND
         related *= fraction ** (part - 1.0)
         dr.eval(color, variance, related)
     return color, variance * related
 
 
-def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float) -> tuple[Any, Any, Any]:
+def _filter_level(
+    color: Any, variance: Any, guide: Guide, step: Any, deviations: float
+) -> tuple[Any, Any, Any]:
     """One level: colour, variance as if pixels were independent, and the ratio of that to the one before."""
     # Blur the variance, and compute the luminance.
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
-    spread = _blurred(variance, column, row, width, height)
-    dr.eval(spread)
+    blurred = _blurred(variance, column, row, width, height)
+    dr.eval(blurred)
     luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
 
     # Prepare the distance of taps from this pixel's tangent plane.
@@ -110,7 +112,7 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.shape_indices, tap) == shape_index)
             other = dr.gather(Array3f, color, tap)
-            deviation = deviations * dr.sqrt(spread + dr.gather(Float, spread, tap)) + TINY
+            deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
             difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance) / deviation
 
             # Weight it by the distance from the tangent plane, and by the cosine of the normals.
@@ -139,10 +141,10 @@ def _pass(color: Any, variance: Any, guide: Guide, step: Any, deviations: float)
     return total / weight, total_variance / whole, squares / whole
 
 
-def spread_fireflies(
+def redistribute_fireflies(
     color: Any, variance: Any, guide: Guide, *, times: float, levels: int
 ) -> tuple[Any, Any]:
-    """Spread the fireflies of an image along their surfaces; the total energy stays.
+    """Distribute the energy of an image's fireflies along their surfaces; its total stays.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ def spread_fireflies(
     times
         Limit, in units of the second brightest neighbour's luminance, since fireflies also come in pairs.
     levels
-        Of the wavelet that spreads them, as of :func:`smooth`.
+        Of the wavelet that distributes it, as of :func:`smooth`.
 
     Returns
     -------
@@ -165,10 +167,10 @@ def spread_fireflies(
     beyond = 1.0 - kept
 
     # Smooth the remainder, and add it again.
-    spread, spread_variance = smooth(
+    smoothed, smoothed_variance = smooth(
         beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
     )
-    return kept * color + spread, kept * kept * variance + spread_variance
+    return kept * color + smoothed, kept * kept * variance + smoothed_variance
 
 
 def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: int = 1) -> Any:
@@ -237,9 +239,9 @@ def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sig
 
 def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:
     """Variance, blurred over 3x3 pixels to reduce its own noise."""
-    spread = Float(0)
+    blurred = Float(0)
     for down, weight_y in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
         for across, weight_x in zip((-1, 0, 1), (0.25, 0.5, 0.25), strict=True):
             i, j = dr.clip(column + across, 0, width - 1), dr.clip(row + down, 0, height - 1)
-            spread += weight_x * weight_y * dr.gather(Float, variance, UInt(j * width + i))
-    return spread
+            blurred += weight_x * weight_y * dr.gather(Float, variance, UInt(j * width + i))
+    return blurred

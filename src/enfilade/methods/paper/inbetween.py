@@ -14,7 +14,7 @@ from enfilade.settings import MaskSettings, SamplingSettings, WarpSettings
 
 
 def fill_slow_pixels(walk: Walkthrough, frame: int, shading: Shading) -> tuple[Frame, int]:
-    """A keyframe whose slow pixels are traced again, with paths spread over the pixel.
+    """A keyframe whose slow pixels are traced again, with paths distributed over the pixel.
 
     The temporal filter finds no new samples for them along the motion (§5.2), so that they must be
     antialiased here. The keyframe that is warped keeps its paths through the pixels' centres.
@@ -68,7 +68,7 @@ def derive(
 
 
 def _trace_into(walk: Walkthrough, frame: int, color: F32, where: Mask) -> int:
-    """Trace some pixels of an image, with paths spread over the pixel; returns the samples left out."""
+    """Trace some pixels of an image, with paths distributed over the pixel; returns the samples left out."""
     if not where.any():
         return 0
     filled = walk.trace(

@@ -70,7 +70,7 @@ class Paper(Method):
         if settings[SamplingSettings].spp < MIN_SPP:
             raise SettingsError(
                 f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences "
-                "by the spread of a pixel's paths"
+                "by the variance of a pixel's paths"
             )
 
     def keyframes(self, analysis: Analysis) -> list[int]:

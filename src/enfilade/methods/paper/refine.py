@@ -61,7 +61,7 @@ class SegmentResult:
         return Segment(self.first, self.last, self.depth)
 
     def to_table(self, numbers: Sequence[int]) -> dict[str, Any]:
-        """As a plain table, fit for JSON, with frame numbers in place of indices."""
+        """The result as a table, fit for JSON, with frame numbers in place of indices."""
         return {
             "first": numbers[self.first],
             "last": numbers[self.last],

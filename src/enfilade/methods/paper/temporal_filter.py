@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 
 from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, opaque
-from enfilade.kernels.gather import sample
+from enfilade.kernels.bilinear import sample
 from enfilade.kernels.rays import pixel_centres
 from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.support import COVERED_PX, TemporalLimits

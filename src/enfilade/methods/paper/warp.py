@@ -10,7 +10,7 @@ import numpy as np
 
 from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, planar_warp
-from enfilade.kernels.gather import bilinear_taps
+from enfilade.kernels.bilinear import bilinear_taps
 from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject, warp_jacobian
 from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest

@@ -19,10 +19,10 @@ def find_emitters(scene: Any) -> Emitters:
     """Distribute points over all emitting surfaces; environments, point and directional lights have none."""
     shapes = [(index, shape) for index, shape in enumerate(scene.shapes(), start=1) if shape.is_emitter()]
     count = int(np.clip(MAX_POINTS // max(len(shapes), 1), *POINTS))
-    square = mi.Point2f(
+    sample_points = mi.Point2f(
         *(lanes(np.mod(step / 2**32 * np.arange(count), 1.0).astype(np.float32)) for step in R2)
     )
-    points = [rows(Array3f(shape.sample_position(0.0, square).p)) for _, shape in shapes]
+    points = [rows(Array3f(shape.sample_position(0.0, sample_points).p)) for _, shape in shapes]
     return Emitters(
         np.concatenate([np.zeros((0, 3), np.float32), *points]),
         np.repeat(np.array([index for index, _ in shapes], np.uint32), count),

@@ -166,7 +166,7 @@ def _opacity(si: Any, bsdf: Any, active: Any) -> Any:
     return 1.0 - dr.mean(bsdf.eval_null_transmission(si, active))
 
 
-def _cosine_direction(si: Any, square: Any) -> Any:
+def _cosine_direction(si: Any, sample_point: Any) -> Any:
     """A cosine-distributed direction in the hemisphere of the viewer."""
-    up = mi.warp.square_to_cosine_hemisphere(square)
+    up = mi.warp.square_to_cosine_hemisphere(sample_point)
     return mi.Vector3f(up.x, up.y, dr.copysign(up.z, si.wi.z))

@@ -95,8 +95,8 @@ class LightTransport:
         self, si: Any, bsdf: Any, evaluate: Any, rng: Any, active: Any, albedo: Any = None
     ) -> Any:
         """Radiance of a lobe from one sampled point on the emitters, MIS-weighted, divided by the albedo."""
-        square = mi.Point2f(rng.next_float32(), rng.next_float32())
-        emitter, radiance = self._scene.sample_emitter_direction(si, square, True, active)
+        sample_point = mi.Point2f(rng.next_float32(), rng.next_float32())
+        emitter, radiance = self._scene.sample_emitter_direction(si, sample_point, True, active)
         active = active & (emitter.pdf != 0.0)
         value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), active)
         if albedo is not None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import Float, image, lanes, pixel_grid
-from enfilade.kernels.gather import bilinear_taps, sample
+from enfilade.kernels.bilinear import bilinear_taps, sample
 from twins.bilinear import interpolated
 
 H, W = 7, 9
