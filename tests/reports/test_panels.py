@@ -1,8 +1,9 @@
 """Charts of runs and plans, and their SVG: series are read, not pixels."""
 
+from xml.etree.ElementTree import fromstring
+
 import numpy as np
 import pytest
-from defusedxml.ElementTree import fromstring
 
 from enfilade.reports.charts import PALETTE, Panel, Series, draw, new_figure, svg
 from enfilade.reports.panels import plan_panels, quality_panel, run_panels, time_panel
