@@ -1,6 +1,6 @@
 """Faults: runs that are killed, stopped, damaged or short of disk end with the bytes of an undisturbed run.
 
-    python benchmarks/faults.py [--only kills bits ...] [--count 20] [--seed 1] [--jobs 2]
+    python benchmarks/faults.py [--quick] [--only kills bits ...] [--count 20] [--seed 1] [--jobs 2]
 
 kills      SIGKILL for a command, for one of its workers, or by the process itself in the middle of a write
 shards     several `enfilade work` commands at once, some of which are killed
@@ -38,6 +38,7 @@ from enfilade.runs.job import read_job
 from enfilade.runs.scheduler import passes_of
 
 COUNTS = {"kills": 40, "shards": 6, "executors": 5, "cluster": 3, "stops": 4, "disk": 10, "bits": 20}
+QUICK = {"kills": 8, "shards": 2, "executors": 5, "cluster": 1, "stops": 1, "disk": 3, "bits": 6}
 POINTS = ("before fsync", "after fsync", "before rename", "after rename", "torn line")
 EXECUTORS = (("in-process", 1), ("processes", 1), ("processes", 2), ("processes", 7), ("ray", 2))
 LIMITS = ("--set", "limits.task_timeout_s=60", "--set", "limits.preflight_s=300")
@@ -91,11 +92,13 @@ Trial = Callable[[Case, Path, random.Random, int], str]  # disturbs and continue
 def main() -> int:
     """Try all; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer trials")
     parser.add_argument("--only", nargs="+", choices=TRIALS, default=list(TRIALS))
     parser.add_argument("--count", type=int, help="number of trials of each kind")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     arguments = parser.parse_args()
+    counts = QUICK if arguments.quick else COUNTS
     tried, wrong = Counter[str](), Counter[str]()
     with tempfile.TemporaryDirectory(prefix="faults-") as name, ThreadPoolExecutor(arguments.jobs) as pool:
         case = undisturbed(Path(name))
@@ -103,7 +106,7 @@ def main() -> int:
         begun = {
             pool.submit(one, kind, number, case, Path(name), arguments.seed): kind
             for kind in arguments.only
-            for number in range(arguments.count or COUNTS[kind])
+            for number in range(arguments.count or counts[kind])
         }
         for ended in as_completed(begun):
             what, is_right = ended.result()
