@@ -1,4 +1,4 @@
-"""Settings: one frozen dataclass a stage, with defaults, ranges and help.
+"""Settings: one frozen dataclass a section, with defaults, ranges and help.
 
 A method names the sections that it reads. A TOML file sets them by table (``[keyframes]`` and below it
 ``spacing = 25``), the command line by flags or ``--set keyframes.spacing=25``.
@@ -59,7 +59,7 @@ def option(
 
 @dataclass(frozen=True)
 class Section:
-    """The settings of one stage. Subclasses are frozen dataclasses whose fields are made by :func:`option`.
+    """A section of settings. Subclasses are frozen dataclasses whose fields are made by :func:`option`.
 
     Attributes
     ----------

@@ -211,13 +211,13 @@ def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | 
         return
     from enfilade.images import files_of
 
-    ours, theirs = files_of(test), files_of(reference)
-    read = {_place_on_disk(file) for file in (*ours, *theirs)} - {None}
+    of_test, of_reference = files_of(test), files_of(reference)
+    read = {_place_on_disk(file) for file in (*of_test, *of_reference)} - {None}
     pictures = [heatmap] if heatmap is not None else []
     if heatmap is not None and _is_folder(heatmap):
         # The frames of a video are counted, and as many as the reference's.
-        counted = [f"{number:06d}" for number in range(1, len(theirs) + 1)]
-        names = [file.stem for file in ours if file.suffix.lower() in IMAGES] or counted
+        counted = [f"{number:06d}" for number in range(1, len(of_reference) + 1)]
+        names = [file.stem for file in of_test if file.suffix.lower() in IMAGES] or counted
         pictures = [heatmap / f"{name}.png" for name in names]
     for flag, files in (("--heatmap", pictures), ("--graph", [graph] if graph is not None else [])):
         for file in files:

@@ -315,9 +315,9 @@ def _check_effect(ctx: click.Context, method: Method) -> None:
     given = ctx.meta.get(_META, {})
     kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
     read = {kind.table for kind in kinds}
-    asked = {flag: kind.table for flag, (kind, _) in FLAGS.items() if flag in given}
-    asked |= {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
-    for flag, table in asked.items():
+    named = {flag: kind.table for flag, (kind, _) in FLAGS.items() if flag in given}
+    named |= {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
+    for flag, table in named.items():
         if table not in read:
             raise SettingsError(
                 f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "
@@ -336,10 +336,10 @@ def workers_of(executor: str, workers: int | None, threads: int) -> Workers:
     from enfilade.device import load
     from enfilade.runs.executor import Workers
 
-    asked = Workers(executor, workers, threads)
+    made = Workers(executor, workers, threads)
     if executor == "in-process" and threads:
         load().set_thread_count(threads)
-    return asked
+    return made
 
 
 def check_png(flag: str, file: Path | None) -> None:

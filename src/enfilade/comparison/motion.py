@@ -105,7 +105,7 @@ def open_motion(
         )
     known = frozenset[int]() if starts is None else starts
     if choice is FlowChoice.NONE:
-        return _Still("image flow: none, as asked; the sequences are compared as static", known)
+        return _Still("image flow: none; the sequences are compared as static", known)
     if len(reference) == 1:
         return _Still("image flow: none in a single image; it is compared as static", known)
     return _Estimated(reference.width, reference.height, known)

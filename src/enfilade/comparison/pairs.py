@@ -230,13 +230,13 @@ def _check_alike(test: Sequence, reference: Sequence) -> None:
 
 
 def _check_same_frames(test: Sequence, reference: Sequence) -> None:
-    ours, theirs = test.numbers or (), reference.numbers or ()
-    differing = set(ours) ^ set(theirs)
+    of_test, of_reference = test.numbers or (), reference.numbers or ()
+    differing = set(of_test) ^ set(of_reference)
     if not differing:
         return
     number = min(differing)
-    roles = (("test", test, ours), ("reference", reference, theirs))
-    (role, has, numbers), (other, lacks, _) = roles if number in ours else roles[::-1]
+    roles = (("test", test, of_test), ("reference", reference, of_reference))
+    (role, has, numbers), (other, lacks, _) = roles if number in of_test else roles[::-1]
     raise ImageError(
         f"the {role}'s run has the frame {number} ({has.name(numbers.index(number))}), and the {other}'s "
         f"(first {lacks.name(0)}) does not: give runs of the same --frames, finish the one that lacks it, or "
@@ -245,11 +245,13 @@ def _check_same_frames(test: Sequence, reference: Sequence) -> None:
 
 
 def _note_on_paths(test: Path | str, reference: Path | str) -> str:
-    ours, theirs = _path_of(test), _path_of(reference)
+    of_test, of_reference = _path_of(test), _path_of(reference)
     # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
     # them: another host may round the same poses otherwise.
-    is_told = "poses" in ours and "poses" in theirs and ours.get("frames") == theirs.get("frames")
-    if not is_told or ours["poses"] == theirs["poses"]:
+    is_told = (
+        "poses" in of_test and "poses" in of_reference and of_test.get("frames") == of_reference.get("frames")
+    )
+    if not is_told or of_test["poses"] == of_reference["poses"]:
         return ""
     return (
         f"camera: {test} and {reference} are of different camera paths (other poses in run.json): "
@@ -270,7 +272,7 @@ def _note_on_numbers(test: Sequence, reference: Sequence) -> str:
     if test.numbers is None or reference.numbers is None or test.numbers == reference.numbers:
         return ""
     pairs = enumerate(zip(test.numbers, reference.numbers, strict=True))
-    index = next(i for i, (ours, theirs) in pairs if ours != theirs)
+    index = next(i for i, (of_test, of_reference) in pairs if of_test != of_reference)
     return (
         f"frames: their numbers differ, so they are paired in order: {test.name(index)} with "
         f"{reference.name(index)}, and so on"

@@ -73,13 +73,13 @@ class Server:
         """
         try:
             activate("gpu" if self._terms.device == "gpu" else "cpu")
-            asked = pickle.loads(order)  # noqa: S301  (from the process that started this one)
-            if self._worker is None or asked.reduction != self._reduction:
+            request = pickle.loads(order)  # noqa: S301  (from the process that started this one)
+            if self._worker is None or request.reduction != self._reduction:
                 self._worker = None  # first, so that there is never memory for two
-                self._worker, self._reduction = self._opened(asked.reduction), asked.reduction
-            self._worker.prepare(asked.task)
+                self._worker, self._reduction = self._opened(request.reduction), request.reduction
+            self._worker.prepare(request.task)
             begun()
-            return self._worker.do(asked.task)
+            return self._worker.do(request.task)
         except Exception as error:  # noqa: BLE001  (the scheduler decides)
             self._worker = None
             return Failure.of(error, traceback.format_exc())

@@ -127,7 +127,7 @@ class Command:
 
 
 def submit(
-    folder: Path, cluster: str, shards: int | None, options: dict[str, Any], tell: Callable[[str], object]
+    folder: Path, cluster: str, shards: int | None, options: dict[str, Any], message: Callable[[str], object]
 ) -> list[str]:
     """Submit a run that was begun to Slurm, step by step, each after the one before.
 
@@ -145,7 +145,7 @@ def submit(
     options
         Parameters of submitit's executor, such as ``slurm_partition``, ``timeout_min`` and ``cpus_per_task``,
         by default 8.
-    tell
+    message
         Receives a line on each job as soon as it is submitted.
 
     Returns
@@ -182,7 +182,7 @@ def submit(
             except RuntimeError as error:  # of sbatch
                 raise EnfiladeError(_refused(step["name"], error, made)) from error
             made.append(ids[-1])
-            tell(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
+            message(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
             if cluster == "local":
                 _wait(step["name"], jobs[0], submitit.core.utils.UncompletedJobError)
         previous = ids

@@ -45,7 +45,7 @@ class _Child:
 class Processes:
     """Worker processes, started when they are needed.
 
-    They are spawned, not forked: a device or a kernel of this process is not theirs. When this process dies,
+    They are spawned, not forked: a device or a kernel of this process is not child_end. When this process dies,
     the kernel ends them.
 
     Parameters
@@ -136,8 +136,8 @@ class Processes:
             raise unwritable(log, error) from error
         gpu = self._gpus[slot % len(self._gpus)] if self._gpus else ""
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        arguments = theirs, self._terms, os.getpid(), log.resolve(), gpu
+        parent_end, child_end = context.Pipe()
+        arguments = child_end, self._terms, os.getpid(), log.resolve(), gpu
         process = context.Process(target=serve, args=arguments, daemon=True)
         # ^C is for this process, which ends its workers: they inherit the mask.
         resource_tracker.ensure_running()  # Python 3.11 unblocks the signal there
@@ -150,8 +150,8 @@ class Processes:
             ) from error
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            theirs.close()
-        self._children[slot] = _Child(process, ours, log)
+            child_end.close()
+        self._children[slot] = _Child(process, parent_end, log)
         return self._children[slot]
 
     def _received(self, slot: int) -> Ended | None:
