@@ -248,10 +248,9 @@ def _note_on_paths(test: Path | str, reference: Path | str) -> str:
     of_test, of_reference = _path_of(test), _path_of(reference)
     # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
     # them: another host may round the same poses otherwise.
-    is_told = (
-        "poses" in of_test and "poses" in of_reference and of_test.get("frames") == of_reference.get("frames")
-    )
-    if not is_told or of_test["poses"] == of_reference["poses"]:
+    is_known = "poses" in of_test and "poses" in of_reference
+    is_alike = of_test.get("poses") == of_reference.get("poses")
+    if is_alike or not is_known or of_test.get("frames") != of_reference.get("frames"):
         return ""
     return (
         f"camera: {test} and {reference} are of different camera paths (other poses in run.json): "

@@ -45,7 +45,7 @@ class _Child:
 class Processes:
     """Worker processes, started when they are needed.
 
-    They are spawned, not forked: a device or a kernel of this process is not child_end. When this process dies,
+    They are spawned, not forked: a device or a kernel of this process is not theirs. When this process dies,
     the kernel ends them.
 
     Parameters
