@@ -247,11 +247,9 @@ def stop(case: Case, place: Path, chance: random.Random, _number: int) -> str:
 
 
 def cluster(case: Case, place: Path, chance: random.Random, _number: int) -> str:
-    """Kill a worker of Ray (not one of its agents, whose node dies with them): the command must end by itself."""
-    out = place / "run"
-    what = struck(
-        case, out, chance, signal.SIGKILL, "--executor", "ray", "--workers", "2", title=b"ray::do_remotely"
-    )
+    """Kill a worker of Ray: the command must end by itself."""
+    out, title = place / "run", b"ray::do_remotely"  # not an agent, whose node dies with it
+    what = struck(case, out, chance, signal.SIGKILL, "--executor", "ray", "--workers", "2", title=title)
     return compare(case, out, what)
 
 
