@@ -40,7 +40,7 @@ class Result:
     Attributes
     ----------
     value
-        A value of JSON.
+        Result, as plain values.
     origin : dict of str to str
         See :func:`~studies.versions.origin`.
     """

@@ -1,6 +1,6 @@
 """Time of a frame by each method of rendering (§6, Table 2).
 
-ART, "fully ray traced frames with antialiasing", is path tracing of every frame with a pixel filter, and the
+ART, "fully ray traced frames with antialiasing", is path tracing of every frame with a pixel filter and the
 smallest spp without visible differences from a reference. RT, "one sample per pixel", is path tracing of
 every frame through the pixels' centres, with the spp of keyframes. Times that were measured under different
 load are compared by the cost of a path.
@@ -21,7 +21,7 @@ from enfilade.runs.folder import RunFolder
 from studies.cases.case import Case
 from studies.cases.speed import even_positions
 from studies.cases.visibility import Scores, Viewer, scores_in
-from studies.cases.windows import load_or_make, reseeded
+from studies.cases.windows import load_or_render, reseeded
 from studies.crops import Crop
 from studies.progress import counted
 
@@ -29,7 +29,7 @@ PAPER_MINUTES = {  # Table 2, for a frame
     "atrium": {"art": 170.0, "rt": 40.0, "ibr_rt": 20.5},
     "room": {"art": 6.9, "rt": 1.5, "ibr_rt": 1.1},
 }
-UNSEEN_PERCENT = 1.0  # of the pixels may be above 1 JND in images without visible differences
+MOST_VISIBLE_PERCENT = 1.0  # of the pixels above 1 JND, in images without visible differences
 
 
 def measure(case: Case) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def measure(case: Case) -> dict[str, Any]:
 def art_spp(series: dict[int, list[Scores]]) -> tuple[int, bool]:
     """Least spp without visible differences, and False; or the largest spp, and True (a lower bound)."""
     for spp in sorted(series):
-        if all((of["visible_percent"] or 0.0) <= UNSEEN_PERCENT for of in series[spp]):
+        if all((of["visible_percent"] or 0.0) <= MOST_VISIBLE_PERCENT for of in series[spp]):
             return spp, False
     return max(series), True
 
@@ -131,7 +131,7 @@ class _Quality:
     def _scores(self, frame: int, color: F32) -> Scores:
         stem = self._case.folder / "crops" / f"{self._walk.path.numbers[frame]:04d}"
         spp = self._case.extent.reference_spp
-        reference = load_or_make(stem, lambda: self._traced(self._reference_walk, frame, spp))
+        reference = load_or_render(stem, lambda: self._traced(self._reference_walk, frame, spp))
         velocity = self._cropped(self._walk.view(frame).velocity_deg_s)
         # The noise of the reference is not an error of the test.
         jnd = self._viewer.paper(color, reference.color, velocity, noise=reference.variance)

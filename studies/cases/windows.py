@@ -170,10 +170,10 @@ class Windows:
         if self._folder is None:
             return self._images.get((kind, frame), make)
         stem = self._folder / kind / f"{self.walk.path.numbers[frame]:04d}"
-        return self._images.get((kind, frame), lambda: load_or_make(stem, make))
+        return self._images.get((kind, frame), lambda: load_or_render(stem, make))
 
 
-def load_or_make(stem: Path, make: Callable[[], Shading]) -> Shading:
+def load_or_render(stem: Path, make: Callable[[], Shading]) -> Shading:
     """Read a traced image from its file; render and write it if the file is missing."""
     file = stem.with_name(f"{stem.name}.exr")
     if not file.is_file():
@@ -182,7 +182,7 @@ def load_or_make(stem: Path, make: Callable[[], Shading]) -> Shading:
 
 
 def reseeded(walk: Walkthrough) -> Walkthrough:
-    """The same walkthrough with other random numbers."""
+    """Copy of a walkthrough with independent random numbers."""
     seed = (walk.settings[TraceSettings].seed + 1) % 2**32
     return Walkthrough(walk.path, walk.settings.replace(TraceSettings, seed=seed), walk.renderer)
 

@@ -117,7 +117,7 @@ def test_an_unknown_configuration_is_refused(run, line):
     assert "no configuration is called 'best'; there are: traced-1" in result.stderr
 
 
-def test_missing_rivals_and_measures_are_reported(tmp_path, monkeypatch):
+def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
     job = room_job(tmp_path, 2, method="reference")
     monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
     with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
