@@ -90,7 +90,7 @@ def _fits_table(validation: Validation) -> Table:
     table = Table(title="Cross-validation of fitted constants", title_justify="left", box=box.SIMPLE_HEAD)
     for heading in ("constant", "data"):
         table.add_column(heading)
-    for heading in ("value", "best candidates", "dB RMS", "cross-validated"):
+    for heading in ("value", "best candidates", "RMS, dB", "CV RMS, dB"):
         table.add_column(heading, justify="right")
     for fit in validation.fits:
         best = listed(fit.least) if fit.least == fit.most else f"{listed(fit.least)} to {listed(fit.most)}"
