@@ -1,12 +1,12 @@
-# make demo    set up, render a small walkthrough into runs/demo, and a page that shows it
-# make test    set up, run the tests, two files at a time (JOBS=4: four); Chromium, which tests the page, by apt where it is missing
-# make validate-metric   set up, judge the metric by what people saw
-# make bench   set up, race our methods against their rivals on ROOM and ATRIUM; it says first how long it takes
-# make case-studies   set up, run the paper's experiments again, write studies/cases/README.md; PRESET=small is quick
-# make check   set up, run format, lint, type and import-floor checks
-# make setup   only set up: .venv with locked versions, and system libraries by apt where they are missing
-# make lock    write requirements.lock anew from pyproject.toml
-# make clean   remove what the above have made; runs/ stays
+# make demo    set up, render a small walkthrough into runs/demo, and write its report
+# make test    set up, run the tests in two processes (JOBS=4: four); installs Chromium by apt if it is missing
+# make validate-metric   set up, validate the metric on published experiments with observers (five minutes)
+# make bench   set up, compare enfilade's methods with baselines on ROOM and ATRIUM; prints a forecast of the time
+# make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
+# make check   set up, check formatting, lint, types and import rules
+# make setup   create .venv with the locked versions; installs system libraries by apt if they are missing
+# make lock    update requirements.lock from pyproject.toml
+# make clean   remove .venv, caches and build files; runs/ is kept
 
 VENV ?= .venv
 BIN := $(VENV)/bin

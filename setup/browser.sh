@@ -1,6 +1,6 @@
 #!/bin/sh
-# See that Chromium is there, in which the tests open the page of `enfilade report`; install it by apt where
-# it is missing. Exit 0 also where that can't be: then what to do was said, and those tests fail.
+# Install Chromium by apt if it is missing; the tests of `enfilade report` open the report in it. The exit status
+# is always 0: if the installation fails, a message says what to do, and those tests fail.
 set -u
 
 has_browser() {
@@ -16,7 +16,7 @@ if [ "$(id -u)" -ne 0 ]; then
     fi
 fi
 if [ "$as_root" = none ] || ! command -v apt-get >/dev/null 2>&1; then
-    echo "setup: Chromium is missing, and the tests of the report's page fail without it; install it once:" >&2
+    echo "setup: Chromium is missing; the tests of the report need it. Install it with:" >&2
     echo "       sudo apt-get install chromium" >&2
     exit 0
 fi
@@ -25,6 +25,6 @@ install() {
 }
 echo "setup: installing chromium"
 install || { $as_root apt-get update -qq && install; } || {
-    echo "setup: apt-get could not install chromium; its reason stands above. The tests of the page will fail" >&2
+    echo "setup: apt-get could not install chromium (see above); the tests of the report will fail" >&2
 }
 exit 0

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Write requirements.lock: the versions of everything for Python 3.11 to 3.13, development tools included.
+# Write requirements.lock: versions of all dependencies for Python 3.11 to 3.13, with development tools.
 set -eu
 cd "$(dirname "$0")/.."
 tool=$(mktemp -d)

@@ -1,17 +1,17 @@
 #!/bin/sh
-# Make a virtual environment (folder $1, .venv by default) with the versions of requirements.lock and
-# this checkout, editable.
+# Create a virtual environment (folder $1, .venv by default) with the versions of requirements.lock and an
+# editable installation of this checkout.
 set -eu
 cd "$(dirname "$0")/.."
 folder=${1:-.venv}
 
 python=$(sh setup/python.sh)
 if ! "$folder/bin/python" -c 'import pip' >/dev/null 2>&1; then
-    echo "setup: making $folder with $("$python" --version 2>&1)"
+    echo "setup: creating $folder with $("$python" --version 2>&1)"
     "$python" -m venv --clear "$folder"
 fi
 
-# pip, one line a package.
+# Run pip with one line of output for each package.
 install() {
     status=$(mktemp)
     {

@@ -1,1 +1,1 @@
-"""Studies of enfilade on its public functions; the product does not depend on them."""
+"""Studies of enfilade: benchmarks, validation and example scenes. The package does not depend on them."""

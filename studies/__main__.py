@@ -1,4 +1,4 @@
-"""The laboratory's command: ``python -m studies COMMAND``."""
+"""Command line of the studies: ``python -m studies COMMAND``."""
 
 import click
 
@@ -15,7 +15,7 @@ MODULES = {
 @click.group(cls=EnfiladeGroup, modules=MODULES, context_settings={"help_option_names": ["-h", "--help"]})
 @debug_option
 def main() -> None:
-    """Studies of enfilade: generated scenes, rivals, human observers, the paper's experiments."""
+    """Studies of enfilade: generated scenes, baselines, human observers, the paper's experiments."""
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The part of an image that a picture shows."""
+"""Crops of images for figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Crop = tuple[slice, slice]  # rows, columns
 
 
 def crop_around(weights: npt.NDArray[Any], side: int) -> Crop:
-    """The square with the largest sum of weights, (H, W), or all there is where the image is smaller."""
+    """Square crop with the largest sum of weights, (H, W), clipped to the size of the image."""
     height, width = weights.shape
     y, x = min(side, height), min(side, width)
     sums = np.pad(weights.astype(np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))

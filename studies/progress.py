@@ -20,13 +20,13 @@ def counted(items: Sequence[T], name: str, monitor: Monitor) -> Iterator[T]:
 
 @dataclass(frozen=True)
 class Prefixed:
-    """A monitor that puts a prefix before the names of stages: several runs have the same ones."""
+    """A monitor that prefixes the names of stages, which several runs have in common."""
 
     monitor: Monitor
     prefix: str
 
     def progress(self, name: str, done: int, total: int) -> None:
-        """Show how many of the items of a stage are done."""
+        """Show the number of finished items of a stage."""
         self.monitor.progress(f"{self.prefix}: {name}", done, total)
 
     def message(self, text: str) -> None:

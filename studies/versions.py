@@ -44,7 +44,7 @@ def machine() -> dict[str, Any]:
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of the packages that render, encode and measure, as far as they are installed."""
+    """Versions of the installed packages that render, encode and measure."""
     found = {}
     for name in PACKAGES:
         try:

@@ -1,1 +1,1 @@
-"""The bench: our methods against their rivals on one path tracer, quality over CPU time."""
+"""The bench: quality over CPU time of enfilade's methods and of baselines, on one path tracer."""

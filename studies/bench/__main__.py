@@ -1,9 +1,9 @@
-"""Run the bench on the generated scenes, and fail where a required ratio is missed: `make bench`.
+"""Run the bench on the generated scenes and check the required ratios: `make bench`.
 
     python -m studies.bench [--scenes room atrium] [--size 320x180] [--frames 40] [--reference-spp 256]
 
-Writes the small scenes, runs the bench on each (or continues it), prints requirements that are missed, and
-keeps the results of all scenes in studies/bench/results/, with machine and date.
+Writes the small scenes, runs or continues the bench on each, prints missed requirements, and writes the
+results of all scenes into studies/bench/results/, with machine and date.
 """
 
 import argparse
@@ -17,10 +17,10 @@ from typing import Any
 from studies.bench.tables import ratio_text
 
 HERE = Path(__file__).resolve().parent
-PIXEL_M = 0.25 / 800.0  # of the paper's screen, 640x480 on 25 cm: 28 a degree from half a metre
-RIVAL = "traced-256"
-TIMES_TRACED = {"room": 30.0, "atrium": 15.0}  # times less CPU time than RIVAL, within 0.1 JND
-TIMES_DENOISED = 3.0  # geometric mean over the measures, at equal quality; by no measure slower
+PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
+BASELINE = "traced-256"
+TIMES_TRACED = {"room": 30.0, "atrium": 15.0}  # times less CPU time than BASELINE, within 0.1 JND
+TIMES_DENOISED = 3.0  # geometric mean over the measures, at equal quality; no measure below 1
 
 
 def main() -> int:
@@ -31,20 +31,20 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--reference-spp", type=int, default=256)
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
-    parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder that keeps the results")
-    arguments, others = parser.parse_known_args()
+    parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
+    arguments, options = parser.parse_known_args()
     missing = []
     for scene in arguments.scenes:
-        found = run(scene, arguments, others)
+        found = run(scene, arguments, options)
         arguments.keep.mkdir(parents=True, exist_ok=True)
         (arguments.keep / f"{scene}.json").write_text(json.dumps(found, indent=1) + "\n")
         missing += [f"{scene}: {text}" for text in missed(scene, found["ratios"])]
-    print("\n".join(["", "Missed:", *missing] if missing else ["", "All requirements are met."]))
+    print("\n".join(["", "Requirements missed:", *missing] if missing else ["", "All requirements are met."]))
     return 1 if missing else 0
 
 
-def run(scene: str, arguments: argparse.Namespace, others: list[str]) -> dict[str, Any]:
-    """Write a scene and run the bench on it, with other options of the command."""
+def run(scene: str, arguments: argparse.Namespace, options: list[str]) -> dict[str, Any]:
+    """Write a scene and run the bench on it, with further options of the command."""
     files, folder = arguments.out / "scenes" / scene, arguments.out / scene
     studies = [sys.executable, "-m", "studies"]
     write = [*studies, "scene", scene, "--preset", "small", "--size", arguments.size, "--out", files]
@@ -57,7 +57,7 @@ def run(scene: str, arguments: argparse.Namespace, others: list[str]) -> dict[st
         arguments.reference_spp,
         "--set",
         f"viewing.diagonal_m={diagonal_m}",
-        *others,
+        *options,
     ]
     subprocess.run([*map(str, bench)], check=True)
     found: dict[str, Any] = json.loads((folder / "bench.json").read_text())
@@ -65,12 +65,14 @@ def run(scene: str, arguments: argparse.Namespace, others: list[str]) -> dict[st
 
 
 def missed(scene: str, ratios: dict[str, Any]) -> list[str]:
-    """Requirements that the ratios of a bench miss, in words."""
+    """Messages about the requirements that the ratios of a bench miss."""
     found = []
-    traced = ratios["traced"].get(RIVAL, {}).get("aqm")
+    traced = ratios["traced"].get(BASELINE, {}).get("aqm")
     if traced is None or traced["kind"] == "at most" or traced["times"] < TIMES_TRACED[scene]:
         text = "none" if traced is None else ratio_text(traced)
-        found.append(f"{TIMES_TRACED[scene]:g} times less CPU time than {RIVAL} within 0.1 JND; found {text}")
+        found.append(
+            f"{TIMES_TRACED[scene]:g} times less CPU time than {BASELINE} within 0.1 JND; found {text}"
+        )
     if denoised := ratios["denoised"]:
         if denoised["geometric_mean"] < TIMES_DENOISED or denoised["kind"] not in ("equal", "at least"):
             mean = ratio_text({"times": denoised["geometric_mean"], "kind": denoised["kind"]})
@@ -81,8 +83,10 @@ def missed(scene: str, ratios: dict[str, Any]) -> list[str]:
             if ratio["times"] < 1.0 or ratio["kind"] == "at most"
         ]
     else:
-        found.append("no denoised rival was rendered: pip install 'enfilade[denoise]'")
-    return found + [f"better than {name} at less cost" for name, ours in ratios["paper"].items() if not ours]
+        found.append("no denoised baseline was rendered: pip install 'enfilade[denoise]'")
+    return found + [
+        f"better than {name} at less cost" for name, better in ratios["paper"].items() if not better
+    ]
 
 
 if __name__ == "__main__":

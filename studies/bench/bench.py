@@ -2,9 +2,9 @@
 
 ::
 
-    references/box/ gaussian/    run folders, with all AOVs
-    configurations/NAME/         a run folder each
-    scores/NAME.json             measures of each
+    references/box/ gaussian/    run folders of the references, with all AOVs
+    configurations/NAME/         run folders of the configurations
+    scores/NAME.json             measures of the configurations
     bench.json  bench.png  crops.png
 """
 
@@ -41,18 +41,18 @@ from enfilade.settings import (
     TraceSettings,
     ViewingSettings,
 )
+from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
 from studies.bench.measures import SCALES
 from studies.bench.measuring import available, measure
 from studies.bench.ratios import ratios
-from studies.bench.rivals import why_missing
 from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
 
-PATHS_PER_CPU_S = 1.0e6  # of a furnished room on one core of 2026; for a rough forecast
-WARM_FRAMES = 3  # of the path, rendered and thrown away before anything is counted: kernels are compiled
-UNCHARGED = (CLIPS.name, VIDEO.name)  # rivals need no video
-RIVALS_UNCHARGED = (*UNCHARGED, ANALYSIS.name, "gbuffer")  # nor G-buffers
+PATHS_PER_CPU_S = 1.0e6  # measured in a furnished room on one core of 2026; for the forecast
+WARM_FRAMES = 3  # rendered and discarded before the measurement, to compile the kernels
+UNCHARGED = (CLIPS.name, VIDEO.name)  # baselines need no video
+BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name, "gbuffer")  # nor G-buffers
 
 
 def bench(
@@ -65,27 +65,27 @@ def bench(
     reference_device: Choice = "auto",
     quiet: bool = False,
 ) -> dict[str, Any]:
-    """Render and measure all configurations, or go on with it.
+    """Render and measure all configurations, or continue.
 
-    Finished frames and measures are not made again. One process works at a time, so that the times are those
-    of a machine that does nothing else.
+    Finished frames and measures are kept. One process works at a time, so that runs do not slow each other
+    down.
 
     Parameters
     ----------
     job
         Scene, path and settings.
     configurations
-        They run on the CPU.
+        Rendered on the CPU.
     folder
-        Made if it is not there.
+        Created if it does not exist.
     reference_spp
-        Of the references. Their own noise is the noise floor of every error.
+        Paths a pixel of the references, whose noise is a lower bound of all errors.
     measures
-        Names; empty: all that can be had here.
+        Names; empty: all that are available.
     reference_device
-        For the kernels of references, whose cost is not measured.
+        Device of the references, whose cost is not measured.
     quiet
-        Whether no progress is shown.
+        Whether to hide the progress.
 
     Returns
     -------
@@ -97,20 +97,20 @@ def bench(
     InputError
         The scene, the settings, or a folder that holds another bench.
     SettingsError
-        A measure that was asked for can't be had here, or no configuration can be rendered.
+        A requested measure is not available, or no configuration can be rendered.
     """
     job.check()
     names, left_out = available(measures, job)
     reasons = {family: why for family in FAMILIES if (why := why_missing(family))}
     missing = reasons.keys() & {c.family for c in configurations}
     left_out += [f"{FAMILIES[family]} is left out: {reasons[family]}" for family in sorted(missing)]
-    able = [c for c in configurations if c.family not in reasons]
-    if not able:
+    available_configurations = [c for c in configurations if c.family not in reasons]
+    if not available_configurations:
         raise SettingsError(f"no configuration can be rendered: {'; '.join(left_out)}")
-    of = _Bench(job, folder, names, quiet=quiet)
-    filters = dict.fromkeys(c.pixel_filter for c in able)
-    references = {kind.value: of.reference(kind, reference_spp, reference_device) for kind in filters}
-    rows = [of.row(configuration) for configuration in able]
+    runs = _Bench(job, folder, names, quiet=quiet)
+    filters = dict.fromkeys(c.pixel_filter for c in available_configurations)
+    references = {kind.value: runs.reference(kind, reference_spp, reference_device) for kind in filters}
+    rows = [runs.row(configuration) for configuration in available_configurations]
     found = {
         **origin(),
         "machine": machine(),
@@ -124,7 +124,7 @@ def bench(
         "reference": {
             "spp": reference_spp,
             "filters": references,
-            "noise_floor": of.noise_floor(able, reference_spp),
+            "noise_floor": runs.noise_floor(available_configurations, reference_spp),
         },
         "measures": {
             name: {key: getattr(SCALES[name], key) for key in ("title", "unit", "is_more_better")}
@@ -139,11 +139,11 @@ def bench(
 
 
 def forecast_s(job: Job, configurations: Sequence[Configuration], reference_spp: int, cores: int) -> float:
-    """Rough duration of a bench from its beginning on CPUs, wall seconds: by its paths alone."""
+    """Rough duration of a whole bench on CPUs, wall seconds, from its number of paths."""
     pixels = job.path.width * job.path.height * len(job.path)
     filters = len({c.pixel_filter for c in configurations})
-    own = (c.spp for c in configurations if c.family in ("traced", "denoised"))
-    return pixels * (reference_spp * filters + sum(own)) / PATHS_PER_CPU_S / cores
+    spps = (c.spp for c in configurations if c.family in ("traced", "denoised"))
+    return pixels * (reference_spp * filters + sum(spps)) / PATHS_PER_CPU_S / cores
 
 
 class _Bench:
@@ -153,7 +153,7 @@ class _Bench:
         self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
 
     def reference(self, pixel_filter: SampleFilter, spp: int, device: Choice) -> dict[str, Any]:
-        """Render a reference, with random numbers of its own: its cost and the renderer's variant."""
+        """Render a reference with independent random numbers; return its cost and the renderer's variant."""
         seed = (self._job.settings[TraceSettings].seed + 1) % 2**32
         settings = (
             self._job.settings.replace(TraceSettings, seed=seed)
@@ -167,7 +167,7 @@ class _Bench:
         return {**_cost(run, UNCHARGED), "variant": run.identity["scene"]["variant"]}
 
     def row(self, one: Configuration) -> dict[str, Any]:
-        """Render and measure a configuration: its row of the result."""
+        """Render and measure a configuration; return its row of the result."""
         folder = self._run(one)
         _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
         return {
@@ -176,7 +176,7 @@ class _Bench:
             "spp": one.spp,
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
-            "cost": _cost(RunFolder.read(folder), RIVALS_UNCHARGED if one.is_rival else UNCHARGED),
+            "cost": _cost(RunFolder.read(folder), BASELINES_UNCHARGED if one.is_baseline else UNCHARGED),
             "scores": self._scores(one.name, folder, self._reference(one.pixel_filter)),
         }
 
@@ -185,33 +185,33 @@ class _Bench:
     ) -> dict[str, float | None]:
         """Scores of a perfect configuration: all of its error is the noise of the reference.
 
-        A path-traced configuration of N paths and the reference of R differ by noise whose variance is 1/N +
-        1/R of a path's; a perfect configuration differs from the reference by 1/R of it.
+        A path-traced configuration of N paths and a reference of R paths differ by noise of 1/N + 1/R of the
+        variance of a path; a perfect configuration differs from the reference by 1/R of it.
         """
         traced = [c for c in configurations if c.family == "traced"]
         if not traced:
             return {}
         one = max(traced, key=lambda c: c.spp)
-        share = (1.0 + reference_spp / one.spp) ** -0.5
-        return self._scores("noise floor", self._run(one), self._reference(one.pixel_filter), share)
+        weight = (1.0 + reference_spp / one.spp) ** -0.5
+        return self._scores("noise floor", self._run(one), self._reference(one.pixel_filter), weight)
 
-    def _scores(self, name: str, test: Path, reference: Path, share: float = 1.0) -> dict[str, float | None]:
-        """Scores of a run folder by measure, from their file as far as it holds them."""
+    def _scores(self, name: str, test: Path, reference: Path, weight: float = 1.0) -> dict[str, float | None]:
+        """Scores of a run folder by measure; read from their file if they are there, else measured."""
         settings = self._job.settings
-        of = {
+        identity = {
             "runs": [RunFolder.read(folder).digest() for folder in (test, reference)],
-            "share": share,
+            "weight": weight,
             **settings.to_tables([ViewingSettings]),
             "metering": settings[MetricSettings].metering.value,
         }
         file = self._folder / "scores" / f"{name}.json"
         found: dict[str, Any] = read_json(file) if file.is_file() else {}
-        if found.get("of") != of:
-            found = {"of": of, "measures": {}}
+        if found.get("identity") != identity:
+            found = {"identity": identity, "measures": {}}
         if missing := [measure for measure in self._names if measure not in found["measures"]]:
             with watch(quiet=self._quiet) as monitor:
-                shown = Prefixed(monitor, name)
-                found["measures"] |= measure(test, reference, self._job, missing, shown, share=share)
+                prefixed = Prefixed(monitor, name)
+                found["measures"] |= measure(test, reference, self._job, missing, prefixed, weight=weight)
             write_json(file, found)
         return {measure: found["measures"][measure]["score"] for measure in self._names}
 
@@ -247,18 +247,18 @@ def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quie
 
 
 def _is_finished(job: Job, folder: Path) -> bool:
-    """Whether a run folder holds the finished run of a job, on whatever device."""
+    """Whether a run folder holds the finished run of a job, on any device."""
     if not (folder / "summary.json").is_file():
         return False
-    wanted, there = json.loads(json.dumps(job.identity())), RunFolder.read(folder).identity
-    return bool({**wanted, "renderer": None} == {**there, "renderer": None})
+    wanted, existing = json.loads(json.dumps(job.identity())), RunFolder.read(folder).identity
+    return bool({**wanted, "renderer": None} == {**existing, "renderer": None})
 
 
 def _render(job: Job, folder: Path, *, is_warm: bool, quiet: bool) -> None:
-    """Compile the kernels, then render; the function of the new process."""
+    """Compile the kernels, then render; runs in the new process."""
     if is_warm:
-        with tempfile.TemporaryDirectory(prefix="enfilade-") as place:
-            render(_excerpt(job), Path(place) / "run", Silence())
+        with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
+            render(_excerpt(job), Path(scratch) / "run", Silence())
     with watch(quiet=quiet) as monitor:
         render(job, folder, Prefixed(monitor, folder.name))
 
@@ -268,7 +268,7 @@ def _excerpt(job: Job) -> Job:
     path = job.path
     count = min(WARM_FRAMES, len(path))
     frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
-    spp = min(job.settings[SamplingSettings].spp, SPP_PER_SUM)  # more make no other kernel
+    spp = min(job.settings[SamplingSettings].spp, SPP_PER_SUM)  # more need no other kernel
     cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
     settings = job.settings.replace(SamplingSettings, spp=spp)
     return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)

@@ -9,19 +9,24 @@ from typing import Any
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
-from studies.bench.ratios import OURS, Point, front
+from studies.bench.ratios import DECOUPLED, Point, front
 
 DPI = 130
 PANEL_IN = (5.6, 4.1)
-STYLES: dict[str, dict[str, Any]] = {  # by family: told apart by marker and line as well as by colour
-    "traced": {"color": "#7A7A7A", "marker": "o", "linestyle": "--", "label": "path tracing every frame"},
-    "denoised": {"color": ORANGE, "marker": "s", "linestyle": "-.", "label": "the same, Open Image Denoise"},
+STYLES: dict[str, dict[str, Any]] = {  # by family; they differ in marker and line, too
+    "traced": {"color": "#7A7A7A", "marker": "o", "linestyle": "--", "label": "path tracing"},
+    "denoised": {
+        "color": ORANGE,
+        "marker": "s",
+        "linestyle": "-.",
+        "label": "path tracing, Open Image Denoise",
+    },
     "interpolated": {"color": VERMILION, "marker": "X", "linestyle": "none", "label": "minterpolate"},
     "paper": {"color": GREEN, "marker": "^", "linestyle": ":", "label": "enfilade, paper (2000)"},
     "decoupled": {"color": BLUE, "marker": "D", "linestyle": "-", "label": "enfilade, decoupled"},
 }
-BELOW = ("traced", "denoised")  # families whose labels stand below their points
-LABELLED = ("", "high")  # variants that are labelled: the others lie beside them
+BELOW = ("traced", "denoised")  # families whose labels are below their points
+LABELLED = ("", "high")  # variants with labels; the others are close to them
 TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 
 
@@ -83,26 +88,26 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str, of: Mapping[str, Any]) 
 
 
 def _curve(ax: Any, points: Sequence[tuple[Point, Any]], family: str, sign: float) -> None:
-    """A curve through the configurations that no cheaper one of the family beats; the others open."""
-    style, is_ours = STYLES[family], family == OURS
+    """Draw a curve through the Pareto front of a family; other configurations are open marks."""
+    style, is_decoupled = STYLES[family], family == DECOUPLED
     best = front([point for point, _ in points])
-    look = {"color": style["color"], "marker": style["marker"], "markersize": 8 if is_ours else 6.5}
+    look = {"color": style["color"], "marker": style["marker"], "markersize": 8 if is_decoupled else 6.5}
     ax.plot(
         [p.cpu_s for p in best],
         [sign * p.error for p in best],
         **(look | {"linestyle": style["linestyle"], "label": style["label"]}),
-        linewidth=2.6 if is_ours else 1.5,
+        linewidth=2.6 if is_decoupled else 1.5,
         markeredgecolor="white",
         markeredgewidth=0.8,
-        zorder=4 if is_ours else 3,
+        zorder=4 if is_decoupled else 3,
     )
     is_below = family in BELOW
     for point, of in points:
-        place = point.cpu_s, sign * point.error
+        position = point.cpu_s, sign * point.error
         if point not in best:
-            ax.plot(*place, **look, linestyle="none", markerfacecolor="white", zorder=3)
+            ax.plot(*position, **look, linestyle="none", markerfacecolor="white", zorder=3)
         if of["variant"] in LABELLED:
-            label = of["name"].rpartition("-")[2] if family in (OURS, "paper") else str(of["spp"])
+            label = of["name"].rpartition("-")[2] if family in (DECOUPLED, "paper") else str(of["spp"])
             text = {"ha": "center", "va": "top" if is_below else "bottom", "fontsize": 7, "zorder": 5}
             offset = {"xytext": (0, -7 if is_below else 7), "textcoords": "offset points"}
-            ax.annotate(label, place, color=style["color"], **text, **offset)
+            ax.annotate(label, position, color=style["color"], **text, **offset)

@@ -1,4 +1,4 @@
-"""``python -m studies bench``: our methods and their rivals on one path tracer, quality over CPU time."""
+"""``python -m studies bench``: quality over CPU time of enfilade's methods and of baselines."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     """Numbers of paths, written ``4,16,64``; ``none`` for no configuration."""
     parts = [] if text.strip() == "none" else [part.strip() for part in text.split(",")]
     if not all(part.isascii() and part.isdigit() and 0 < int(part) < 2**20 for part in parts):
-        raise click.BadParameter(f"{text!r} is no list of numbers of paths; write it like 4,16,64")
+        raise click.BadParameter(f"{text!r} is not a list of numbers of paths; write it like 4,16,64")
     return tuple(map(int, parts))
 
 
-@click.command("bench", short_help="Our methods and their rivals: quality over CPU time.")
+@click.command("bench", short_help="Quality over CPU time of enfilade and baselines.")
 @path_options
 @click.option(
     "--spp",
@@ -34,7 +34,7 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     metavar="N,N,...",
     default="4,16,64,256",
     show_default=True,
-    help="Paths a pixel of path tracing every frame; none leaves it out.",
+    help="Paths a pixel of the path-traced configurations; none: leave them out.",
 )
 @click.option(
     "--denoised-spp",
@@ -43,7 +43,7 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     metavar="N,N,...",
     default="1,2,4,8,16,32",
     show_default=True,
-    help="Paths a pixel of path tracing and denoising every frame; none leaves it out.",
+    help="Paths a pixel of the denoised configurations; none: leave them out.",
 )
 @click.option(
     "--reference-spp",
@@ -52,14 +52,19 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     show_default=True,
     help="Paths a pixel of the references.",
 )
-@click.option("--only", metavar="NAME", multiple=True, help="Only these, such as 'decoupled-*'; repeatable.")
-@click.option("--measure", "measures", metavar="NAME", multiple=True, help="Only these measures; repeatable.")
+@click.option(
+    "--only",
+    metavar="NAME",
+    multiple=True,
+    help="Only configurations of this name, such as 'decoupled-*'; repeatable.",
+)
+@click.option("--measure", "measures", metavar="NAME", multiple=True, help="Only this measure; repeatable.")
 @click.option(
     "--out",
     "folder",
     type=click.Path(path_type=Path),
     required=True,
-    help="The bench's folder; the same command continues.",
+    help="Folder of the bench; the same command continues.",
 )
 @click.option(
     "--reference-device",
@@ -85,27 +90,27 @@ def command(
     as_json: bool,
     **inputs: Any,
 ) -> None:
-    """Compare our methods with their rivals on SCENE (Mitsuba 3 XML), all on one path tracer.
+    """Compare enfilade's methods with baselines on SCENE (Mitsuba 3 XML), all on one path tracer.
 
-    Path tracing of every frame, the same denoised by Open Image Denoise, FFmpeg's minterpolate, the paper's
-    method and ours, each at several settings, each in a process of its own, each against a reference of the
-    same pixel filter, by several measures. Written are bench.json, bench.png (quality over CPU time) and
-    crops.png.
+    The configurations are path tracing, path tracing denoised by Open Image Denoise, keyframes interpolated
+    by FFmpeg's minterpolate, and the methods paper and decoupled, each at several settings. Each runs in its
+    own process and is compared with a reference of the same pixel filter by several measures. The command
+    writes bench.json, bench.png (quality over CPU time) and crops.png.
     """
     mark_resumable(ctx)
     activate("cpu")
     from studies.bench.bench import bench, forecast_s
     from studies.bench.charts import plot_bench
-    from studies.bench.configurations import chosen, lineup
+    from studies.bench.configurations import all_configurations, selected
     from studies.bench.pictures import plot_crops
 
     path = {name: inputs.pop(name) for name in ("path_file", "size", "frames", "fps")}
     job = _job(ctx, scene, **path)
-    configurations = chosen(lineup(job, traced=traced, denoised=denoised), only)
+    configurations = selected(all_configurations(job, traced=traced, denoised=denoised), only)
     if not inputs["quiet"]:
         seconds = forecast_s(job, configurations, inputs["reference_spp"], len(os.sched_getaffinity(0)))
-        many = f"{len(configurations)} configurations"
-        click.echo(f"{many}; some {seconds / 60.0:.0f} minutes of path tracing from the beginning", err=True)
+        count = f"{len(configurations)} configurations"
+        click.echo(f"{count}, about {seconds / 60.0:.0f} minutes of path tracing in total", err=True)
     found = bench(job, configurations, folder, **inputs)
     plots = [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png")]
     if as_json:
@@ -117,7 +122,7 @@ def command(
 
 
 def _job(ctx: click.Context, scene: Path, *, path_file: Path, size: Any, frames: str | None, fps: Any) -> Job:
-    """Scene, path, and settings of all sections: each configuration reads some of them."""
+    """Scene, path, and settings of all sections; each configuration reads some of them."""
     from enfilade.camera import load_path, parse_frames
     from enfilade.runs.job import Job
     from enfilade.scene.opener import Scene

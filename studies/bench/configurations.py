@@ -1,4 +1,4 @@
-"""Configurations of a bench: the rivals at several spp, and our methods at several settings."""
+"""Configurations of a bench: baselines at several spp, and enfilade's methods at several settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from enfilade.errors import SettingsError
 from enfilade.runs.job import Job
 from enfilade.settings import OutputSettings, ReferenceSettings, SampleFilter, SamplingSettings, Settings
-from studies.bench.rivals import QUALITIES, DenoiserSettings
+from studies.bench.baselines import QUALITIES, DenoiserSettings
 
 FAMILIES = {  # in the order of tables: title
     "traced": "path tracing",
@@ -19,12 +19,12 @@ FAMILIES = {  # in the order of tables: title
     "paper": "paper",
     "decoupled": "decoupled",
 }
-RIVALS = {
+BASELINES = {
     "traced": "reference",
-    "denoised": "studies.bench.rivals:Denoised",
-    "interpolated": "studies.bench.rivals:Interpolated",
+    "denoised": "studies.bench.baselines:Denoised",
+    "interpolated": "studies.bench.baselines:Interpolated",
 }
-PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of our methods: tables that differ
+PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's methods: settings that differ
     **{f"paper-{spp}": ("paper", {"sampling": {"spp": spp}}) for spp in (16, 64)},
     **{
         f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
@@ -40,12 +40,12 @@ class Configuration:
     Attributes
     ----------
     name : str
-        Also of its run folder.
+        Name, also of the run folder.
     family : str
-        One of :data:`FAMILIES`: its configurations make one curve.
+        One of :data:`FAMILIES`; its configurations form one curve.
     job : Job
     variant : str
-        Distinguishes it from another of its family with as many spp: the denoiser's quality.
+        Quality of the denoiser, which distinguishes configurations of equal spp.
     """
 
     name: str
@@ -54,42 +54,42 @@ class Configuration:
     variant: str = ""
 
     @property
-    def is_rival(self) -> bool:
-        """Whether it is not one of our methods."""
-        return self.family in RIVALS
+    def is_baseline(self) -> bool:
+        """Whether it is a baseline, instead of one of enfilade's methods."""
+        return self.family in BASELINES
 
     @property
     def spp(self) -> int:
-        """Paths traced for a pixel, where the method traces whole pixels."""
+        """Paths a pixel, for methods that trace whole pixels."""
         return self.job.settings[SamplingSettings].spp
 
     @property
     def pixel_filter(self) -> SampleFilter:
-        """That of its reference."""
+        """Pixel filter of its reference."""
         return SampleFilter.BOX if self.family == "denoised" else SampleFilter.GAUSSIAN
 
 
-def lineup(job: Job, *, traced: Iterable[int], denoised: Iterable[int]) -> list[Configuration]:
-    """All configurations: rivals at the given spp, and our presets, which differ from the job's settings.
+def all_configurations(job: Job, *, traced: Iterable[int], denoised: Iterable[int]) -> list[Configuration]:
+    """All configurations: baselines at the given spp, and the presets applied to the job's settings.
 
     Interpolated keyframes have the largest spp of `traced`.
     """
     spps = sorted(set(traced))
-    found = [_rival("traced", f"traced-{n}", job, n) for n in spps]
+    found = [_baseline("traced", f"traced-{n}", job, n) for n in spps]
     for n in sorted(set(denoised)):
         for quality in QUALITIES:
             name = f"denoised-{n}" if quality == QUALITIES[0] else f"denoised-{n}-{quality}"
-            found.append(_rival("denoised", name, job, n, quality))
+            found.append(_baseline("denoised", name, job, n, quality))
     if spps:
-        found.append(_rival("interpolated", f"minterpolate-{spps[-1]}", job, spps[-1]))
+        found.append(_baseline("interpolated", f"minterpolate-{spps[-1]}", job, spps[-1]))
     for name, (method, tables) in PRESETS.items():
-        ours = replace(job, method=method, settings=_overridden(job.settings, tables))
-        found.append(Configuration(name, method, ours))
+        preset = replace(job, method=method, settings=_overridden(job.settings, tables))
+        found.append(Configuration(name, method, preset))
     return found
 
 
-def chosen(configurations: Sequence[Configuration], patterns: Sequence[str]) -> list[Configuration]:
-    """Those whose names match a pattern, such as ``decoupled-*``; all without patterns."""
+def selected(configurations: Sequence[Configuration], patterns: Sequence[str]) -> list[Configuration]:
+    """Configurations whose names match a pattern, such as ``decoupled-*``; all without patterns."""
     for pattern in patterns:
         if not any(fnmatch.fnmatchcase(c.name, pattern) for c in configurations):
             names = ", ".join(c.name for c in configurations)
@@ -99,12 +99,12 @@ def chosen(configurations: Sequence[Configuration], patterns: Sequence[str]) -> 
     ]
 
 
-def _rival(family: str, name: str, job: Job, spp: int, quality: str = "") -> Configuration:
+def _baseline(family: str, name: str, job: Job, spp: int, quality: str = "") -> Configuration:
     settings = job.settings.replace(SamplingSettings, spp=spp).replace(OutputSettings, layers="none")
     if family == "denoised":
         settings = settings.replace(ReferenceSettings, pixel_filter=SampleFilter.BOX)
         settings = settings.replace(DenoiserSettings, quality=quality)
-    return Configuration(name, family, replace(job, method=RIVALS[family], settings=settings), quality)
+    return Configuration(name, family, replace(job, method=BASELINES[family], settings=settings), quality)
 
 
 def _overridden(settings: Settings, tables: Mapping[str, Mapping[str, Any]]) -> Settings:

@@ -1,4 +1,4 @@
-"""Guides of a denoiser without noise: albedo and normal of each pixel, followed through mirrors and glass."""
+"""Noise-free guides of a denoiser: albedo and normal of each pixel, traced through mirrors and glass."""
 
 from __future__ import annotations
 
@@ -17,45 +17,47 @@ from enfilade.records import F32, SPECULAR, SurfaceClass
 from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
 SIDE = 4  # strata along each side of a pixel: 16 rays
-BOUNCES = 6  # off mirrors and through glass, before a path ends
+BOUNCES = 6  # reflections and transmissions, before a path ends
 SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
 
 def guides(renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: int) -> tuple[F32, F32]:
-    """Find the guides of an image, with a box filter.
+    """Albedo and normal of an image, through a box filter.
 
     Parameters
     ----------
     renderer
-        A :class:`LobeRenderer` is followed through mirrors and glass, as Open Image Denoise recommends; of
-        another renderer, the first surface counts.
+        With a :class:`LobeRenderer` rays continue through mirrors and glass, as Open Image Denoise
+        recommends; with others they end at the first surface.
     camera
     seed, frame
         Of the random numbers.
     chunk
-        Rays in flight; it changes no result.
+        Rays in flight; no result depends on it.
 
     Returns
     -------
     albedo : (H, W, 3) float32
-        Diffuse reflectance plus, on glossy surfaces, that of the lobe, times the throughput of mirrors and
-        glass in front. 0..1; 0 where nothing is hit.
+        Diffuse reflectance, plus that of the lobe on glossy surfaces, times the throughput of mirrors and
+        glass in front; 0 to 1, 0 where nothing is hit.
     normal : (H, W, 3) float32
-        Of the surface where the path ends, in the world, not of unit length where several meet.
+        World-space normal of the surface where the path ends, averaged over the pixel (not normalized).
     """
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     step = max(chunk // SIDE**2, 1)
     random = RandomKey(seed, frame, Purpose.GUIDE)
-    parts = [_of_pixels(renderer, camera, pixels[i : i + step], random) for i in range(0, len(pixels), step)]
-    found = np.concatenate(parts, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
+    batches = [
+        _pixel_guides(renderer, camera, pixels[i : i + step], random) for i in range(0, len(pixels), step)
+    ]
+    found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
     albedo = np.clip(found[..., :3], 0.0, 1.0)
     return np.ascontiguousarray(albedo), np.ascontiguousarray(found[..., 3:])
 
 
-def _of_pixels(
+def _pixel_guides(
     renderer: Renderer, camera: Camera, pixels: npt.NDArray[np.uint32], random: RandomKey
 ) -> npt.NDArray[np.float32]:
-    # Send one ray in each of the strata of each pixel, neighbouring lanes.
+    # Trace one ray for each stratum of each pixel, in neighbouring lanes.
     count = SIDE * SIDE
     lane = dr.arange(UInt, len(pixels) * count)
     slot = lane // count
@@ -66,16 +68,16 @@ def _of_pixels(
     inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
     at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE
     direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    albedo, normal = _followed(renderer, Rays(vector3(camera.eye), direction), rng)
+    albedo, normal = _trace_guides(renderer, Rays(vector3(camera.eye), direction), rng)
 
-    # Average them.
+    # Average over the strata.
     dr.eval(albedo, normal)
     sums = [np.array(dr.block_sum(v, count)) for v in (*albedo, *normal)]
     return np.asarray(np.stack(sums) / count, np.float32)
 
 
-def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
-    """Albedo and normal at the end of each path."""
+def _trace_guides(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
+    """Trace paths through sharp surfaces; albedo and normal at the end of each."""
     # Find the first surface.
     hit = renderer.surfaces(rays)
     albedo, normal = _guides_of(hit)
@@ -91,33 +93,33 @@ def _followed(renderer: Renderer, rays: Rays, rng: Any) -> tuple[Any, Any]:
         sample = renderer.sample_specular(point, rng)
         throughput = dr.select(sample.is_alive, throughput * sample.throughput, 0)
 
-        # Add the reflectance of lobes that are not sharp, which end their paths.
+        # End paths at lobes that are not sharp, with their reflectance.
         is_sharp = sample.is_alive & _is_one_of(point.surfaces, SHARP) & (bounce < BOUNCES - 1)
         _add(albedo, lane, dr.select(is_sharp, 0, throughput))
         dr.eval(sample.rays, throughput, is_sharp, rng)
-        going: Any = dr.compress(is_sharp)
-        if len(going) == 0:
+        active: Any = dr.compress(is_sharp)
+        if len(active) == 0:
             break
-        lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
-        rays, throughput = dr.gather(Rays, sample.rays, going), dr.gather(Array3f, throughput, going)
+        lane, rng = dr.gather(UInt, lane, active), dr.gather(PCG32, rng, active)
+        rays, throughput = dr.gather(Rays, sample.rays, active), dr.gather(Array3f, throughput, active)
 
-        # Find the surface behind sharp ones, in a number of lanes that suits recorded kernels.
+        # Find the next surface, with lanes padded to the size of a recorded kernel.
         every = dr.arange(UInt, len(lane))
-        more, _ = padded(every)
-        hit = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, more)), every)
-        behind, turned = _guides_of(hit)
+        padded_lanes, _ = padded(every)
+        hit = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, padded_lanes)), every)
+        next_albedo, next_normal = _guides_of(hit)
         is_specular = _is_one_of(hit, SPECULAR)
-        _add(albedo, lane, throughput * behind)
-        for target, value in zip(normal, turned, strict=True):
+        _add(albedo, lane, throughput * next_albedo)
+        for target, value in zip(normal, next_normal, strict=True):
             dr.scatter(target, value, lane)
 
         # Continue paths at specular surfaces.
         dr.eval(normal, is_specular, rays, throughput, rng)
-        going = dr.compress(is_specular)
-        if len(going) == 0:
+        active = dr.compress(is_specular)
+        if len(active) == 0:
             break
-        lane, rng = dr.gather(UInt, lane, going), dr.gather(PCG32, rng, going)
-        rays, throughput = dr.gather(Rays, rays, going), dr.gather(Array3f, throughput, going)
+        lane, rng = dr.gather(UInt, lane, active), dr.gather(PCG32, rng, active)
+        rays, throughput = dr.gather(Rays, rays, active), dr.gather(Array3f, throughput, active)
     return albedo, normal
 
 

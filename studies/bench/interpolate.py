@@ -18,9 +18,7 @@ from enfilade.records import F32
 __all__ = ["interpolate", "why_no_interpolation"]
 
 FILTER = "minterpolate"
-OPTIONS = (
-    "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # the best: overlapped blocks of any size
-)
+OPTIONS = "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # best quality
 PIXELS = "yuv444p"  # the filter supports 8 bits only
 MARGIN = 4  # repeats of the first and the last frame: the filter uses two frames on either side
 
@@ -38,13 +36,13 @@ def interpolate(keyframes: Mapping[int, F32], fps: Fraction) -> Iterator[tuple[i
     Yields
     ------
     int, (H, W, 3) float32
-        Number and image of each frame from the first keyframe to the last, keyframes included; all of
-        them rounded to 8 bits, the format of FFmpeg's filter.
+        Number and image of each frame from the first keyframe to the last, keyframes included, rounded to
+        8 bits, the format of FFmpeg's filter.
 
     Raises
     ------
     SettingsError
-        This build of FFmpeg has no such filter.
+        FFmpeg was built without the filter.
     """
     if why := why_no_interpolation():
         raise SettingsError(why)
@@ -58,9 +56,9 @@ def interpolate(keyframes: Mapping[int, F32], fps: Fraction) -> Iterator[tuple[i
         picture = _picture(keyframes[number])
         picture.pts, picture.time_base = at - first + MARGIN, 1 / fps
         source.push(picture)
-        yield from _made(graph, first, last)
+        yield from _frames(graph, first, last)
     source.push(None)
-    yield from _made(graph, first, last)
+    yield from _frames(graph, first, last)
 
 
 def why_no_interpolation() -> str:
@@ -73,15 +71,15 @@ def why_no_interpolation() -> str:
 def _graph(width: int, height: int, fps: Fraction) -> tuple[Any, Any]:
     graph = av.filter.Graph()
     source = graph.add_buffer(width=width, height=height, format=PIXELS, time_base=1 / fps)
-    between = graph.add(FILTER, f"fps={fps.numerator}/{fps.denominator}:{OPTIONS}")
+    interpolator = graph.add(FILTER, f"fps={fps.numerator}/{fps.denominator}:{OPTIONS}")
     sink = graph.add("buffersink")
-    source.link_to(between)
-    between.link_to(sink)
+    source.link_to(interpolator)
+    interpolator.link_to(sink)
     graph.configure()
     return graph, source
 
 
-def _made(graph: Any, first: int, last: int) -> Iterator[tuple[int, F32]]:
+def _frames(graph: Any, first: int, last: int) -> Iterator[tuple[int, F32]]:
     while True:
         try:
             picture = graph.pull()

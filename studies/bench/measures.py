@@ -1,4 +1,4 @@
-"""Measures of the bench: those of ``enfilade compare``, the AQM, and the temporal error."""
+"""Measures of the bench: the measures of ``enfilade compare``, the AQM, and the temporal error."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class TrackedPair(DisplayedPair):
     flow : Flow
         Motion vectors of the reference.
     visible_before : (H, W) bool or None
-        Where the last frame shows the same surface, `flow.backward` away; None where this frame begins a
-        shot.
+        Pixels whose surface the previous frame shows, at the end of `flow.backward`; None in the first
+        frame of a shot.
     """
 
     flow: Flow
@@ -41,11 +41,11 @@ class Measure(Protocol):
     """A :class:`enfilade.comparison.measures.Measure` that may use motion."""
 
     def measure(self, pair: TrackedPair) -> float | None:
-        """Measure the next frame; None where it has no value of its own."""
+        """Measure the next frame; None where the measure is undefined."""
         ...
 
     def pool(self, values: Sequence[float | None]) -> float:
-        """The result for the sequence, from the values of its frames."""
+        """Result for the sequence, from the values of its frames."""
         ...
 
 
@@ -85,69 +85,70 @@ class AqmMeasure:
 
 
 class Temporal:
-    """RMS change of the error since the last frame, followed along the surfaces.
+    """RMS change of the error since the previous frame, along the motion vectors.
 
-    With e_t = test - reference, sRGB-encoded, and the backward flow b_t of the reference, a frame's value is
-    the root of the mean of |e_t(x) - e_{t-1}(x + b_t(x))|^2 over channels and over the pixels whose
-    surface both frames see. An error that stays on its surface counts nothing, noise that is drawn afresh
-    counts sqrt(2) times its own size. It is the warping error of Lai et al. (2018, "Learning blind video
-    temporal consistency"), of the error rather than of the image, so that what the reference does by itself
-    (highlights that wander) is no fault.
+    With e_t = test - reference, sRGB-encoded, and the backward motion vectors b_t of the reference, a frame's
+    value is the root of the mean of |e_t(x) - e_{t-1}(x + b_t(x))|^2 over channels and over the pixels whose
+    surface both frames show. An error that stays on its surface has 0; independent noise has sqrt(2) times
+    its deviation. This is the warping error of Lai et al. (2018, "Learning blind video temporal
+    consistency"), applied to the error instead of the image, so that changes of the reference (moving
+    highlights) are no error.
 
-    The last error is read between its pixels by bilinear taps, which smooth fine noise somewhat and so
-    flatter those whose errors are noise.
+    The previous error is interpolated bilinearly, which smooths fine noise and slightly favours noisy
+    configurations.
     """
 
     SCALE = Scale("temporal", "temporal", "RMS")
     name = SCALE.name
 
     def __init__(self) -> None:
-        self._before: F32 | None = None
+        self._previous: F32 | None = None
 
     def measure(self, pair: TrackedPair) -> float | None:
-        """Change of the error; None where a shot begins, or no surface is in both frames."""
+        """Change of the error; None in the first frame of a shot, or where no surface is in both frames."""
         error = pair.test - pair.reference
-        before, self._before = self._before, error
-        if before is None or pair.visible_before is None or not pair.visible_before.any():
+        previous, self._previous = self._previous, error
+        if previous is None or pair.visible_before is None or not pair.visible_before.any():
             return None
-        change = (error - _read(before, pair.flow.backward))[pair.visible_before]
+        change = (error - _bilinear(previous, pair.flow.backward))[pair.visible_before]
         return math.sqrt(float(np.mean(np.square(change, dtype=np.float64))))
 
     def pool(self, values: Sequence[float | None]) -> float:
-        """Root of the mean over frames of the squares; 0 where no frame has one before it."""
+        """RMS over frames; 0 where no frame has a previous one."""
         known = [value for value in values if value is not None]
         return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
 
 
-def visible_before(layers: Mapping[str, npt.NDArray[Any]], last: Mapping[str, npt.NDArray[Any]]) -> Mask:
-    """Pixels whose surface the last frame shows, too.
+def visible_before(layers: Mapping[str, npt.NDArray[Any]], previous: Mapping[str, npt.NDArray[Any]]) -> Mask:
+    """Pixels whose surface the previous frame shows, too.
 
     Parameters
     ----------
-    layers, last
-        AOVs ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the one
-        before it in the same shot.
+    layers, previous
+        AOVs ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the previous
+        one of the same shot.
 
     Returns
     -------
     (H, W) bool
-        True where the flow leads to a pixel that shows the same shape on the same plane (or nothing, where
-        nothing is hit).
+        True where the motion vector ends at a pixel of the same shape on the same plane, or at the
+        background, where nothing is hit.
     """
     backward = layers["backward"].astype(np.float32)
     height, width = backward.shape[:2]
     column = np.arange(width) + backward[..., 0]
     row = np.arange(height)[:, None] + backward[..., 1]
-    inside = (column > -0.5) & (column < width - 0.5) & (row > -0.5) & (row < height - 0.5)
-    at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0).astype(int)
-    step = last[POSITION][at] - layers[POSITION]
-    off_plane = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
-    same: Mask = inside & (last[SHAPE][at] == layers[SHAPE]) & (off_plane <= PLANE_TOLERANCE * layers[DEPTH])
-    return same
+    is_inside = (column > -0.5) & (column < width - 0.5) & (row > -0.5) & (row < height - 0.5)
+    at = np.where(is_inside, np.rint(row), 0).astype(int), np.where(is_inside, np.rint(column), 0).astype(int)
+    step = previous[POSITION][at] - layers[POSITION]
+    plane_distance = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
+    is_same_shape = previous[SHAPE][at] == layers[SHAPE]
+    is_visible: Mask = is_inside & is_same_shape & (plane_distance <= PLANE_TOLERANCE * layers[DEPTH])
+    return is_visible
 
 
-def _read(image: F32, flow: F32) -> F32:
-    """Values of an image where the flow leads from each pixel: bilinear, held at the borders."""
+def _bilinear(image: F32, flow: F32) -> F32:
+    """Values of an image at the ends of the motion vectors: bilinear, clamped at the borders."""
     height, width = image.shape[:2]
     x = np.clip(np.arange(width) + flow[..., 0], 0.0, width - 1.0)
     y = np.clip(np.arange(height)[:, None] + flow[..., 1], 0.0, height - 1.0)

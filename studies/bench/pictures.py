@@ -23,39 +23,39 @@ AMPLIFICATION = 4.0  # of differences
 CROP_PX = 72  # side of a crop
 CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 SHOWN_FRAMES = 3
-SHOWN_OF_FAMILY = 3  # configurations: cheapest, middle, dearest
+SHOWN_OF_FAMILY = 3  # configurations: cheapest, median, most expensive
 
 
 class Frames:
-    """Frames of a bench as the screen shows them: after exposure and clipping, encoded."""
+    """Frames of a bench as displayed: exposed, clipped and encoded as sRGB."""
 
     def __init__(self, found: Mapping[str, Any], folder: Path) -> None:
         self._scale = np.float32(2.0 ** found["exposure_ev"])
         self._folder = folder
         self.configurations = {of["name"]: of for of in found["configurations"]}
 
-    def shown(self, place: str, number: int) -> F32:
+    def displayed(self, folder: str, number: int) -> F32:
         """A frame of a run folder of the bench, such as ``references/box``."""
-        file = RunFolder.read(self._folder / place).file_of(FRAMES, number)
+        file = RunFolder.read(self._folder / folder).file_of(FRAMES, number)
         linear = read_exr(file)["RGB"].astype(np.float32)
         return srgb_encode(np.clip(linear * self._scale, 0.0, 1.0)).astype(np.float32)
 
     def of(self, name: str, number: int) -> F32:
         """A frame of a configuration."""
-        return self.shown(f"configurations/{name}", number)
+        return self.displayed(f"configurations/{name}", number)
 
     def reference(self, name: str, number: int) -> F32:
-        """The same frame of its reference."""
-        return self.shown(f"references/{self.configurations[name]['pixel_filter']}", number)
+        """The same frame of the configuration's reference."""
+        return self.displayed(f"references/{self.configurations[name]['pixel_filter']}", number)
 
     def selected(self) -> list[str]:
-        """Names of a few configurations of each family, by cost as they are listed."""
+        """Names of a few configurations of each family, in the order of the bench."""
         chosen: dict[str, None] = {}
         for family in STYLES:
             names = [name for name, of in self.configurations.items() if of["family"] == family]
             count = min(SHOWN_OF_FAMILY, len(names))
-            places = [round(i * (len(names) - 1) / max(count - 1, 1)) for i in range(count)]
-            chosen |= dict.fromkeys(names[place] for place in places)
+            indices = [round(i * (len(names) - 1) / max(count - 1, 1)) for i in range(count)]
+            chosen |= dict.fromkeys(names[index] for index in indices)
         return list(chosen)
 
 

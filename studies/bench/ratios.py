@@ -1,4 +1,4 @@
-"""CPU time at equal quality, by measure, against each rival."""
+"""CPU time at equal quality, by measure, against each baseline."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from studies.bench.measures import SCALES
 
-OURS = "decoupled"  # the family that is compared with the others
-AQM_MARGIN_JND = 0.1  # by which ours may be worse than path tracing: no visible difference
+DECOUPLED = "decoupled"  # the family that is compared with all others
+AQM_MARGIN_JND = 0.1  # by which decoupled may be worse than path tracing: not a visible difference
 LEVELS = 16  # of quality, evenly spaced on a logarithmic axis, over which a ratio is averaged
 MIN_ERROR = 1e-9  # for logarithms: below it sequences are identical
 
@@ -27,18 +27,18 @@ class Point:
 
 @dataclass(frozen=True)
 class Ratio:
-    """CPU time of theirs over that of ours.
+    """CPU time of a baseline over that of decoupled.
 
     Attributes
     ----------
     times : float
-        Above 1 where ours is faster; the geometric mean over the levels of quality that both reach.
+        Above 1 where decoupled is faster: geometric mean over the levels of quality that both reach.
     least : float
-        The smallest over those levels.
+        The smallest ratio over those levels.
     kind : {"equal", "at least", "at most"}
-        ``equal``: both were measured at these qualities. ``at least``: ours is better than theirs at every
-        cost: theirs at its dearest is taken, and would need more. ``at most``: theirs is better than ours at
-        every cost.
+        ``equal``: both reach these qualities. ``at least``: decoupled is better at every cost; the most
+        expensive configuration of the baseline is compared, which would need more time. ``at most``: the
+        baseline is better at every cost.
     """
 
     times: float
@@ -47,44 +47,49 @@ class Ratio:
 
 
 def ratios(configurations: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[str, Any]:
-    """Compare our curve with those of the rivals, by configurations as in ``bench.json``.
+    """Compare decoupled with the baselines, by configurations as in ``bench.json``.
 
     Returns
     -------
     dict
-        ``traced``: by rival and measure, :class:`Ratio` at the rival's own quality (for AQM 0.1 JND above its
-        score). ``denoised``: ``by_measure``, over all qualities that both reach, with the ``geometric_mean``
-        over the measures, its ``kind`` (None where the ratios are bounds both ways), and the ``least``.
-        ``paper``: by configuration, the names of ours that are better by every measure at less cost. Empty
-        where one side is missing.
+        ``traced``: by baseline and measure, :class:`Ratio` at the baseline's quality (for AQM 0.1 JND above
+        its score). ``denoised``: ``by_measure``, over all qualities that both reach, with the
+        ``geometric_mean`` over the measures, its ``kind`` (None where the ratios are bounds in both
+        directions), and the ``least``. ``paper``: by configuration, the names of decoupled configurations
+        that are better by every measure at less cost. Empty where one side is missing.
     """
-    ours, traced, denoised, paper = (
+    decoupled, traced, denoised, paper = (
         [c for c in configurations if c["family"] == family]
-        for family in (OURS, "traced", "denoised", "paper")
+        for family in (DECOUPLED, "traced", "denoised", "paper")
     )
-    if not ours:
+    if not decoupled:
         return {"traced": {}, "denoised": {}, "paper": {}}
-    curves = {measure: [_point(c, measure) for c in ours] for measure in measures}
+    curves = {measure: [_point(c, measure) for c in decoupled] for measure in measures}
     margins = {"aqm": AQM_MARGIN_JND}
     return {
         "traced": {
-            rival["name"]: {
-                m: asdict(ratio_at(_point(rival, m), curves[m], margin=margins.get(m, 0.0))) for m in measures
+            baseline["name"]: {
+                m: asdict(ratio_at(_point(baseline, m), curves[m], margin=margins.get(m, 0.0)))
+                for m in measures
             }
-            for rival in traced
+            for baseline in traced
         },
         "denoised": _denoised(denoised, curves),
         "paper": {
-            rival["name"]: [one["name"] for one in ours if _is_better(one, rival, measures)]
-            for rival in paper
+            baseline["name"]: [one["name"] for one in decoupled if _is_better(one, baseline, measures)]
+            for baseline in paper
         },
     }
 
 
-def _denoised(rivals: Sequence[Mapping[str, Any]], curves: Mapping[str, Sequence[Point]]) -> dict[str, Any]:
-    if not rivals:
+def _denoised(
+    baselines: Sequence[Mapping[str, Any]], curves: Mapping[str, Sequence[Point]]
+) -> dict[str, Any]:
+    if not baselines:
         return {}
-    found = {m: ratio_over([_point(rival, m) for rival in rivals], curve) for m, curve in curves.items()}
+    found = {
+        m: ratio_over([_point(baseline, m) for baseline in baselines], curve) for m, curve in curves.items()
+    }
     times = [ratio.times for ratio in found.values()]
     bounds = {ratio.kind for ratio in found.values()} - {"equal"}
     return {
@@ -95,9 +100,9 @@ def _denoised(rivals: Sequence[Mapping[str, Any]], curves: Mapping[str, Sequence
     }
 
 
-def _is_better(one: Mapping[str, Any], rival: Mapping[str, Any], measures: Sequence[str]) -> bool:
-    pairs = [(_point(one, measure), _point(rival, measure)) for measure in measures]
-    return all(mine.cpu_s < its.cpu_s and mine.error < its.error for mine, its in pairs)
+def _is_better(one: Mapping[str, Any], baseline: Mapping[str, Any], measures: Sequence[str]) -> bool:
+    pairs = [(_point(one, measure), _point(baseline, measure)) for measure in measures]
+    return all(point.cpu_s < other.cpu_s and point.error < other.error for point, other in pairs)
 
 
 def _point(configuration: Mapping[str, Any], measure: str) -> Point:
@@ -107,7 +112,7 @@ def _point(configuration: Mapping[str, Any], measure: str) -> Point:
 
 
 def front(points: Sequence[Point]) -> list[Point]:
-    """Points that no cheaper point beats, rising in cost and falling in error."""
+    """Pareto front of points, rising in cost and falling in error."""
     kept: list[Point] = []
     for point in sorted(points, key=lambda p: (p.cpu_s, p.error)):
         if not kept or point.error < kept[-1].error:
@@ -127,8 +132,8 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
     Returns
     -------
     float, str
-        The cost is ``equal``; ``at most`` that of the cheapest, which is better already; or ``at least`` that
-        of the best, which is not good enough.
+        The cost, and ``equal``; or the cost of the cheapest point, which is better, and ``at most``; or the
+        cost of the best point, which is worse, and ``at least``.
     """
     curve = front(points)
     cheapest, best = curve[0], curve[-1]
@@ -141,28 +146,31 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
     return float(math.exp(np.interp(_log(error), errors, costs))), "equal"
 
 
-def ratio_at(theirs: Point, ours: Sequence[Point], *, margin: float = 0.0) -> Ratio:
-    """The ratio at the quality of one rival; ours may be worse by a margin, in units of the error."""
-    cost, kind = cost_at(ours, theirs.error + margin)
-    times = theirs.cpu_s / cost
+def ratio_at(baseline: Point, decoupled: Sequence[Point], *, margin: float = 0.0) -> Ratio:
+    """Ratio at the quality of one baseline; decoupled may be worse by a margin, in units of the error."""
+    cost, kind = cost_at(decoupled, baseline.error + margin)
+    times = baseline.cpu_s / cost
     return Ratio(times, times, {"equal": "equal", "at most": "at least", "at least": "at most"}[kind])
 
 
-def ratio_over(theirs: Sequence[Point], ours: Sequence[Point]) -> Ratio:
-    """The ratio over all qualities that both curves reach.
+def ratio_over(baseline: Sequence[Point], decoupled: Sequence[Point]) -> Ratio:
+    """Ratio over all qualities that both curves reach.
 
-    Where they have none in common, the ends that face each other are compared: see :class:`Ratio`.
+    Without a common quality, the nearest ends of the curves are compared: see :class:`Ratio`.
     """
-    rival, own = front(theirs), front(ours)
-    worst, best = min(rival[0].error, own[0].error), max(rival[-1].error, own[-1].error)
+    baseline_front, decoupled_front = front(baseline), front(decoupled)
+    worst, best = (
+        min(baseline_front[0].error, decoupled_front[0].error),
+        max(baseline_front[-1].error, decoupled_front[-1].error),
+    )
     if best > worst:
-        if own[0].error < rival[-1].error:
-            times = rival[-1].cpu_s / own[0].cpu_s
+        if decoupled_front[0].error < baseline_front[-1].error:
+            times = baseline_front[-1].cpu_s / decoupled_front[0].cpu_s
             return Ratio(times, times, "at least")
-        times = rival[0].cpu_s / own[-1].cpu_s
+        times = baseline_front[0].cpu_s / decoupled_front[-1].cpu_s
         return Ratio(times, times, "at most")
     levels = np.exp(np.linspace(_log(best), _log(worst), LEVELS)).clip(best, worst)
-    found = [cost_at(rival, float(e))[0] / cost_at(own, float(e))[0] for e in levels]
+    found = [cost_at(baseline_front, float(e))[0] / cost_at(decoupled_front, float(e))[0] for e in levels]
     return Ratio(float(np.exp(np.mean(np.log(found)))), min(found), "equal")
 
 

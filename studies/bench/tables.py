@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "bounds both ways, "}
+SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "bounds in both directions, "}
 
 
 def bench_tables(found: Mapping[str, Any]) -> list[Table]:
@@ -42,8 +42,8 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
     if ratios["traced"] or ratios["denoised"]:
         headings = ("than", *(of["title"] for of in measures.values()))
         table = _table("decoupled: times less CPU at equal quality", *headings)
-        for rival, by_measure in ratios["traced"].items():
-            table.add_row(rival, *(ratio_text(by_measure[name]) for name in measures))
+        for baseline, by_measure in ratios["traced"].items():
+            table.add_row(baseline, *(ratio_text(by_measure[name]) for name in measures))
         if denoised := ratios["denoised"]:
             table.add_section()
             table.add_row("denoised", *(ratio_text(denoised["by_measure"][name]) for name in measures))
@@ -51,9 +51,9 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
             table.caption = f"denoised: geometric mean over the measures {mean}"
         tables.append(table)
     if ratios["paper"]:
-        table = _table("decoupled, better by every measure at less cost", "than", "which")
-        for rival, names in ratios["paper"].items():
-            table.add_row(rival, ", ".join(names) or "none")
+        table = _table("decoupled: better by every measure at less cost", "than", "configurations")
+        for baseline, names in ratios["paper"].items():
+            table.add_row(baseline, ", ".join(names) or "none")
         tables.append(table)
     return tables
 
@@ -75,8 +75,8 @@ def _number_text(value: float) -> str:
 
 
 def _table(title: str, first: str, *others: str) -> Table:
-    shown = Text(title, style="table.title")  # a scene's name may hold what looks like markup
-    table = Table(title=shown, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
+    text = Text(title, style="table.title")  # a scene's name may contain markup characters
+    table = Table(title=text, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
     table.min_width = len(title)
     table.add_column(first, no_wrap=True)
     for name in others:

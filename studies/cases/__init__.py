@@ -1,1 +1,1 @@
-"""The paper's experiments (§5, §6), run again on ROOM and ATRIUM: one module a question."""
+"""The paper's experiments (§5, §6) on the scenes ROOM and ATRIUM, one module for each question."""

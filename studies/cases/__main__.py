@@ -1,10 +1,9 @@
-"""Run the paper's experiments again on the generated scenes: `make case-studies`.
+"""Reproduce the paper's experiments on the generated scenes: `make case-studies`.
 
     python -m studies.cases [--preset full|small] [--scenes room atrium] [--items placement ...]
 
-Renders and measures everything that is not measured yet, and writes figures and tables into
-studies/cases/README.md, with the preset `small` into a copy of it beside the results. Interrupted, the same
-command continues.
+Measures all items that are not measured yet, and writes figures and tables into studies/cases/README.md
+(preset `small`: into a copy of it beside the results). After an interruption the same command continues.
 """
 
 import argparse
@@ -20,14 +19,14 @@ DOCUMENT = Path(__file__).resolve().parent / "README.md"
 
 
 def main() -> int:
-    """Measure, draw, write."""
+    """Measure the items and write the document."""
     activate("cpu")
     from studies.cases.document import check_blocks, write_document
+    from studies.cases.extent import EXTENTS
     from studies.cases.runner import ITEMS, measure
-    from studies.cases.terms import TERMS
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--preset", default="full", choices=list(TERMS))
+    parser.add_argument("--preset", default="full", choices=list(EXTENTS))
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
     parser.add_argument("--items", nargs="+", default=list(ITEMS), choices=list(ITEMS))
     parser.add_argument("--out", type=Path, help="folder of the results; runs/case-studies/PRESET")
@@ -35,12 +34,12 @@ def main() -> int:
     arguments = parser.parse_args()
     folder = arguments.out or Path("runs/case-studies") / arguments.preset
     target = arguments.document or (DOCUMENT if arguments.preset == "full" else folder / DOCUMENT.name)
-    terms = TERMS[arguments.preset]
+    extent = EXTENTS[arguments.preset]
     try:
         check_blocks(DOCUMENT)
         with watch(quiet=False) as monitor:
-            results = measure(arguments.scenes, arguments.items, terms, folder, monitor)
-        files = write_document(results, terms, folder, DOCUMENT, target)
+            results = measure(arguments.scenes, arguments.items, extent, folder, monitor)
+        files = write_document(results, extent, folder, DOCUMENT, target)
     except EnfiladeError as error:
         print(error, file=sys.stderr)
         return 2 if isinstance(error, InputError) else 1

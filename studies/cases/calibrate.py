@@ -1,4 +1,4 @@
-"""``python -m studies calibrate``: settings that depend on the scene, found by the metric."""
+"""``python -m studies calibrate``: scene-dependent settings, calibrated by the metric."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.options import check_png, job_of, output_options, path_options, settings_options
 
 
-@click.group("calibrate", short_help="Settings that depend on the scene, found by the metric.")
+@click.group("calibrate", short_help="Calibrate scene-dependent settings by the metric.")
 @debug_option
 def command() -> None:
-    """Find settings for a scene by the metric."""
+    """Calibrate settings for a scene by the metric."""
 
 
 @command.command("threshold", short_help="Velocity below which pixels must be traced.")
@@ -39,13 +39,13 @@ def command() -> None:
     type=click.Choice(("traced", "plain")),
     default="traced",
     show_default=True,
-    help="The scene's own light, path traced, or a light without shadows and thus without noise.",
+    help="Path-traced light of the scene, or a noise-free light without shadows.",
 )
 @click.option(
     "--out",
     "folder",
     type=click.Path(path_type=Path),
-    help="Keep the traced frames in this folder, with which the same command continues.",
+    help="Folder of the traced frames, which the same command continues.",
 )
 @click.option(
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw the curve into this PNG file."
@@ -69,8 +69,8 @@ def threshold(
 ) -> None:
     """Find the velocity v_t below which reused pixels of SCENE would be visible, as in §5.2 and Fig. 9.
 
-    A few frames are rendered with every pixel traced, and from keyframes. The metric gives the velocity up to
-    which the former must replace the latter. The result is for --set masks.slow_deg_s.
+    A few frames are rendered twice: with every pixel traced, and composited from keyframes. The metric gives
+    the velocity up to which pixels must be traced. The result is a value for --set masks.slow_deg_s.
     """
     check_png("--plot", plot)
     if folder is not None:
@@ -84,7 +84,7 @@ def threshold(
             job,
             probes=probes,
             tolerated_percent=visible_percent,
-            is_plain=light == "plain",
+            is_noise_free=light == "plain",
             folder=folder,
             monitor=monitor,
         )
@@ -109,10 +109,15 @@ def _show(found: dict[str, Any]) -> None:
     for row in found["curve"]:
         table.add_row(*("" if value is None else f"{value:.3g}" for value in row.values()))
     Console().print(table)
-    chosen, share = found["threshold_deg_s"], f"{found['tolerated_percent']:g} % of the reused pixels"
-    if chosen is None:
+    threshold_deg_s, share = (
+        found["threshold_deg_s"],
+        f"{found['tolerated_percent']:g} % of the reused pixels",
+    )
+    if threshold_deg_s is None:
         last = found["curve"][-1]["threshold_deg_s"]
         click.echo(f"No threshold up to {last:g} deg/s leaves less than {share} visibly different.")
     else:
-        click.echo(f"v_t     {chosen:g} deg/s: from there on, no more than {share} differ visibly")
-        click.echo(f"        (enfilade render ... --set masks.slow_deg_s={chosen:g})")
+        click.echo(
+            f"v_t     {threshold_deg_s:g} deg/s: from this threshold on, at most {share} differ visibly"
+        )
+        click.echo(f"        (enfilade render ... --set masks.slow_deg_s={threshold_deg_s:g})")

@@ -1,4 +1,4 @@
-"""One scene of the case studies: its files, its walkthroughs, and its results."""
+"""A scene of the case studies: files, walkthroughs and results."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.scene.opener import Scene
 from enfilade.settings import SamplingSettings, Settings, ViewingSettings
-from studies.cases.plain import PlainlyLit
+from studies.cases.extent import PIXEL_M, Extent
+from studies.cases.noise_free import NoiseFreeRenderer
 from studies.cases.speed import mean_cost, path_costs
-from studies.cases.terms import PIXEL_M, Terms
 from studies.cases.windows import Windows
 from studies.progress import Prefixed, counted
 from studies.scenes import write_scene
 from studies.versions import origin
 
 PLAIN_SPP = 64  # rays a pixel of a reference without noise
-TERMS_FILE = "terms.json"
+EXTENT_FILE = "extent.json"
 
 
 @dataclass(frozen=True)
@@ -40,61 +40,61 @@ class Result:
     Attributes
     ----------
     value
-        As JSON has it.
-    made : dict of str to str
-        Its :func:`~studies.versions.origin`.
+        Result, as plain values.
+    origin : dict of str to str
+        See :func:`~studies.versions.origin`.
     """
 
     value: Any
-    made: dict[str, str]
+    origin: dict[str, str]
 
 
 def read_result(file: Path) -> Result:
-    """A result that was measured before."""
+    """Read a result that was measured before."""
     table = read_json(file)
-    return Result(table["result"], table["made"])
+    return Result(table["result"], table["origin"])
 
 
-def begin(folder: Path, terms: Terms) -> None:
-    """Begin a folder of results, or go on with one: all of it is of one version, and on the same terms.
+def open_folder(folder: Path, extent: Extent) -> None:
+    """Create a folder of results, or continue one of the same version and extent.
 
     Raises
     ------
     RunFolderError
-        The folder holds results on other terms.
+        The folder holds results of another version or extent.
     """
-    file, now = folder / TERMS_FILE, {"enfilade": __version__, **terms.to_dict()}
+    file, identity = folder / EXTENT_FILE, {"enfilade": __version__, **extent.to_dict()}
     if file.is_file():
-        there = read_json(file)
-        if changed := [key for key in now if there.get(key) != now[key]]:
+        existing = read_json(file)
+        if changed := [key for key in identity if existing.get(key) != identity[key]]:
             raise RunFolderError(
-                f"{folder} holds case studies on other terms ({', '.join(changed)}); choose another --out, "
-                "or delete it to begin anew"
+                f"{folder} holds case studies of another extent ({', '.join(changed)}); choose another "
+                "--out, or delete the folder"
             )
-    write_json(file, now)
+    write_json(file, identity)
 
 
 class Case:
-    """A scene, and everything made of it.
+    """A scene with its renderings and results.
 
     Parameters
     ----------
     name : {"room", "atrium"}
     terms
     folder
-        Of this scene: ``scene/``, a run folder for each walkthrough, traced frames in ``windows/``, results
-        as JSON.
+        Folder of this scene: ``scene/``, a run folder for each walkthrough, traced frames in ``windows/``,
+        results as JSON.
     monitor
     """
 
-    def __init__(self, name: str, terms: Terms, folder: Path, monitor: Monitor) -> None:
-        self.name, self.terms, self.folder = name, terms, folder
+    def __init__(self, name: str, extent: Extent, folder: Path, monitor: Monitor) -> None:
+        self.name, self.extent, self.folder = name, extent, folder
         self.monitor = Prefixed(monitor, name)
 
     @cached_property
     def whole(self) -> Job:
         """The whole walk, by the paper's method."""
-        return self._job(self.terms.size, self.terms.spp)
+        return self._job(self.extent.size, self.extent.spp)
 
     @cached_property
     def walk(self) -> Walkthrough:
@@ -109,27 +109,27 @@ class Case:
     @cached_property
     def windows(self) -> Windows:
         """Short sequences, path traced."""
-        terms, job = self.terms, self._job(self.terms.window_size, self.terms.window_spp)
+        extent, job = self.extent, self._job(self.extent.window_size, self.extent.window_spp)
         walk = Walkthrough(job.path, job.settings, self._renderer)
         return Windows(
-            walk, self._analyzed("analysis-windows", walk), self.monitor, probes=terms.traced_windows,
-            reference_spp=terms.window_reference_spp, folder=self.folder / "windows",
+            walk, self._analyzed("analysis-windows", walk), self.monitor, probes=extent.traced_windows,
+            reference_spp=extent.window_reference_spp, folder=self.folder / "windows",
         )  # fmt: skip
 
     @cached_property
-    def plain_windows(self) -> Windows:
+    def noise_free_windows(self) -> Windows:
         """Short sequences without noise, at the size of the whole walk."""
-        walk = Walkthrough(self.whole.path, self.whole.settings, PlainlyLit(self._renderer))
-        probes = self.terms.windows
+        walk = Walkthrough(self.whole.path, self.whole.settings, NoiseFreeRenderer(self._renderer))
+        probes = self.extent.windows
         return Windows(walk, self.analysis, self.monitor, probes=probes, reference_spp=PLAIN_SPP)
 
     def rendered(self, method: str) -> dict[str, Any]:
-        """Render the whole walk by a method, or go on with it.
+        """Render the whole walk by a method, or continue.
 
         Returns
         -------
         dict
-            Its summary, and as ``path_s`` the mean cost of a path before and after
+            The summary of the run, and in ``path_s`` the mean cost of a path before and after it
             (:func:`~studies.cases.speed.path_costs`).
 
         Raises
@@ -145,10 +145,10 @@ class Case:
         return {**summary, "path_s": read_json(file)}
 
     def result(self, name: str, measure: Callable[[], Any]) -> Result:
-        """A result from its file, measured where it is missing."""
+        """Read a result from its file; measure it if the file is missing."""
         file = self.folder / f"{name}.json"
         if not file.is_file():
-            write_json(file, {"result": measure(), "made": origin()})
+            write_json(file, {"result": measure(), "origin": origin()})
         return read_result(file)
 
     def _analyzed(self, name: str, walk: Walkthrough) -> Analysis:
@@ -163,10 +163,10 @@ class Case:
 
     @cached_property
     def _scene(self) -> Path:
-        """The scene file, written unless all of the scene is there; its camera path is written last."""
+        """The scene file; written if the scene is incomplete (its camera path is written last)."""
         folder = self.folder / "scene"
         if not (folder / "camera_path.json").is_file():
-            write_scene(self.name, folder, preset=self.terms.preset)
+            write_scene(self.name, folder, preset=self.extent.preset)
         return folder / "scene.xml"
 
     @cached_property

@@ -29,11 +29,11 @@ TRACED = {"slow": BLUE, "specular": ORANGE, "disoccluded": GREEN, "keyframe": GR
 Values = Mapping[str, Any]
 
 
-def draw_placement(found: Values, file: Path) -> Path:
+def draw_placement(results: Values, file: Path) -> Path:
     """Fig. 11: disoccluded pixels over the frames, and their mean by A; a row for each scene."""
-    figure, axes = _grid(len(found), 2, (5.6, 2.7), ratios=(2.2, 1.0))
-    for (left, right), (scene, of) in zip(axes, found.items(), strict=True):
-        by_a = {row["adaptation"]: row for row in of["placements"]}
+    figure, axes = _grid(len(results), 2, (5.6, 2.7), ratios=(2.2, 1.0))
+    for (left, right), (scene, result) in zip(axes, results.items(), strict=True):
+        by_a = {row["adaptation"]: row for row in result["placements"]}
         for a, name, line, color in ((0.0, "uniform", "--", VERMILION), (0.5, "Eq. 6, A = 0.5", "-", BLUE)):
             points = sorted(zip(by_a[a]["frames"], by_a[a]["percent"], strict=True))
             label = f"{name}: mean {by_a[a]['mean']:.2f} %"
@@ -49,9 +49,9 @@ def draw_placement(found: Values, file: Path) -> Path:
     return save(figure, file)
 
 
-def draw_walk(of: Values, scene: str, file: Path) -> Path:
+def draw_walk(result: Values, scene: str, file: Path) -> Path:
     """Figs. 12 and 13: velocity, predictions with noise and without, and traced pixels, over the frames."""
-    rows, limit = of["per_frame"], of["split_percent"]
+    rows, limit = result["per_frame"], result["split_percent"]
     panels = ("mean image velocity", "predictions", "predictions without noise", "pixels traced, by reason")
     figure, axes = new_figure(scene, panels)
     velocity = {row["frame"]: row["velocity_deg_s"] for row in rows}
@@ -68,7 +68,7 @@ def draw_walk(of: Values, scene: str, file: Path) -> Path:
     top = 1.1 * max(sum(row[name] for name in TRACED) for row in rows)
     draw(axes[3], Panel("traced", panels[3], "%", "", bars, top))
     axes[0].set_ylabel("velocity, deg/s")
-    for ax, segments in zip(axes[1:3], (of["segments"], of["plain_segments"]), strict=True):
+    for ax, segments in zip(axes[1:3], (result["segments"], result["plain_segments"]), strict=True):
         _predictions(ax, segments, limit)
     axes[3].set_ylabel("traced, % of pixels")
     for ax in axes:
@@ -98,19 +98,19 @@ def _predictions(ax: Any, segments: Sequence[Values], limit: float) -> None:
     ax.set_ylabel("visible, % of pixels")
 
 
-def draw_threshold(found: Values, file: Path) -> Path:
+def draw_threshold(results: Values, file: Path) -> Path:
     """Fig. 9: visible differences of reused pixels by threshold, and by their velocity.
 
-    Results of ``threshold.calibrate`` come by a name for the legend.
+    ``results`` are those of ``threshold.calibrate`` by name in the legend.
     """
     figure, axes = _grid(1, 2, (5.4, 3.4))
     left, right = axes[0]
-    for (name, of), color, mark in zip(found.items(), COLORS, MARKS, strict=False):
-        curve = [row for row in of["curve"] if row["reused_visible_percent"] is not None]
+    for (name, result), color, mark in zip(results.items(), COLORS, MARKS, strict=False):
+        curve = [row for row in result["curve"] if row["reused_visible_percent"] is not None]
         x, y = ([row[key] for row in curve] for key in ("threshold_deg_s", "reused_visible_percent"))
         style = {"color": color, "marker": mark, "markersize": 4, "linewidth": 1.2}
         left.plot(x, y, label=name, **style)
-        classes = of["by_velocity"]
+        classes = result["by_velocity"]
         middles = [
             1.25 * row["from_deg_s"]
             if row["to_deg_s"] is None
@@ -118,7 +118,7 @@ def draw_threshold(found: Values, file: Path) -> Path:
             for row in classes
         ]
         right.plot(middles, [row["visible_percent"] for row in classes], **style)
-    tolerated = next(iter(found.values()))["tolerated_percent"]
+    tolerated = next(iter(results.values()))["tolerated_percent"]
     left.axhline(tolerated, color=INK, linestyle=":", linewidth=1.1)
     for ax in (left, right):
         ax.axvline(0.5, color=INK, linestyle="--", linewidth=0.9)
@@ -129,7 +129,7 @@ def draw_threshold(found: Values, file: Path) -> Path:
         ax.set_xticks([0.0, 0.1, 0.5, 1.0, 5.0, 20.0], ["0", "0.1", "0.5", "1", "5", "20"])
         ax.set_yticks([0.0, 0.5, 1.0, 3.0, 10.0, 30.0, 100.0], ["0", "0.5", "1", "3", "10", "30", "100"])
     figure.legend(loc="outside lower center", fontsize=8.5, frameon=False, ncols=4)
-    _titled(left, "I_c against I_rt, pixels that are reused", "v_t, deg/s", "above 1 JND, %")
+    _titled(left, "I_c against I_rt, reused pixels", "v_t, deg/s", "above 1 JND, %")
     _titled(right, "I_ibr against I_rt, by velocity", "velocity, deg/s", "above 1 JND, %")
     return save(figure, file)
 

@@ -1,7 +1,7 @@
-"""The document of the case studies: tables and figures, put into blocks of a text that is written by hand.
+"""The document of the case studies: tables and figures in blocks of a handwritten text.
 
-A block stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``. Its content is replaced, everything else
-stays.
+A block stands between ``<!-- NAME -->`` and ``<!-- /NAME -->``. Only its content is
+replaced.
 """
 
 from __future__ import annotations
@@ -14,24 +14,26 @@ from enfilade.errors import InputError
 from enfilade.files import whole_file
 from studies.cases.blocks import BLOCKS, FIGURES
 from studies.cases.case import Result
+from studies.cases.extent import Extent
 from studies.cases.runner import Results
-from studies.cases.terms import Terms
 
 
-def write_document(results: Results, terms: Terms, folder: Path, template: Path, target: Path) -> list[Path]:
-    """Draw the figures and fill the blocks of which there are results.
+def write_document(
+    results: Results, extent: Extent, folder: Path, template: Path, target: Path
+) -> list[Path]:
+    """Draw the figures and fill the blocks that have results.
 
     Parameters
     ----------
     results
     terms
-        Stated in each block.
+        Extent of the results, stated in each block.
     folder
-        Of the results, with the images of the examples.
+        Folder of the results, with the images of the examples.
     template
-        The document whose text is taken.
+        The document that provides the text.
     target
-        The document that is written, with the figures beside it. May be the template.
+        The document to write, with the figures beside it. May be the template.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def write_document(results: Results, terms: Terms, folder: Path, template: Path,
     for name, write in BLOCKS.items():
         if by_scene := results.get(name):
             values = {scene: result.value for scene, result in by_scene.items()}
-            body, drawn = write(values, terms, folder, target.parent / FIGURES)
+            body, drawn = write(values, extent, folder, target.parent / FIGURES)
             files += drawn
             text = replaced(text, name, f"{body}\n\n{_origins(by_scene)}")
     with whole_file(target) as beside:
@@ -52,7 +54,7 @@ def write_document(results: Results, terms: Terms, folder: Path, template: Path,
 
 
 def check_blocks(template: Path) -> None:
-    """Check that a document has all blocks, before hours are spent on their content.
+    """Check that a document has all blocks, before they are measured.
 
     Raises
     ------
@@ -67,14 +69,14 @@ def check_blocks(template: Path) -> None:
 def _origins(by_scene: Mapping[str, Result]) -> str:
     origins = []
     for scene, result in by_scene.items():
-        version = f"enfilade {result.made['enfilade']}"
-        commit = f", {result.made['commit']}" if result.made["commit"] else ""
-        origins.append(f"{scene.upper()} {result.made['date']} ({version}{commit})")
+        version = f"enfilade {result.origin['enfilade']}"
+        commit = f", {result.origin['commit']}" if result.origin["commit"] else ""
+        origins.append(f"{scene.upper()} {result.origin['date']} ({version}{commit})")
     return f"*Measured: {'; '.join(origins)}.*"
 
 
 def replaced(text: str, name: str, body: str) -> str:
-    """The text with another body in one of its blocks."""
+    """The text with a new body in one of its blocks."""
     block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
     if not block.search(text):
         raise InputError(f"the document has no block <!-- {name} --> ... <!-- /{name} -->; restore it")

@@ -1,4 +1,4 @@
-"""Pictures of ghosts, as in the paper's Fig. 10."""
+"""Images of ghosts, as in the paper's Fig. 10."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def draw_ghosts(example: Path, file: Path) -> Path:
     """Fig. 10: a crop unfiltered, filtered without and with separation, maps of the metric, velocity."""
     with np.load(example, allow_pickle=False) as images:
         colors = {name: srgb_encode(np.clip(images[name], 0.0, 1.0)) for name in COLORS}
-        grey = colors["apart"].mean(axis=2).astype(np.float32)
+        grey = colors["separated"].mean(axis=2).astype(np.float32)
         pictures = {title: _bytes(colors[name]) for name, title in COLORS.items()} | {
             "ghosts, JND in motion": _bytes(overlay(images["motion"], grey)),
             "ghosts, JND as a still": _bytes(overlay(images["still"], grey)),
@@ -37,8 +37,8 @@ def draw_ghosts(example: Path, file: Path) -> Path:
         }
         crop = crop_around(images["ghost"], CROP_PX)
     figure = Figure(figsize=(10.0, 5.5), dpi=110, layout="constrained")
-    for place, (title, image) in enumerate(pictures.items(), 1):
-        ax = figure.add_subplot(2, 4, place)
+    for index, (title, image) in enumerate(pictures.items(), 1):
+        ax = figure.add_subplot(2, 4, index)
         ax.imshow(image[crop], interpolation="nearest")
         ax.set_title(title, fontsize=8.5, color=INK)
         ax.set_axis_off()
@@ -46,9 +46,9 @@ def draw_ghosts(example: Path, file: Path) -> Path:
 
 
 COLORS = {
-    "raw": "unfiltered",
-    "together": "without separation",
-    "apart": "with separation",
+    "unfiltered": "unfiltered",
+    "unseparated": "without separation",
+    "separated": "with separation",
     "reference": "reference",
 }
 

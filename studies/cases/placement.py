@@ -29,17 +29,17 @@ def measure(case: Case) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``numbers``; ``placements``: of each its ``name``, ``adaptation`` (None for equal flow), the numbers
-        of its ``keyframes``, the ``frames`` that were measured, ``percent`` of each and their ``mean`` over
-        all frames of the path.
+        ``numbers`` of all frames; ``placements``: for each its ``name``, ``adaptation`` (None for equal
+        flow), numbers of ``keyframes`` and of the measured ``frames``, ``percent`` of each of these, and the
+        ``mean`` over all frames of the path.
     """
-    plain = KeyframeSettings()
-    placements = [replace(plain, placement=Placement.ADAPTED, adaptation=a) for a in ADAPTATIONS]
-    placements.append(replace(plain, placement=Placement.EQUAL_FLOW))
+    default = KeyframeSettings()
+    placements = [replace(default, placement=Placement.ADAPTED, adaptation=a) for a in ADAPTATIONS]
+    placements.append(replace(default, placement=Placement.EQUAL_FLOW))
     rows = []
     for placed in placements:
-        is_papers = placed.placement is Placement.ADAPTED and placed.adaptation in PAPER_PERCENT
-        step = 1 if is_papers else case.terms.sweep_step
+        is_in_paper = placed.placement is Placement.ADAPTED and placed.adaptation in PAPER_PERCENT
+        step = 1 if is_in_paper else case.extent.sweep_step
         rows.append(disocclusions(case.walk, case.analysis, placed, step, case.monitor))
     return {"numbers": list(case.walk.path.numbers), "placements": rows}
 
@@ -49,7 +49,7 @@ def disocclusions(
 ) -> dict[str, Any]:
     """Disoccluded pixels of one placement.
 
-    Every so many-th in-between of a segment is measured, by `step`, and stands for those around it.
+    One in `step` in-betweens of a segment is measured, and represents its neighbours.
     """
     path, numbers = walk.path, walk.path.numbers
     shots = Analysis(

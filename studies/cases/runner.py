@@ -1,4 +1,4 @@
-"""All case studies: each item measured once a scene."""
+"""Runner of the case studies: measures each item once for each scene."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 from enfilade.monitor import Monitor
 from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
-from studies.cases.case import Case, Result, begin, read_result
-from studies.cases.terms import Terms
+from studies.cases.case import Case, Result, open_folder, read_result
+from studies.cases.extent import Extent
 from studies.scenes import SCENES
 
 Results = Mapping[str, Mapping[str, Result]]  # by item and scene
@@ -28,9 +28,9 @@ ITEMS: dict[str, Callable[[Case], Any]] = {  # in the order of the paper's figur
 
 
 def measure(
-    scenes: Sequence[str], items: Sequence[str], terms: Terms, folder: Path, monitor: Monitor
+    scenes: Sequence[str], items: Sequence[str], extent: Extent, folder: Path, monitor: Monitor
 ) -> Results:
-    """Measure some items of some scenes, unless they were measured before.
+    """Measure items of scenes that are not measured yet.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def measure(
         Of :data:`ITEMS`.
     terms
     folder
-        Gets a folder for each scene. Killed anywhere, the same call continues: whole walkthroughs at their
-        first missing frame, other items at their beginning, with the frames that they have traced.
+        Receives a folder for each scene. After an interruption the same call continues: walkthroughs at
+        their first missing frame, other items at their beginning, with the frames traced so far.
     monitor
 
     Returns
@@ -52,11 +52,11 @@ def measure(
     Raises
     ------
     RunFolderError
-        The folder holds results on other terms.
+        The folder holds results of another extent.
     """
-    begin(folder, terms)
+    open_folder(folder, extent)
     for scene in scenes:
-        case = Case(scene, terms, folder / scene, monitor)
+        case = Case(scene, extent, folder / scene, monitor)
         for item in items:
             case.result(item, partial(ITEMS[item], case))
     return {

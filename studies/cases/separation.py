@@ -1,7 +1,7 @@
-"""§5.3 and Fig. 10: visibility of the ghosts that the filter leaves along occluding edges.
+"""Visibility of ghosts at occluding edges, with and without flow separation (§5.3, Fig. 10).
 
-Flow separation ends trajectories where they meet another surface. Away from outlines this removes ghosts; at
-outlines it removes the samples that would have antialiased them. Both are measured apart.
+Flow separation ends trajectories at other surfaces. Away from outlines this removes ghosts; at outlines it
+also removes samples that contribute to antialiasing. The two regions are measured separately.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from enfilade.records import F32, U32, Mask
 from enfilade.settings import AntialiasSettings
 from studies.cases.case import Case
 from studies.cases.pictures import write_example
-from studies.cases.seen import Viewer, scores_in
+from studies.cases.visibility import Viewer, scores_in
 from studies.cases.windows import Windows
 from studies.progress import counted
 
 Example = dict[str, F32]  # images of a frame
 
-GHOST_CD_M2 = 1.0  # difference on the screen, of 100, made by separation: smaller ones are invisible
-FEWEST = 200  # pixels: fewer are not reported
-OUTLINE_PX = 2  # from an outline: differences nearer to it are a matter of antialiasing
+GHOST_CD_M2 = 1.0  # effect of separation on the luminance (white: 100); smaller ones are invisible
+MIN_PIXELS = 200  # of a region: smaller ones are not reported
+OUTLINE_PX = 2  # half width of outlines, where differences are due to antialiasing
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """Measurements of all probes; the images of an example are written beside. See :func:`compare`."""
-    rows, example = compare(case.plain_windows, case.plain_windows.probes)
+    """Measure all probes, and write the images of an example; see :func:`compare`."""
+    rows, example = compare(case.noise_free_windows, case.noise_free_windows.probes)
     write_example(case.folder / "separation.npz", example)
     return rows
 
@@ -41,15 +41,14 @@ def compare(windows: Windows, probes: list[int]) -> tuple[dict[str, Any], Exampl
     Returns
     -------
     rows : dict
-        ``frames``: of each probe its number, and for ``ghosts`` (without separation farther from the
-        reference) and ``outlines`` the ``count`` of pixels and their share, ``pixels``, percent, their median
-        velocity ``deg_s`` (None where there are none), and, in motion and as stills, the score, JND, and the
-        share above 1 JND, percent: of ``together`` (without separation) and ``apart`` against the reference
-        (``reference``), and of the former against the unfiltered frame, as in the paper (``raw``);
-        ``effect``: the one against the other.
+        ``frames``: for each probe its number, and for the regions ``ghosts`` (error larger without
+        separation) and ``outlines`` the ``count`` of pixels, their share ``pixels``, percent, their median
+        velocity ``deg_s`` (None for an empty region), and comparisons by score, JND, and share above 1 JND,
+        percent, in motion and as stills: ``unseparated against reference``, ``separated against reference``,
+        ``unseparated against unfiltered`` (the paper's), and ``effect``, unseparated against separated.
     example : dict
-        Images of the probe with most ghosts, as in Fig. 10: ``raw``, ``together``, ``apart`` and
-        ``reference`` colours, ``ghost``, ``motion`` and ``still`` JND of together against apart,
+        Images of the probe with most ghosts, as in Fig. 10: colours ``unfiltered``, ``unseparated``,
+        ``separated`` and ``reference``, mask ``ghost``, JND of the effect in ``motion`` and ``still``,
         ``speed_deg_s``.
     """
     frames = counted(probes, "flow separation", windows.monitor)
@@ -70,41 +69,52 @@ def outlines(shape_index: U32) -> Mask:
     return near
 
 
-def changed_pixels(viewer: Viewer, together: F32, apart: F32) -> Mask:
-    """Pixels that separation changes on the screen, (H, W): samples of another surface were mixed in."""
-    changed: Mask = np.abs(viewer.shown(together) - viewer.shown(apart)) > GHOST_CD_M2
+def changed_pixels(viewer: Viewer, unseparated: F32, separated: F32) -> Mask:
+    """Pixels that separation changes visibly, (H, W): those with samples of another surface."""
+    changed: Mask = np.abs(viewer.luminance(unseparated) - viewer.luminance(separated)) > GHOST_CD_M2
     return changed
 
 
 def _compare(windows: Windows, frame: int) -> tuple[dict[str, Any], Example]:
     view, viewer = windows.view(frame), windows.viewer
     settings = windows.walk.settings[AntialiasSettings]
-    raw, reference = windows.traced(frame).color, windows.reference(frame).color
-    together, apart = (
+    unfiltered, reference = windows.traced(frame).color, windows.reference(frame).color
+    unseparated, separated = (
         windows.antialiased(frame, replace(settings, separate_shapes=separate)) for separate in (False, True)
     )
-    changed, near = changed_pixels(viewer, together, apart), outlines(view.geometry.shape_index)
-    errors = [np.abs(viewer.shown(image) - viewer.shown(reference)) for image in (together, apart)]
-    places = {"ghosts": changed & ~near & (errors[0] > errors[1]), "outlines": changed & near}
+    changed, near = changed_pixels(viewer, unseparated, separated), outlines(view.geometry.shape_index)
+    errors = [
+        np.abs(viewer.luminance(image) - viewer.luminance(reference)) for image in (unseparated, separated)
+    ]
+    regions = {"ghosts": changed & ~near & (errors[0] > errors[1]), "outlines": changed & near}
     maps = {
-        kind: {how: viewer.paper(test, wanted, velocity) for how, velocity in _velocities(view).items()}
-        for kind, (test, wanted) in {
-            "effect": (together, apart),
-            "reference together": (together, reference),
-            "reference apart": (apart, reference),
-            "raw together": (together, raw),
+        kind: {eye: viewer.paper(test, target, velocity) for eye, velocity in _velocities(view).items()}
+        for kind, (test, target) in {
+            "effect": (unseparated, separated),
+            "unseparated against reference": (unseparated, reference),
+            "separated against reference": (separated, reference),
+            "unseparated against unfiltered": (unseparated, unfiltered),
         }.items()
     }
     row: dict[str, Any] = {"frame": windows.walk.path.numbers[frame]}
-    for place, where in places.items():
-        row[place] = {
+    for region, where in regions.items():
+        row[region] = {
             "count": int(where.sum()),
             "pixels": 100.0 * float(where.mean()),
             "deg_s": float(np.median(view.speed_deg_s[where])) if where.any() else None,
-            **{kind: {how: scores_in(jnd, where) for how, jnd in by.items()} for kind, by in maps.items()},
+            **{
+                kind: {eye: scores_in(jnd, where) for eye, jnd in maps_by_eye.items()}
+                for kind, maps_by_eye in maps.items()
+            },
         }
-    images = {"together": together, "apart": apart, "raw": raw, "reference": reference, **maps["effect"]}
-    return row, {**images, "ghost": places["ghosts"].astype(np.float32), "speed_deg_s": view.speed_deg_s}
+    images = {
+        "unseparated": unseparated,
+        "separated": separated,
+        "unfiltered": unfiltered,
+        "reference": reference,
+    }
+    images |= maps["effect"]
+    return row, {**images, "ghost": regions["ghosts"].astype(np.float32), "speed_deg_s": view.speed_deg_s}
 
 
 def _velocities(view: View) -> dict[str, F32 | None]:

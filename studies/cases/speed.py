@@ -1,4 +1,4 @@
-"""Cost of a path at the present speed of the machine, by which times of different hours are compared."""
+"""Cost of a path on this machine, a unit for times that were measured under different load."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from enfilade.renderer import PixelFilter, Purpose
 PathCost = dict[str, dict[str, float]]  # by pixel filter: wall and CPU seconds of a path
 
 FILTERS = (PixelFilter.CENTRE, PixelFilter.GAUSSIAN)
-FRAMES = 2  # of a walk that are traced whole
-TIMED_SPP, WARM_SPP = 8, 1  # the latter first: kernels are compiled
+FRAMES = 2  # of a walk, traced whole
+TIMED_SPP, WARM_SPP = 8, 1  # the latter first, to compile the kernels
 
 
 def path_costs(walk: Walkthrough) -> PathCost:
-    """``wall`` and ``cpu`` seconds of a path, by pixel filter: a few frames are traced whole."""
+    """Seconds of a path, ``wall`` and ``cpu``, by pixel filter, measured on a few whole frames."""
     everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
-    frames, found = spread_over(len(walk.path), FRAMES), {}
+    frames, found = even_positions(len(walk.path), FRAMES), {}
     for pixel_filter in FILTERS:
         wall = cpu = 0.0
         for frame in frames:
@@ -43,6 +43,6 @@ def mean_cost(costs: Sequence[PathCost]) -> PathCost:
     }
 
 
-def spread_over(length: int, count: int) -> list[int]:
-    """Places evenly spread over a length, each in the middle of its share."""
+def even_positions(length: int, count: int) -> list[int]:
+    """Indices evenly spread over a length, at the centres of equal intervals."""
     return [round((length - 1) * (k + 0.5) / count) for k in range(count)]

@@ -40,20 +40,20 @@ def measure(case: Case) -> dict[str, Any]:
 
 
 def shares(case: Case) -> dict[str, Any]:
-    """Shares of traced pixels from the run's ledger, and of those that might have been.
+    """Shares of traced pixels from the run's ledger, and of candidates.
 
     Returns
     -------
     dict
-        ``table1``: percent by reason. ``specular_seen``: mean share of pixels on glossy, mirroring or
-        transparent surfaces, traced or not; ``slow_seen``: below v_t, keyframes and repeated frames included.
-        ``frames``, ``keyframes``: numbers of them.
+        ``traced_percent``: by reason. ``specular_percent``: mean share of pixels on glossy, mirroring or
+        transparent surfaces, traced or not; ``slow_percent``: of pixels below v_t, including keyframes and
+        repeated frames. ``frames``, ``keyframes``: their numbers.
     """
     summary, frames = case.rendered("paper"), case.analysis.frames
     return {
-        "table1": summary["traced_percent"],
-        "specular_seen": sum(of.specular_percent for of in frames) / len(frames),
-        "slow_seen": sum(of.slow_percent for of in frames) / len(frames),
+        "traced_percent": summary["traced_percent"],
+        "specular_percent": sum(of.specular_percent for of in frames) / len(frames),
+        "slow_percent": sum(of.slow_percent for of in frames) / len(frames),
         "frames": len(frames),
         "keyframes": sum(row["keyframe"] > 0.0 for row in summary["per_frame"]),
     }
@@ -73,12 +73,12 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
     -------
     dict
         ``initial``, ``split``, ``remaining``: numbers of segments. ``before``, ``after``: mean percentage of
-        visible differences under pursuit, of the initial ones and of those that remain, weighted by their
-        in-betweens; ``split_before``, ``split_after``: the same of the split ones alone and of their parts,
-        None where none is; ``before_still``, ``after_still``: of all, without pursuit.
-        ``split_not_seen_still``: segments that are split although they are below the limit without pursuit;
-        ``seen_still_not_split``: the contrary. ``given_up``: above the limit, and not split, since splitting
-        helps no more.
+        visible differences under pursuit, of initial and of remaining segments, weighted by their
+        in-betweens; ``split_before``, ``split_after``: the same for split segments and their parts, None
+        without splits; ``before_still``, ``after_still``: for all, without pursuit.
+        ``split_only_by_pursuit``: split segments below the limit without pursuit;
+        ``unsplit_above_limit_still``: remaining segments above the limit without pursuit.
+        ``remaining_above_limit``: remaining segments above the limit, where splitting does not help.
     """
     compared = [s for s in segments if s["middle"] is not None]
     initial = [s for s in compared if s["depth"] == 0]
@@ -95,9 +95,9 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
         "split_after": _mean([s for s in remaining if s["depth"] > 0], pursuit),
         "before_still": _mean(initial, still),
         "after_still": _mean(remaining, still),
-        "split_not_seen_still": sum(s[still] <= limit for s in split),
-        "seen_still_not_split": sum(s[still] > limit for s in remaining),
-        "given_up": sum(s[pursuit] > limit for s in remaining),
+        "split_only_by_pursuit": sum(s[still] <= limit for s in split),
+        "unsplit_above_limit_still": sum(s[still] > limit for s in remaining),
+        "remaining_above_limit": sum(s[pursuit] > limit for s in remaining),
     }
 
 
@@ -109,8 +109,8 @@ def _mean(segments: list[dict[str, Any]], key: str) -> float | None:
 
 
 def without_noise(case: Case) -> list[dict[str, Any]]:
-    """Segments as in a summary, compared and split without noise (`PlainlyLit`)."""
-    windows = case.plain_windows
+    """Segments as in a summary, compared and split without noise (`NoiseFreeRenderer`)."""
+    windows = case.noise_free_windows
     refinement, numbers = Refinement(windows.walk), windows.walk.path.numbers
     initial = [s for shot in case.analysis.segments() for s in shot]
     rows = []

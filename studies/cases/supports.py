@@ -1,4 +1,4 @@
-"""§5.2: best width of the antialiasing filter at each velocity.
+"""Best support of the antialiasing filter at each velocity (§5.2).
 
 Uniform supports, spatial and temporal, are applied to traced frames sampled at pixels' centres, and the
 results are compared with the reference: the same frame through a pixel filter.
@@ -14,21 +14,21 @@ from enfilade.methods.paper.support import spatial_support_px
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.settings import AntialiasSettings
 from studies.cases.case import Case
-from studies.cases.seen import score_in
+from studies.cases.visibility import score_in
 from studies.cases.windows import Windows
 from studies.progress import counted
 
 SPATIAL_PX = (1.0, 3.0, 5.0, 7.0, 9.0, 11.0)  # 1 is no filter
 TEMPORAL = (1, 5, 11, 15, 21)  # frames
 CLASSES_DEG_S = (0.0, 0.15, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, np.inf)
-MIN_PIXELS = 500  # of a class of velocity, over all probes: fewer are not representative
+MIN_PIXELS = 500  # of a velocity class, over all probes: smaller ones are not representative
 MODES = ("paper", "modern")
 
 
 def measure(case: Case) -> dict[str, Any]:
     """Scores without noise (``plain``) and path traced (``traced``); see :func:`compare`."""
     return {
-        "plain": compare(case.plain_windows, case.plain_windows.probes),
+        "plain": compare(case.noise_free_windows, case.noise_free_windows.probes),
         "traced": compare(case.windows, case.windows.probes),
     }
 
@@ -41,14 +41,14 @@ def compare(
     temporal: tuple[int, ...] = TEMPORAL,
     classes_deg_s: tuple[float, ...] = CLASSES_DEG_S,
 ) -> dict[str, Any]:
-    """Score every support in every class of velocity.
+    """Score every support in every velocity class.
 
-    Specular surfaces are left out: their reflections do not move as they do (§5.4).
+    Specular surfaces are left out, since reflections move differently from surfaces (§5.4).
 
     Returns
     -------
     dict
-        ``classes``: of each its ends (None: no end), ``pixels``, the supports of §5.2 (``paper_px``,
+        ``classes``: for each its limits (None: unbounded), ``pixels``, the supports of §5.2 (``paper_px``,
         ``paper_frames``), and ``scores``: by mode of the metric, a row for each spatial and a column for each
         temporal support, JND in motion; ``best``: by mode, the supports with the least score;
         ``paper_score``: that of the paper's adaptive filter. ``spatial_px``, ``temporal``.
@@ -93,7 +93,7 @@ def compare(
 
 
 def uniform(width_px: float, frames: int) -> AntialiasSettings:
-    """The same support at all velocities, which does not end where half a pixel is covered."""
+    """Settings with the same support at all velocities."""
     return AntialiasSettings(
         frames=frames,
         slow_frames=frames,
@@ -105,12 +105,12 @@ def uniform(width_px: float, frames: int) -> AntialiasSettings:
 
 
 def _class(start: float, end: float, pixels_per_degree: float) -> dict[str, Any]:
-    """Ends of a class of velocity, and the supports of §5.2 in its middle."""
-    plain, is_last = AntialiasSettings(), np.isinf(end)
+    """Limits of a velocity class, and the supports of §5.2 at its centre."""
+    default, is_last = AntialiasSettings(), np.isinf(end)
     middle = np.array([start + 1.0 if is_last else 0.5 * (start + end)], np.float32)
     return {
         "from_deg_s": start,
         "to_deg_s": None if is_last else end,
-        "paper_px": float(spatial_support_px(middle, pixels_per_degree, plain)[0]),
-        "paper_frames": plain.slow_frames if start < plain.slow_deg_s else plain.frames,
+        "paper_px": float(spatial_support_px(middle, pixels_per_degree, default)[0]),
+        "paper_frames": default.slow_frames if start < default.slow_deg_s else default.frames,
     }

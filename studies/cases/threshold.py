@@ -1,10 +1,9 @@
-"""§5.2 and Fig. 9: velocity below which pixels must be traced.
+"""Velocity below which pixels must be traced (§5.2, Fig. 9).
 
-There are two sequences around a few frames: I_rt, every pixel traced, and I_ibr, composited from keyframes
-with disocclusions traced. For a threshold v_t, I_c takes pixels slower than v_t from I_rt and the others from
-I_ibr. All are filtered as in §5 and compared by the metric. Where I_c differs visibly from I_rt at pixels
-that were not traced, v_t is too low; where all differences of I_ibr that tracing removes lie far below v_t,
-it is too high.
+Two sequences are rendered around a few frames: I_rt with every pixel traced, and I_ibr composited from
+keyframes with traced disocclusions. For a threshold v_t, I_c takes pixels slower than v_t from I_rt and the
+others from I_ibr. All are filtered (§5) and compared by the metric. If reused pixels of I_c differ visibly
+from I_rt, v_t is too low; if all differences of I_ibr that tracing removes are far below v_t, it is too high.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.settings import AntialiasSettings, MaskSettings, SamplingSettings
 from studies.cases.case import Case
-from studies.cases.plain import PlainlyLit
-from studies.cases.seen import VISIBLE_JND
+from studies.cases.noise_free import NoiseFreeRenderer
+from studies.cases.visibility import VISIBLE_JND
 from studies.cases.windows import Windows
 from studies.progress import counted
 
@@ -43,7 +42,7 @@ LAST_PERCENT = 95.0  # of the visible differences that lie below the velocity th
 
 @dataclass
 class _Count:
-    """Pixels of all probes, for one threshold."""
+    """Pixel counts over all probes, for one threshold."""
 
     pixels: int = 0
     traced: int = 0
@@ -52,7 +51,7 @@ class _Count:
     removed_deg_s: list[F32] = field(default_factory=list)
 
     def row(self, threshold: float) -> dict[str, Any]:
-        """Its row of the curve; see :func:`calibrate`."""
+        """Row of the curve; see :func:`calibrate`."""
         removed = np.concatenate(self.removed_deg_s)
         return {
             "threshold_deg_s": threshold,
@@ -65,7 +64,7 @@ class _Count:
 def measure(case: Case) -> dict[str, Any]:
     """The threshold without noise (``plain``) and path traced (``traced``); see :func:`calibrate`."""
     return {
-        "plain": calibrate(case.plain_windows, case.plain_windows.probes),
+        "plain": calibrate(case.noise_free_windows, case.noise_free_windows.probes),
         "traced": calibrate(case.windows, case.windows.probes),
     }
 
@@ -79,8 +78,8 @@ def calibrate(
 ) -> dict[str, Any]:
     """Find the velocity threshold of a scene.
 
-    Pixels on mirroring, transparent and glossy surfaces are left out, since another rule decides on them
-    (§4.3). Differences that the noise of the paths explains do not count.
+    Pixels of mirroring, transparent and glossy surfaces are left out; another rule applies to them (§4.3).
+    Differences within the Monte Carlo noise are discounted.
 
     Parameters
     ----------
@@ -95,11 +94,11 @@ def calibrate(
     Returns
     -------
     dict
-        ``threshold_deg_s``: see :func:`chosen`. ``curve``: of each candidate ``threshold_deg_s``,
+        ``threshold_deg_s``: see :func:`least_threshold`. ``curve``: for each candidate ``threshold_deg_s``,
         ``traced_percent``, ``reused_visible_percent`` (I_c against I_rt) and ``removed_below_deg_s`` (I_c
-        against I_ibr: 95 % of the visible differences that tracing removes are slower; None where there is
-        none). ``by_velocity``: share of visible differences between I_rt and I_ibr by velocity. ``probes``:
-        their numbers.
+        against I_ibr: 95 % of the visible differences that tracing removes are slower; None without
+        any). ``by_velocity``: share of visible differences between I_rt and I_ibr by velocity. ``probes``:
+        numbers of the probes.
     """
     counts = {v: _Count() for v in thresholds_deg_s}
     classes = np.zeros((2, len(CLASSES_DEG_S) - 1), np.int64)  # all pixels, visibly different ones
@@ -111,7 +110,7 @@ def calibrate(
         "probes": [windows.walk.path.numbers[f] for f in probes],
         "spp": windows.walk.settings[SamplingSettings].spp,
         "tolerated_percent": tolerated_percent,
-        "threshold_deg_s": chosen(curve, tolerated_percent),
+        "threshold_deg_s": least_threshold(curve, tolerated_percent),
         "curve": curve,
         "by_velocity": [
             {"from_deg_s": a, "to_deg_s": b, "pixels": int(n), "visible_percent": 100.0 * float(v) / int(n)}
@@ -126,7 +125,7 @@ def calibrate_job(
     *,
     probes: int,
     tolerated_percent: float,
-    is_plain: bool,
+    is_noise_free: bool,
     folder: Path | None,
     monitor: Monitor,
 ) -> dict[str, Any]:
@@ -139,36 +138,36 @@ def calibrate_job(
     probes
         Number of frames to compare.
     tolerated_percent
-    is_plain
-        Whether a plain light replaces the scene's (:class:`PlainlyLit`).
+    is_noise_free
+        Whether to render without noise (:class:`NoiseFreeRenderer`).
     folder
-        Holds traced frames; None: nothing is kept.
+        Folder of the traced frames; None: they are not kept.
     monitor
 
     Raises
     ------
     InputError
-        The scene; too few paths to tell noise from differences; a folder that holds frames of something else.
+        The scene, too few paths to estimate the noise, or a folder that holds frames of another run.
     """
     job.check()
-    if not is_plain and job.settings[SamplingSettings].spp < MIN_SPP:
-        raise SettingsError(f"--light traced needs --spp {MIN_SPP} or more: their spread tells the noise")
+    if not is_noise_free and job.settings[SamplingSettings].spp < MIN_SPP:
+        raise SettingsError(f"--light traced needs --spp {MIN_SPP} or more, to estimate the noise")
     renderer = job.open_renderer()
-    walk = Walkthrough(job.path, job.settings, PlainlyLit(renderer) if is_plain else renderer)
+    walk = Walkthrough(job.path, job.settings, NoiseFreeRenderer(renderer) if is_noise_free else renderer)
     frames = counted(range(len(job.path)), "analysis", monitor)
     analysis = Analysis(job.path, job.settings, tuple(analyze(walk, frame) for frame in frames))
     with ExitStack() as stack:
         if folder is not None:
-            identity = {**job.identity(), "method": "plain windows" if is_plain else "windows"}
+            identity = {**job.identity(), "method": "noise-free windows" if is_noise_free else "windows"}
             stack.enter_context(RunFolder.create(folder, identity))
         windows = Windows(walk, analysis, monitor, probes=probes, reference_spp=1, folder=folder)
         return calibrate(windows, windows.probes, tolerated_percent=tolerated_percent)
 
 
-def chosen(curve: list[dict[str, Any]], tolerated_percent: float) -> float | None:
-    """The least threshold at which, and above which, no more than the tolerated share differs visibly.
+def least_threshold(curve: list[dict[str, Any]], tolerated_percent: float) -> float | None:
+    """Least threshold from which on at most the tolerated share of reused pixels differs visibly.
 
-    Thresholds above which nothing is reused count neither way. None where there is no such threshold.
+    Thresholds without reused pixels are ignored. None if there is no such threshold.
     """
     found: float | None = None
     for row in reversed(curve):
@@ -181,10 +180,10 @@ def chosen(curve: list[dict[str, Any]], tolerated_percent: float) -> float | Non
     return found
 
 
-def composed(rt: F32, ibr: F32, is_slow: Mask) -> F32:
+def composite_by_velocity(rt: F32, ibr: F32, is_slow: Mask) -> F32:
     """I_c of Fig. 9: slow pixels traced, the others reused."""
-    mixed: F32 = np.where(is_slow[..., None], rt, ibr)
-    return mixed
+    composited: F32 = np.where(is_slow[..., None], rt, ibr)
+    return composited
 
 
 def _compare(windows: Windows, frame: int, counts: dict[float, _Count], classes: Any) -> None:
@@ -192,7 +191,7 @@ def _compare(windows: Windows, frame: int, counts: dict[float, _Count], classes:
     settings = windows.walk.settings[AntialiasSettings]
     speed, velocity = view.speed_deg_s, view.velocity_deg_s
     valid = view.geometry.is_hit & ~view.geometry.is_specular
-    # Noise of both, as if none were averaged over time: that of warped pixels is the same in every frame.
+    # Noise of both, without temporal averaging: warped pixels carry the same noise in every frame.
     support = spatial_support_px(speed, windows.walk.viewing.pixels_per_degree, settings)
     noise = {
         "noise": windows.traced(frame).variance + windows.reused(frame).variance,
@@ -204,7 +203,9 @@ def _compare(windows: Windows, frame: int, counts: dict[float, _Count], classes:
 
     def filtered(threshold: float) -> F32:
         def color(at: int) -> F32:
-            return composed(windows.traced(at).color, windows.reused(at).color, is_slow(at, threshold))
+            return composite_by_velocity(
+                windows.traced(at).color, windows.reused(at).color, is_slow(at, threshold)
+            )
 
         return windows.antialiased(frame, settings, color)
 
@@ -212,16 +213,16 @@ def _compare(windows: Windows, frame: int, counts: dict[float, _Count], classes:
     ibr = windows.antialiased(frame, settings, lambda at: windows.reused(at).color)
     is_visible = valid & (viewer.paper(ibr, rt, velocity, valid=valid, **noise) > VISIBLE_JND)
     classes += [np.histogram(speed[where], CLASSES_DEG_S)[0] for where in (valid, is_visible)]
-    before: list[int] = []
+    previous_counts: list[int] = []
     for threshold, count in counts.items():
         slow = [int(is_slow(at, threshold).sum()) for at in windows.around(frame, settings)]
-        if slow != before:  # otherwise the same pixels as for the last threshold
-            before, c = slow, filtered(threshold)
-            raised = viewer.paper(c, rt, velocity, valid=valid, **noise)
-            lowered = viewer.paper(ibr, c, velocity, valid=valid, **noise)
+        if slow != previous_counts:  # otherwise the pixels are those of the previous threshold
+            previous_counts, c = slow, filtered(threshold)
+            against_traced = viewer.paper(c, rt, velocity, valid=valid, **noise)
+            against_reused = viewer.paper(ibr, c, velocity, valid=valid, **noise)
         reused = valid & ~is_slow(frame, threshold)
         count.pixels += int(valid.sum())
         count.traced += int((valid & ~reused).sum())
         count.reused += int(reused.sum())
-        count.visible += int((raised[reused] > VISIBLE_JND).sum())
-        count.removed_deg_s.append(speed[valid & (lowered > VISIBLE_JND)])
+        count.visible += int((against_traced[reused] > VISIBLE_JND).sum())
+        count.removed_deg_s.append(speed[valid & (against_reused > VISIBLE_JND)])

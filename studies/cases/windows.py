@@ -1,6 +1,6 @@
-"""Short sequences around a frame, traced whole and reused from keyframes, to be filtered and compared.
+"""Short sequences around a frame, path traced and composited from keyframes, for filters and comparisons.
 
-All are sampled at pixels' centres, as in the paper (§5.2): antialiasing is left to the filter.
+Frames are sampled at pixels' centres, as in the paper (§5.2); the filter antialiases them.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from enfilade.monitor import Monitor
 from enfilade.records import F32, Geometry, Keyframe, Shading, Warped
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
-from studies.cases.mirrored import mirrored
-from studies.cases.seen import Viewer
+from studies.cases.virtual_images import reflected_geometry
+from studies.cases.visibility import Viewer
 
-CACHED_IMAGES, CACHED_VIEWS = 64, 24  # some 600 MiB at 640x480
-END_FRAMES = 10  # of a path, where a temporal filter lacks half its support
+CACHED_IMAGES, CACHED_VIEWS = 64, 24  # about 600 MiB at 640x480
+END_FRAMES = 10  # at the ends of a path, where the support of the temporal filter is truncated
 
 
 class Windows:
-    """Frames of a walkthrough, made when they are needed.
+    """Frames of a walkthrough, rendered on demand.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class Windows:
     analysis
     monitor
     probes
-        Number of frames whose surroundings are used.
+        Number of frames around which sequences are rendered.
     reference_spp
     folder
-        Holds one file a frame and kind. The caller keeps to one folder for each walkthrough and spp. None:
-        frames are cached in memory only.
+        Holds one file for each frame and kind; a folder belongs to one walkthrough and spp. None: frames are
+        cached in memory only.
     """
 
     def __init__(
@@ -60,9 +60,9 @@ class Windows:
         folder: Path | None = None,
     ) -> None:
         self.walk, self.analysis, self.monitor = walk, analysis, monitor
-        self.probes = probes_of(analysis, probes)
+        self.probes = probe_frames(analysis, probes)
         self.viewer = Viewer(walk.viewing, walk.settings)
-        self._reference_walk = other_seed(walk)
+        self._reference_walk = reseeded(walk)
         self._reference_spp = reference_spp
         self._folder = folder
         self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
@@ -82,12 +82,12 @@ class Windows:
         """G-buffer of a frame."""
         return self.view(frame).geometry
 
-    def reflected(self, frame: int) -> Geometry:
-        """The same, with virtual images in place of the mirrors."""
-        return mirrored(self.walk.renderer, self.geometry(frame))
+    def reflected_geometry(self, frame: int) -> Geometry:
+        """G-buffer of a frame, with virtual images in place of mirrors."""
+        return reflected_geometry(self.walk.renderer, self.geometry(frame))
 
     def traced(self, frame: int) -> Shading:
-        """A frame with every pixel traced: I_rt of Fig. 9."""
+        """A frame with every pixel traced (I_rt of Fig. 9)."""
         spp = self.walk.settings[SamplingSettings].spp
         return self._cached(
             "traced", frame, lambda: _trace(self.walk, frame, spp, Purpose.FILL, PixelFilter.CENTRE)
@@ -101,10 +101,10 @@ class Windows:
         )
 
     def reused(self, frame: int) -> Shading:
-        """A frame composited from the keyframes around it, disocclusions traced: I_ibr of Fig. 9.
+        """A frame composited from its keyframes, with traced disocclusions (I_ibr of Fig. 9).
 
-        The keyframes are the initial ones: no segment is split. The variance is the density of the noise, as
-        warped (:mod:`enfilade.metric.noise`).
+        The keyframes are the initial ones, without splits. The variance is the warped density of
+        the noise (:mod:`enfilade.metric.noise`).
         """
         segments = (s for shot in self.analysis.segments() for s in shot)
         segment = next((s for s in segments if frame in s.inbetweens), None)
@@ -130,10 +130,10 @@ class Windows:
         frame
         settings
         color_of
-            Colours of each frame before the filter; by default those of the traced frames.
+            Unfiltered colours of each frame; by default those of the traced frames.
         geometry_of
-            Geometry of each frame whose motion is followed, in place of the visible surfaces'. Where it is
-            not specular, the filter has its full length.
+            Geometry of each frame that provides the motion; by default that of the visible surfaces. Where
+            it is not specular, the filter has its full length.
         """
         viewing, path = self.walk.viewing, self.walk.path
         span = self.around(frame, settings)
@@ -170,25 +170,25 @@ class Windows:
         if self._folder is None:
             return self._images.get((kind, frame), make)
         stem = self._folder / kind / f"{self.walk.path.numbers[frame]:04d}"
-        return self._images.get((kind, frame), lambda: stored(stem, make))
+        return self._images.get((kind, frame), lambda: load_or_render(stem, make))
 
 
-def stored(stem: Path, make: Callable[[], Shading]) -> Shading:
-    """A traced image from its file, made and written where the file is missing."""
+def load_or_render(stem: Path, make: Callable[[], Shading]) -> Shading:
+    """Read a traced image from its file; render and write it if the file is missing."""
     file = stem.with_name(f"{stem.name}.exr")
     if not file.is_file():
         write_record(stem, make())
     return read_record(file, Shading)
 
 
-def other_seed(walk: Walkthrough) -> Walkthrough:
-    """The same walkthrough with other random numbers."""
+def reseeded(walk: Walkthrough) -> Walkthrough:
+    """Copy of a walkthrough with independent random numbers."""
     seed = (walk.settings[TraceSettings].seed + 1) % 2**32
     return Walkthrough(walk.path, walk.settings.replace(TraceSettings, seed=seed), walk.renderer)
 
 
-def probes_of(analysis: Analysis, count: int) -> list[int]:
-    """Frames at even quantiles of the mean velocity, slowest first, each once, not at the path's ends."""
+def probe_frames(analysis: Analysis, count: int) -> list[int]:
+    """Distinct frames at even quantiles of the mean velocity, slowest first, without the ends of the path."""
     length = len(analysis.path)
     margin = min(END_FRAMES, length // 4)
     by_speed = sorted(range(margin, length - margin), key=lambda frame: analysis.frames[frame].speed_deg_s)

@@ -1,1 +1,1 @@
-"""The metric against people: published measurements, and what the metric says of the same stimuli."""
+"""Validation of the metric on published experiments with human observers."""

@@ -1,4 +1,4 @@
-"""Plots of a validation: what people saw, and what each mode of the metric says of the same stimuli."""
+"""Plots of a validation: measurements of observers, and predictions of both modes of the metric."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from enfilade.reports.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
 
-__all__ = ["plot_people"]
+__all__ = ["plot_validation"]
 
 DPI = 100
 PANEL_IN = (4.6, 3.4)
@@ -28,7 +28,7 @@ TEXTURE_COLORS = {"checkerboard": VERMILION, "gradient": GREEN, "grass": GREY, "
 DISPLAY_MARKERS = {"pc": "o", "phone": "s", "headset": "^"}
 
 
-def plot_people(validation: Mapping[str, Any], folder: Path) -> list[Path]:
+def plot_validation(validation: Mapping[str, Any], folder: Path) -> list[Path]:
     """Draw a plot for each data set.
 
     Parameters
@@ -36,7 +36,7 @@ def plot_people(validation: Mapping[str, Any], folder: Path) -> list[Path]:
     validation
         ``Validation.to_dict()``; its first two modes are drawn.
     folder
-        Where the PNG files go.
+        Receives the PNG files.
 
     Returns
     -------
@@ -67,30 +67,29 @@ def _new(columns: int, *, width: float = 1.0) -> tuple[Figure, list[Any]]:
 
 def _modelfest(modes: Sequence[Mapping[str, Any]]) -> Figure:
     figure, (ax,) = _new(1, width=2.2)
-    people = modes[0]["modelfest"]
-    places = np.arange(len(people["number"]))
+    observers = modes[0]["modelfest"]
+    positions = np.arange(len(observers["number"]))
     ax.errorbar(
-        places,
-        people["people_db"],
-        yerr=people["spread_db"],
+        positions,
+        observers["observers_db"],
+        yerr=observers["spread_db"],
         fmt="D",
         color=INK,
         markersize=5,
         elinewidth=0.8,
-        label="16 observers, and their spread",
+        label="16 observers, with standard deviation",
     )
     for mode, style in zip(modes, MODE_STYLES, strict=False):
-        found = mode["modelfest"]
-        gain_db = np.mean(_array(found["people_db"]) - _array(found["metric_db"]))
-        shown = _array(found["metric_db"]) + gain_db
+        predicted = mode["modelfest"]
+        gain_db = np.mean(_array(predicted["observers_db"]) - _array(predicted["metric_db"]))
         ax.plot(
-            places,
-            shown,
+            positions,
+            _array(predicted["metric_db"]) + gain_db,
             **style | {"linestyle": "none"},
             markersize=5,
             label=f"{mode['mode']}, gain {gain_db:+.1f} dB",
         )
-    ax.set_xticks(places, [str(n) for n in people["number"]], fontsize=8)
+    ax.set_xticks(positions, [str(n) for n in observers["number"]], fontsize=8)
     ax.set_xlabel("target")
     ax.set_ylabel("contrast sensitivity, dB")
     ax.legend(fontsize=8, frameon=False, loc="lower right", ncols=3, bbox_to_anchor=(1.0, 1.0))
@@ -99,12 +98,14 @@ def _modelfest(modes: Sequence[Mapping[str, Any]]) -> Figure:
 
 def _masking(modes: Sequence[Mapping[str, Any]]) -> Figure:
     figure, (ax,) = _new(1, width=1.4)
-    people = modes[0]["masking"]
-    ax.plot(people["mask_db"], people["people_db"], "D", color=INK, markersize=6, label="Foley 1994")
+    observers = modes[0]["masking"]
+    ax.plot(observers["mask_db"], observers["observers_db"], "D", color=INK, markersize=6, label="Foley 1994")
     for mode, style in zip(modes, MODE_STYLES, strict=False):
-        found = mode["masking"]
-        label = f"{mode['mode']}, moved {found['gain_db']:+.1f} dB"
-        ax.plot(found["mask_db"], found["metric_db"], **style, markersize=4, linewidth=1.4, label=label)
+        predicted = mode["masking"]
+        label = f"{mode['mode']}, gain {predicted['gain_db']:+.1f} dB"
+        ax.plot(
+            predicted["mask_db"], predicted["metric_db"], **style, markersize=4, linewidth=1.4, label=label
+        )
     ax.set_xlabel("contrast of the mask, dB")
     ax.set_ylabel("contrast of the target at threshold, dB")
     ax.legend(fontsize=8, frameon=False, loc="upper left")
@@ -113,7 +114,7 @@ def _masking(modes: Sequence[Mapping[str, Any]]) -> Figure:
 
 def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
     figure, axes = _new(len(STUDY_TITLES))
-    shades = {
+    colors = {
         0.0: INK,
         1.0: INK,
         6.06: GREEN,
@@ -125,33 +126,33 @@ def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
     }
     for ax, (study, title) in zip(axes, STUDY_TITLES.items(), strict=True):
         ax.set_title(title, fontsize=10, color=INK)
-        for hertz, color in shades.items():
+        for hertz, color in colors.items():
             _draw_rate(ax, [mode["sensitivity"][study] for mode in modes], hertz, color)
         ax.set(xscale="log", yscale="log", xlabel="spatial frequency, cpd", ylim=(1.0, 500.0))
         ax.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
         ax.minorticks_off()
         ax.legend(fontsize=8, frameon=False, loc="lower left")
     axes[0].set_ylabel("contrast sensitivity")
-    figure.supxlabel("points: people; dashed: paper; line: modern", fontsize=9, color=INK)
+    figure.supxlabel("points: observers; dashed: paper; line: modern", fontsize=9, color=INK)
     return figure
 
 
-def _draw_rate(ax: Any, found: Sequence[Mapping[str, Any]], hertz: float, color: str) -> None:
-    """Points and curves of one temporal frequency, where there are enough to make a curve.
+def _draw_rate(ax: Any, modes: Sequence[Mapping[str, Any]], hertz: float, color: str) -> None:
+    """Draw the points and curves of one temporal frequency, if it has two or more gratings.
 
-    Gratings as large as the largest make one curve, filled points; smaller ones another, open points.
+    Gratings of the largest area are filled points with one curve; smaller ones are open points with another.
     """
-    is_rate = np.abs(_array(found[0]["temporal_hz"]) - hertz) < 0.01
-    area, cpd = (_array(found[0][name]) for name in ("area_deg2", "frequency_cpd"))
+    is_rate = np.abs(_array(modes[0]["temporal_hz"]) - hertz) < 0.01
+    area, cpd = (_array(modes[0][name]) for name in ("area_deg2", "frequency_cpd"))
     is_large = area > 0.99 * area.max()
     for is_chosen, face in ((is_rate & is_large, color), (is_rate & ~is_large, "white")):
         if np.count_nonzero(is_chosen) < 2:
             continue
         label = f"{hertz:g} Hz" + ("" if face == color else ", smaller")
-        people = _array(found[0]["people"])[is_chosen]
-        ax.plot(cpd[is_chosen], people, "o", color=color, markerfacecolor=face, markersize=5, label=label)
+        observers = _array(modes[0]["observers"])[is_chosen]
+        ax.plot(cpd[is_chosen], observers, "o", color=color, markerfacecolor=face, markersize=5, label=label)
         order = np.argsort(cpd[is_chosen], kind="stable")
-        for mode, style in zip(found, MODE_STYLES, strict=False):
+        for mode, style in zip(modes, MODE_STYLES, strict=False):
             curve = np.maximum(_array(mode["metric"])[is_chosen][order], 0.01)
             ax.plot(cpd[is_chosen][order], curve, style["linestyle"], color=color, linewidth=1.2)
 
@@ -159,22 +160,22 @@ def _draw_rate(ax: Any, found: Sequence[Mapping[str, Any]], hertz: float, color:
 def _moving_texture(modes: Sequence[Mapping[str, Any]]) -> Figure:
     figure, axes = _new(len(modes), width=1.2)
     for ax, mode in zip(axes, modes, strict=True):
-        found = mode["moving_texture"]
-        people, metric = _array(found["people_jnd"]), _array(found["metric_jnd"])
-        spread = np.array([found["low_jnd"], found["high_jnd"]])
-        kinds = [(c["texture"], c["display"]) for c in found["conditions"]]
+        results = mode["moving_texture"]
+        observers, metric = _array(results["observers_jnd"]), _array(results["metric_jnd"])
+        interval = np.array([results["low_jnd"], results["high_jnd"]])
+        kinds = [(c["texture"], c["display"]) for c in results["conditions"]]
         for texture, color in TEXTURE_COLORS.items():
             for display, marker in DISPLAY_MARKERS.items():
                 is_chosen = np.array([kind == (texture, display) for kind in kinds])
-                shown = {"color": color, "markersize": 5, "elinewidth": 0.5}
+                style = {"color": color, "markersize": 5, "elinewidth": 0.5}
                 label = f"{texture}, {display}"
-                bars = spread[:, is_chosen]
-                ax.errorbar(metric[is_chosen], people[is_chosen], yerr=bars, fmt=marker, label=label, **shown)
+                x, y, bars = metric[is_chosen], observers[is_chosen], interval[:, is_chosen]
+                ax.errorbar(x, y, yerr=bars, fmt=marker, label=label, **style)
         ax.set_xscale("log")
         ax.set_title(mode["mode"], fontsize=10, color=INK)
         ax.set_xlabel("score of the metric, JND")
         ax.axhline(0.0, color=INK, linewidth=0.8)
-    axes[0].set_ylabel("quality lost to people, JND")
+    axes[0].set_ylabel("quality loss reported by observers, JND")
     axes[-1].legend(fontsize=7, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 

@@ -1,4 +1,4 @@
-"""``enfilade validate``: the metric against what people saw."""
+"""``python -m studies validate``: validation of the metric on observers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from studies.observers.validate import Validation
 
 
-@click.command("validate", short_help="The metric against what people saw.")
+@click.command("validate", short_help="Validate the metric on published experiments.")
 @click.option(
     "--plots",
     "folder",
@@ -30,30 +30,29 @@ if TYPE_CHECKING:
 @debug_option
 @click.pass_context
 def command(ctx: click.Context, /, *, folder: Path | None, as_json: bool, quiet: bool) -> None:
-    """Judge the metric by what people saw: thresholds, masking, moving textures, flicker.
+    """Compare the metric with observers: thresholds, masking, moving textures, flicker.
 
-    Both modes of the metric are shown the stimuli of published experiments. The exit status is 1 where
-    a figure of the modern mode misses what is asked of it. What was fitted is fitted again with a part of
-    the data left out. About five minutes.
+    Both modes of the metric are applied to the stimuli of published experiments. The exit status is 1 if
+    the modern mode misses a target. The fitted constants are cross-validated. This takes about five minutes.
     """
     from enfilade.cli.progress import watch
     from studies.observers.validate import validate
 
     with watch(quiet=quiet) as monitor:
-        found = validate(monitor)
+        validation = validate(monitor)
     if folder is not None:
-        from studies.observers.charts import plot_people
+        from studies.observers.charts import plot_validation
 
-        for file in plot_people(found.to_dict(), folder):
+        for file in plot_validation(validation.to_dict(), folder):
             click.echo(f"plot    {file}", err=True)
     if as_json:
-        click.echo(json.dumps(found.to_dict(), indent=2))
+        click.echo(json.dumps(validation.to_dict(), indent=2))
     else:
-        _show(_table(found))
-        _show(_fits_table(found))
-    if found.missed:
-        names = ", ".join(figure.name.strip() for figure in found.missed)
-        click.echo(f"Missed: {names}.", err=True)
+        _show(_figures_table(validation))
+        _show(_fits_table(validation))
+    if validation.missed:
+        names = ", ".join(figure.name.strip() for figure in validation.missed)
+        click.echo(f"Targets missed: {names}.", err=True)
         ctx.exit(FAILURE)
 
 
@@ -63,37 +62,38 @@ def _show(table: Table) -> None:
     Console().print(table)
 
 
-def _table(found: Validation) -> Table:
+def _figures_table(validation: Validation) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table(title="The metric against people", title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(title="Validation on observers", title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("figure", no_wrap=True)
-    for heading in (*(mode.mode for mode in found.modes), "asked", ""):
+    for heading in (*(mode.mode for mode in validation.modes), "target", ""):
         table.add_column(heading, justify="right")
     table.add_column("unit")
-    for figures in zip(*(mode.figures() for mode in found.modes), strict=True):
+    for figures in zip(*(mode.figures() for mode in validation.modes), strict=True):
         last = figures[-1]
-        asked = "" if last.asked is None else f"{'≥' if last.asked.is_least else '≤'} {last.asked.bound:.2f}"
-        verdict = "" if last.asked is None else ("ok" if last.is_met else "MISSED")
-        table.add_row(last.name, *(f"{figure.value:.3f}" for figure in figures), asked, verdict, last.unit)
+        target = last.target
+        bound = "" if target is None else f"{'≥' if target.is_least else '≤'} {target.bound:.2f}"
+        status = "" if target is None else ("ok" if last.is_met else "MISSED")
+        table.add_row(last.name, *(f"{figure.value:.3f}" for figure in figures), bound, status, last.unit)
     return table
 
 
-def _fits_table(found: Validation) -> Table:
+def _fits_table(validation: Validation) -> Table:
     from rich import box
     from rich.table import Table
 
     def listed(numbers: Iterable[float]) -> str:
         return ", ".join(f"{number:g}" for number in numbers)
 
-    table = Table(title="What was fitted, by data left out", title_justify="left", box=box.SIMPLE_HEAD)
-    for heading in ("number", "data"):
+    table = Table(title="Cross-validation of fitted constants", title_justify="left", box=box.SIMPLE_HEAD)
+    for heading in ("constant", "data"):
         table.add_column(heading)
-    for heading in ("has", "asked for", "dB RMS", "left out"):
+    for heading in ("value", "best candidates", "RMS, dB", "CV RMS, dB"):
         table.add_column(heading, justify="right")
-    for fit in found.fits:
-        asked = listed(fit.least) if fit.least == fit.most else f"{listed(fit.least)} to {listed(fit.most)}"
-        figures = f"{fit.rms_db:.3f}", f"{fit.left_out_rms_db:.3f}"
-        table.add_row(fit.name, fit.data, listed(fit.chosen), asked, *figures)
+    for fit in validation.fits:
+        best = listed(fit.least) if fit.least == fit.most else f"{listed(fit.least)} to {listed(fit.most)}"
+        errors = f"{fit.rms_db:.3f}", f"{fit.cross_validation_rms_db:.3f}"
+        table.add_row(fit.name, fit.data, listed(fit.chosen), best, *errors)
     return table

@@ -1,4 +1,4 @@
-"""The figures by which the metric is judged against people, and what is asked of them."""
+"""Figures of merit of the metric on observers, and their targets."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from studies.observers.modelfest import Thresholds
 from studies.observers.moving_texture import SCREENS, TEXTURES, Losses
 from studies.observers.sensitivity import Sensitivities
 
-__all__ = ["ASKED", "Asked", "Figure", "Measured"]
+__all__ = ["TARGETS", "Figure", "ModeResults", "Target"]
 
-DARK = frozenset({"grass"})  # its mean is a thirtieth of the others'
+DARK = frozenset({"grass"})  # its mean luminance is a thirtieth of that of the others
 DIM = frozenset({"headset"})
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A bound on a figure.
+class Target:
+    """The bound that a figure must keep.
 
     Attributes
     ----------
     bound : float
         In the figure's unit.
     is_least : bool
-        Whether the figure must be at least the bound, instead of at most.
+        Whether the bound is a lower one instead of an upper one.
     """
 
     bound: float
@@ -39,15 +39,15 @@ class Asked:
         return value >= self.bound if self.is_least else value <= self.bound
 
 
-ASKED = {  # of the modern mode
-    "ModelFest": Asked(2.0),
-    "Foley masking": Asked(2.0),
-    "Robson 1966": Asked(3.0),
-    "Laird 2006": Asked(3.0),
-    "ModelFest Gabors": Asked(3.0),
-    "moving texture, 54 conditions": Asked(0.82, is_least=True),
-    "moving texture, 36 conditions": Asked(0.90, is_least=True),
-    "flicker against blur": Asked(1.01, is_least=True),
+TARGETS = {  # of the modern mode
+    "ModelFest": Target(2.0),
+    "Foley masking": Target(2.0),
+    "Robson 1966": Target(3.0),
+    "Laird 2006": Target(3.0),
+    "ModelFest Gabors": Target(3.0),
+    "moving texture, 54 conditions": Target(0.82, is_least=True),
+    "moving texture, 36 conditions": Target(0.90, is_least=True),
+    "flicker against blur": Target(1.01, is_least=True),
 }
 
 
@@ -58,24 +58,24 @@ class Figure:
     Attributes
     ----------
     name : str
-        What it is a figure of.
+        Experiment, or part of one.
     unit : str
         Of the value.
     value : float
         As measured.
-    asked : Asked or None
+    target : Target or None
         None: reported only.
     """
 
     name: str
     unit: str
     value: float
-    asked: Asked | None = None
+    target: Target | None = None
 
     @property
     def is_met(self) -> bool:
-        """Whether the value keeps to what is asked; true where nothing is."""
-        return self.asked is None or self.asked.is_met(self.value)
+        """Whether the value meets its target; true without one."""
+        return self.target is None or self.target.is_met(self.value)
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, for JSON."""
@@ -83,15 +83,15 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
-    """Everything that one mode of the metric says, beside what people said.
+class ModeResults:
+    """Results of one mode of the metric, beside those of the observers.
 
     Attributes
     ----------
     mode : str
-        Its name.
-    is_bound : bool
-        Whether anything is asked of it.
+        Name of the mode.
+    has_targets : bool
+        Whether the targets apply to it.
     thresholds : Thresholds
         ModelFest.
     masking : Masking
@@ -105,7 +105,7 @@ class Measured:
     """
 
     mode: str
-    is_bound: bool
+    has_targets: bool
     thresholds: Thresholds
     masking: Masking
     sensitivities: dict[str, Sensitivities]
@@ -113,10 +113,10 @@ class Measured:
     flicker: dict[str, Pair]
 
     def figures(self) -> tuple[Figure, ...]:
-        """The table's rows."""
+        """All figures, in the order of the table."""
         rows = (*self._of_thresholds(), *self._of_sequences())
         return tuple(
-            Figure(name, unit, value, ASKED.get(name) if self.is_bound else None)
+            Figure(name, unit, value, TARGETS.get(name) if self.has_targets else None)
             for name, unit, value in rows
         )
 
@@ -124,7 +124,7 @@ class Measured:
         robson, laird, gabors = (self.sensitivities[s] for s in ("robson1966", "laird2006", "modelfest"))
         return [
             ("ModelFest", "dB RMS", self.thresholds.rms_db),
-            ("  each target by the others' gain", "dB RMS", self.thresholds.left_out_rms_db),
+            ("  cross-validated gain", "dB RMS", self.thresholds.cross_validation_rms_db),
             ("  gain", "dB", self.thresholds.gain_db),
             ("Foley masking", "dB RMS", self.masking.rms_db),
             ("Robson 1966", "dB RMS", robson.rms_db),

@@ -1,8 +1,8 @@
-"""What was fitted to people, fitted again with a part of what people said left out.
+"""Cross-validation of the fitted constants.
 
-A number that is fitted to a data set says little of how well the metric does on that set. So each
-measurement is judged here by the candidate that suits all the others best, and one data set by the
-number that another one asks for.
+The error on the data to which a constant was fitted is optimistic. Each measurement is therefore evaluated
+with the candidate that fits all other measurements best (leave-one-out), and each data set with the candidate
+that fits another data set best.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ APERTURES_DEG = (0.2, 0.3, 0.45, 0.6)
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted number, or two, and how far the data that they were fitted to speak for themselves.
+    """Cross-validation of one fitted constant, or of two that were fitted together.
 
     Attributes
     ----------
     name : str
-        What was fitted.
+        The constants.
     data : str
-        To what, or by what it is judged where the number is another data set's.
+        The data set that is evaluated, and the one that selects the candidate.
     chosen : tuple of float
-        What the metric has.
+        Values of the metric.
     rms_db : float
-        Of the whole data set, with what the metric has.
-    left_out_rms_db : float
-        The same where each measurement is judged by the candidate that the others ask for.
+        Error of the whole data set with the metric's values.
+    cross_validation_rms_db : float
+        Error of the data set with candidates that were selected without it, or without the measurement.
     least, most : tuple of float
-        Range of the candidates that were asked for.
+        Range of the selected candidates.
     """
 
     name: str
     data: str
     chosen: tuple[float, ...]
     rms_db: float
-    left_out_rms_db: float
+    cross_validation_rms_db: float
     least: tuple[float, ...]
     most: tuple[float, ...]
 
@@ -71,37 +71,37 @@ def fit(
     *,
     has_gain: bool = False,
 ) -> Fit:
-    """Leave out each measurement in turn.
+    """Cross-validate a constant by leaving out each measurement in turn.
 
     Parameters
     ----------
     name, data : str
         For tables.
     candidates : tuple of M tuples
-        Values that were tried.
+        Candidate values.
     chosen : tuple of float
-        That of them which the metric has.
+        The candidate that the metric uses.
     errors_db : (M, N) float64
         Error of each of N measurements with each candidate.
     has_gain : bool
-        Whether the mean of the errors is taken off, which is a fitted number too.
+        Whether the mean error is subtracted, which is a fitted constant, too.
     """
     count = errors_db.shape[1]
-    left_out, asked = np.zeros(count), []
-    for place in range(count):
-        others = np.delete(errors_db, place, axis=1)
+    left_out_db, selected = np.zeros(count), []
+    for index in range(count):
+        others = np.delete(errors_db, index, axis=1)
         gain = others.mean(axis=1) if has_gain else np.zeros(len(candidates))
         best = int(np.argmin(_rms(others - gain[:, None])))
-        left_out[place] = errors_db[best, place] - gain[best]
-        asked.append(candidates[best])
-    own = errors_db[candidates.index(chosen)]
+        left_out_db[index] = errors_db[best, index] - gain[best]
+        selected.append(candidates[best])
+    errors = errors_db[candidates.index(chosen)]
     return Fit(
         name,
         data,
         chosen,
-        float(_rms(own - own.mean() if has_gain else own)),
-        float(_rms(left_out)),
-        *(tuple(float(end) for end in ends) for ends in (np.min(asked, axis=0), np.max(asked, axis=0))),
+        float(_rms(errors - errors.mean() if has_gain else errors)),
+        float(_rms(left_out_db)),
+        *(tuple(float(end) for end in ends) for ends in (np.min(selected, axis=0), np.max(selected, axis=0))),
     )
 
 
@@ -109,15 +109,15 @@ def _rms(errors: Float64Array) -> Float64Array:
     return np.asarray(np.sqrt(np.mean(np.square(errors), axis=-1)))
 
 
-def _between(name: str, data: str, chosen: float, own: Float64Array, others: Float64Array) -> Fit:
-    """Judge a data set by the aperture that suits another one best."""
-    best = int(np.argmin(others))
-    asked = (APERTURES_DEG[best],)
-    mine = float(own[APERTURES_DEG.index(chosen)])
-    return Fit(name, data, (chosen,), mine, float(own[best]), asked, asked)
+def _fit_across(name: str, data: str, chosen: float, errors_db: Float64Array, others_db: Float64Array) -> Fit:
+    """Evaluate a data set with the aperture that fits another data set best."""
+    best = int(np.argmin(others_db))
+    selected = (APERTURES_DEG[best],)
+    chosen_db = float(errors_db[APERTURES_DEG.index(chosen)])
+    return Fit(name, data, (chosen,), chosen_db, float(errors_db[best]), selected, selected)
 
 
-def _with(transducer: Transducer, aperture_sigma_deg: float = APERTURE_SIGMA_DEG) -> Mode:
+def _modern_with(transducer: Transducer, aperture_sigma_deg: float = APERTURE_SIGMA_DEG) -> Mode:
     """The modern mode with other constants."""
 
     def aqm(viewing: Viewing) -> Aqm:
@@ -127,45 +127,45 @@ def _with(transducer: Transducer, aperture_sigma_deg: float = APERTURE_SIGMA_DEG
 
 
 def measure(monitor: Monitor) -> tuple[Fit, ...]:
-    """Fit all fitted constants of the modern mode anew.
+    """Cross-validate all fitted constants of the modern mode.
 
     Parameters
     ----------
     monitor : Monitor
-        Is told of each candidate.
+        Shows the progress over the candidates.
 
     Notes
     -----
     About a minute and a half of CPU time.
     """
     masking = [
-        foley.measure(_with(Transducer(z, fraction)), Silence()).error_db
+        foley.measure(_modern_with(Transducer(z, fraction)), Silence()).error_db
         for fraction, z in counted(TRANSDUCERS, "fits of the transducer", monitor)
     ]
     thresholds, masked = [], []
     for sigma_deg in counted(APERTURES_DEG, "fits of the aperture", monitor):
-        other = _with(Transducer(), sigma_deg)
-        thresholds.append(-modelfest.measure(other, Silence()).error_db)
-        masked.append(foley.measure(other, Silence()).error_db)
+        mode = _modern_with(Transducer(), sigma_deg)
+        thresholds.append(-modelfest.measure(mode, Silence()).error_db)
+        masked.append(foley.measure(mode, Silence()).error_db)
     apertures = tuple((sigma_deg,) for sigma_deg in APERTURES_DEG)
-    has, chosen = Transducer(), APERTURE_SIGMA_DEG
+    transducer, aperture_deg = Transducer(), APERTURE_SIGMA_DEG
     by_modelfest, by_foley = _rms(np.array(thresholds)), _rms(np.array(masked))
     return (
         fit(
             "transducer: neighbour_fraction, semi_saturation",
-            "Foley, each mask by the others",
+            "Foley, leave-one-out",
             TRANSDUCERS,
-            (has.neighbour_fraction, has.semi_saturation),
+            (transducer.neighbour_fraction, transducer.semi_saturation),
             np.array(masking),
         ),
         fit(
             "aperture, deg",
-            "ModelFest, each target by the others",
+            "ModelFest, leave-one-out",
             apertures,
-            (chosen,),
+            (aperture_deg,),
             np.array(thresholds),
             has_gain=True,
         ),
-        _between("aperture, deg", "ModelFest by Foley's", chosen, by_modelfest, by_foley),
-        _between("aperture, deg", "Foley by ModelFest's", chosen, by_foley, by_modelfest),
+        _fit_across("aperture, deg", "ModelFest, fitted on Foley", aperture_deg, by_modelfest, by_foley),
+        _fit_across("aperture, deg", "Foley, fitted on ModelFest", aperture_deg, by_foley, by_modelfest),
     )

@@ -1,7 +1,8 @@
-"""Flicker: errors that come and go against a steady blur of larger error (three made examples).
+"""Flicker against blur: scores of flickering errors and of a steady blur (three synthetic examples).
 
-No experiment, but what everyone who has seen rendered animation knows: of two sequences with the same
-mean squared error, the one that flickers is worse. The blur's squared error is the larger one in each.
+These are not measurements of observers. They test a common experience with rendered animation: of two
+sequences with the same mean squared error, the flickering one looks worse. In each example the blur has the
+larger squared error.
 """
 
 from __future__ import annotations
@@ -32,17 +33,17 @@ FRAMES = 6
 MEAN_CD_M2 = 40.0
 BLUR_PX = 1.0
 PAN_PX = 3  # a frame, in the third example
-SHARE = 0.9  # of the blur's squared error that the flicker has
+SHARE = 0.9  # of the blur's squared error: the squared error of the flicker
 
 
 @dataclass(frozen=True)
 class Pair:
-    """What the metric says of one example.
+    """Scores of one example.
 
     Attributes
     ----------
     flicker_jnd, blur_jnd : float
-        Scores of the sequence whose error flickers and of the one that is steadily blurred.
+        Of the sequence with the flickering error, and of the blurred one.
     """
 
     flicker_jnd: float
@@ -50,7 +51,7 @@ class Pair:
 
     @property
     def ratio(self) -> float:
-        """Above 1 where the flicker is scored worse."""
+        """Ratio of the scores; above 1 where the flicker is scored worse."""
         return self.flicker_jnd / self.blur_jnd
 
 
@@ -74,19 +75,19 @@ def _blurred(scene: Float64Array) -> Float64Array:
 
 
 def _shimmer(frame: int, scene: Float64Array) -> Float64Array:
-    """Edges that jump to and fro by a part of a pixel."""
+    """Edges that alternate between two positions a fraction of a pixel apart."""
     sign = 1.0 if frame % 2 else -1.0
     return sign * (np.roll(scene, 1, axis=1) - np.roll(scene, -1, axis=1))
 
 
 def _boil(frame: int, scene: Float64Array) -> Float64Array:
-    """Noise that is another one in each frame, of the scene's own contrast."""
+    """Noise of the scene's contrast, independent in each frame."""
     noise = np.random.default_rng(frame).standard_normal(scene.shape)
     return scene * scipy.ndimage.gaussian_filter(noise, 1.0, mode="wrap")
 
 
 def _pump(frame: int, scene: Float64Array) -> Float64Array:
-    """Patches of light that go on and off in turn."""
+    """Patches that are brightened and darkened in alternate frames."""
     y, x = np.mgrid[:SIZE_PX, :SIZE_PX] // 32
     return np.where((x + y + frame) % 2 == 0, scene, -scene)
 
@@ -100,7 +101,7 @@ EXAMPLES: dict[str, tuple[Error, int]] = {  # error of a frame, pan in pixels a 
 
 
 def sequences(example: str) -> list[tuple[Float32Array, Float32Array, Float32Array]]:
-    """Frames of an example: the reference, with a flickering error, and steadily blurred.
+    """Frames of an example: the reference, the one with a flickering error, and the blurred one.
 
     Parameters
     ----------
@@ -113,10 +114,10 @@ def sequences(example: str) -> list[tuple[Float32Array, Float32Array, Float32Arr
         cd/m2. The flicker's mean squared error is 0.9 times that of the blur, in each frame.
     """
     error, pan_px = EXAMPLES[example]
-    still = _scene()
+    static_scene = _scene()
     found = []
     for frame in range(FRAMES):
-        scene = np.roll(still, frame * pan_px, axis=1)
+        scene = np.roll(static_scene, frame * pan_px, axis=1)
         blurred = _blurred(scene)
         change = error(frame, scene)
         change *= np.sqrt(SHARE * np.mean((blurred - scene) ** 2) / np.mean(change**2))
@@ -134,7 +135,7 @@ def measure(mode: Mode, monitor: Monitor) -> dict[str, Pair]:
     mode : Mode
         The metric.
     monitor : Monitor
-        Is told of each example.
+        Shows the progress over the examples.
     """
     pairs = {}
     for example, (_, pan_px) in counted(list(EXAMPLES.items()), f"flicker, {mode.name}", monitor):

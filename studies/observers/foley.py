@@ -1,8 +1,8 @@
 """Masking: a Gabor on a sine of the same frequency and orientation (Foley 1994).
 
-Both were shown for 33 ms, too briefly for the full sensitivity that the metric has. One number makes up
-for that: mask and target are shown to the metric in units of the threshold without a mask, people's and
-its own. The comparison is then of the curve's shape, and no error is counted at the unmasked threshold.
+The stimuli lasted 33 ms, too short for the full sensitivity that the metric assumes. One gain corrects for
+this: contrasts are relative to the unmasked threshold, of the observers and of the metric. The comparison
+therefore tests the shape of the masking curve; the unmasked threshold has no error by definition.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["UNMASKED_DB", "Masking", "gabor_and_sine", "measure"]
 
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
-UNMASKED_DB = -31.67  # people's threshold without a mask, 20 log10 contrast
+UNMASKED_DB = -31.67  # unmasked threshold of the observers, 20 log10 contrast
 FREQUENCY_CPD = 2.0
 SIGMA_DEG = 0.5
 MEAN_CD_M2 = 32.0
@@ -40,24 +40,24 @@ class Masking:
     Attributes
     ----------
     mask_db : (N,) float64
-        Contrast of the mask as shown to people, 20 log10.
-    people_db : (N,) float64
+        Contrast of the mask in the experiment, 20 log10.
+    observers_db : (N,) float64
         Contrast of the target at threshold, 20 log10.
     metric_db : (N,) float64
-        The metric's, moved so that the unmasked thresholds agree.
+        That of the metric, after the gain.
     gain_db : float
-        That move: people's unmasked threshold less the metric's.
+        Unmasked threshold of the observers less that of the metric.
     """
 
     mask_db: Float64Array
-    people_db: Float64Array
+    observers_db: Float64Array
     metric_db: Float64Array
     gain_db: float
 
     @property
     def error_db(self) -> Float64Array:
-        """Of each mask; positive where the metric masks too much."""
-        return self.metric_db - self.people_db
+        """Error of each mask; positive where the metric masks too much."""
+        return self.metric_db - self.observers_db
 
     @property
     def rms_db(self) -> float:
@@ -74,27 +74,27 @@ def gabor_and_sine() -> tuple[Float64Array, Float64Array]:
 
 
 def measure(mode: Mode, monitor: Monitor) -> Masking:
-    """Thresholds of the metric on Foley's masks, beside those of people.
+    """Thresholds of the metric on Foley's masks, beside those of the observers.
 
     Parameters
     ----------
     mode : Mode
         The metric.
     monitor : Monitor
-        Is told of each mask.
+        Shows the progress over the masks.
     """
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     gabor, sine = gabor_and_sine()
-    _, people = read_columns("foley.csv", "mask_db", "threshold_db")
-    alone_db = _db(threshold_contrast(observer, gabor, MEAN_CD_M2))
-    gain_db = UNMASKED_DB - alone_db
-    found = []
-    masks = list(zip(people["mask_db"], people["threshold_db"], strict=True))
-    for mask_db, known_db in counted(masks, f"masking, {mode.name}", monitor):
-        mask, guess = (10.0 ** ((db - gain_db) / 20.0) for db in (mask_db, known_db))
+    _, observers = read_columns("foley.csv", "mask_db", "threshold_db")
+    unmasked_db = _db(threshold_contrast(observer, gabor, MEAN_CD_M2))
+    gain_db = UNMASKED_DB - unmasked_db
+    thresholds_db = []
+    masks = list(zip(observers["mask_db"], observers["threshold_db"], strict=True))
+    for mask_db, observed_db in counted(masks, f"masking, {mode.name}", monitor):
+        mask, guess = (10.0 ** ((db - gain_db) / 20.0) for db in (mask_db, observed_db))
         contrast = threshold_contrast(observer, gabor, MEAN_CD_M2, mask=mask * sine, guess=guess)
-        found.append(_db(contrast) + gain_db)
-    return Masking(people["mask_db"], people["threshold_db"], np.array(found), gain_db)
+        thresholds_db.append(_db(contrast) + gain_db)
+    return Masking(observers["mask_db"], observers["threshold_db"], np.array(thresholds_db), gain_db)
 
 
 def _db(contrast: float) -> float:

@@ -1,4 +1,4 @@
-"""A mode of the metric under validation: how it is made, and its CSF as a function."""
+"""A mode of the metric under validation: its constructor, and its CSF as a function."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Mode:
     name : str
         For tables.
     aqm : callable
-        Makes the metric for a viewing condition.
+        Constructor of the metric for a viewing condition.
     sensitivity : callable
         The CSF for a grating that flickers or moves: (frequency_cpd, temporal_hz, luminance_cd_m2,
         area_deg2) -> 1 / contrast at threshold.
@@ -37,7 +37,7 @@ class Mode:
 def _eq_4(frequency_cpd: float, temporal_hz: float, _luminance_cd_m2: float, _area_deg2: float) -> float:
     """Eq. 4, which depends on neither luminance nor size.
 
-    A grating that changes at w Hz is one that moves at w / rho deg/s, and never slower than the eye drifts.
+    A grating of w Hz moves at w / rho deg/s, at least at the drift of the eye.
     """
     speed = max(temporal_hz / frequency_cpd, EYE_DRIFT_DEG_S)
     return float(spatiovelocity_sensitivity(frequency_cpd, speed))

@@ -50,32 +50,32 @@ TILTED = {36: (45.0,), 37: (0.0,), 38: (45.0, 90.0), 39: (0.0, 90.0)}  # normals
 
 @dataclass(frozen=True, eq=False)
 class Thresholds:
-    """Sensitivity of people and of the metric to a set of targets.
+    """Sensitivity of the observers and of the metric to a set of targets.
 
     Attributes
     ----------
     number : (N,) int64
         Number of the target.
-    people_db, metric_db : (N,) float64
+    observers_db, metric_db : (N,) float64
         -20 log10 of the contrast at threshold.
     spread_db : (N,) float64
-        Standard deviation between people.
+        Standard deviation between observers.
     """
 
     number: npt.NDArray[np.int64]
-    people_db: Float64Array
+    observers_db: Float64Array
     metric_db: Float64Array
     spread_db: Float64Array
 
     @property
     def gain_db(self) -> float:
-        """How much less sensitive than people the metric is on average: the one fitted number."""
-        return float(np.mean(self.people_db - self.metric_db))
+        """Mean sensitivity of the observers over that of the metric: the one fitted number."""
+        return float(np.mean(self.observers_db - self.metric_db))
 
     @property
     def error_db(self) -> Float64Array:
-        """Of each target, once the gain is applied; positive where the metric is too sensitive."""
-        return self.metric_db + self.gain_db - self.people_db
+        """Error of each target after the gain; positive where the metric is too sensitive."""
+        return self.metric_db + self.gain_db - self.observers_db
 
     @property
     def rms_db(self) -> float:
@@ -83,8 +83,8 @@ class Thresholds:
         return float(np.sqrt(np.mean(self.error_db**2)))
 
     @property
-    def left_out_rms_db(self) -> float:
-        """The same with, for each target, the gain that the other targets ask for."""
+    def cross_validation_rms_db(self) -> float:
+        """The same, each target with the gain of the other targets."""
         count = len(self.number)
         return self.rms_db * count / (count - 1)
 
@@ -106,10 +106,10 @@ def _wave(x: Float64Array, y: Float64Array, cpd: float, normal_deg: float = 90.0
 
 
 def _collinear(x: Float64Array, y: Float64Array, sign: float) -> Float64Array:
-    sigma, apart = 0.07, 5.0 * 0.07
+    sigma, spacing = 0.07, 5.0 * 0.07
     total = np.zeros_like(x)
-    for place in range(-2, 3):
-        total += sign**place * _gauss(x - place * apart, y, sigma, sigma)
+    for index in range(-2, 3):
+        total += sign**index * _gauss(x - index * spacing, y, sigma, sigma)
     total *= _wave(x, y, 8.0)
     return total
 
@@ -128,7 +128,7 @@ def _checks(x: Float64Array, y: Float64Array) -> Float64Array:
     return np.where(across * down >= 0.0, 1.0, -1.0)
 
 
-# Profiles that the wide Gaussian windows, and the rest, which are whole.
+# Profiles under the wide Gaussian window, and targets without a window.
 WINDOWED: dict[int, Callable[[Float64Array, Float64Array], Float64Array]] = {
     30: lambda _, y: np.where(y >= 0.0, 1.0, -1.0),
     31: lambda _, y: _row(y, 0),
@@ -175,14 +175,14 @@ def target(number: int) -> Float64Array:
 
 
 def measure(mode: Mode, monitor: Monitor) -> Thresholds:
-    """Thresholds of the metric for all 41 targets, beside those of people.
+    """Thresholds of the metric for all 41 targets, beside those of the observers.
 
     Parameters
     ----------
     mode : Mode
         The metric.
     monitor : Monitor
-        Is told of each target.
+        Shows the progress over the targets.
 
     Returns
     -------
@@ -190,15 +190,18 @@ def measure(mode: Mode, monitor: Monitor) -> Thresholds:
         In the order of the targets' numbers.
     """
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
-    _, people = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
-    numbers = people["target"].astype(np.int64)
-    chosen = ~np.isin(numbers, IMAGES)
-    found = []
-    targets = list(zip(numbers[chosen], people["sensitivity_db"][chosen], strict=True))
-    for number, known_db in counted(targets, f"ModelFest, {mode.name}", monitor):
-        guess = 10.0 ** (-known_db / 20.0)
+    _, observers = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
+    numbers = observers["target"].astype(np.int64)
+    is_chosen = ~np.isin(numbers, IMAGES)
+    sensitivities_db = []
+    targets = list(zip(numbers[is_chosen], observers["sensitivity_db"][is_chosen], strict=True))
+    for number, observed_db in counted(targets, f"ModelFest, {mode.name}", monitor):
+        guess = 10.0 ** (-observed_db / 20.0)
         contrast = threshold_contrast(observer, target(int(number)), MEAN_CD_M2, guess=guess)
-        found.append(-20.0 * math.log10(contrast))
+        sensitivities_db.append(-20.0 * math.log10(contrast))
     return Thresholds(
-        numbers[chosen], people["sensitivity_db"][chosen], np.array(found), people["spread_db"][chosen]
+        numbers[is_chosen],
+        observers["sensitivity_db"][is_chosen],
+        np.array(sensitivities_db),
+        observers["spread_db"][is_chosen],
     )

@@ -1,14 +1,13 @@
-"""Moving texture: what coarser shading costs while the texture scrolls (Jindal et al. 2021).
+"""Moving texture: quality loss by coarse shading of scrolling textures (Jindal et al. 2021).
 
 A texture pans over the screen. One version is shaded in every pixel, the other once for two or four
-neighbouring columns. 13 observers compared them on three displays at three speeds each. This tests what
-the metric claims: that motion hides detail.
+neighbouring columns. 13 observers compared them on three displays at three speeds each. This tests the
+prediction that motion hides detail.
 
-The stimuli, pixel for pixel as on the screen: a texel is as wide as a pixel; the texture stands at
-fractions of a pixel as its speed wants; a sample for n columns takes the mipmap level of n by n texels, at
-the middle of the columns, which stay where they are on the screen while the texture moves under them.
-White is twice the display's mean luminance. The authors' model takes 2 deg/s off each speed, for a
-rotation that went on throughout; so does this.
+The stimuli are reproduced pixel by pixel. A texel is as wide as a pixel, and the texture moves by fractions
+of a pixel. A sample for n columns reads the mipmap level of n by n texels at the centre of the columns; the
+columns are fixed on the screen while the texture moves. White is twice the display's mean luminance. As in
+the authors' model, 2 deg/s are subtracted from each speed, for the constant rotation of the experiment.
 """
 
 from __future__ import annotations
@@ -39,14 +38,14 @@ __all__ = [
     "conditions",
     "measure",
     "score",
-    "shown",
+    "shade",
 ]
 
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
-ROWS = slice(192, 320)  # a quarter of the texture is enough: rows are alike
-FRAMES = 4  # the first has no frame before it
+ROWS = slice(192, 320)  # a quarter of the texture: rows are alike
+FRAMES = 4  # the first has no previous frame
 ROTATION_DEG_S = 2.0  # the authors' correction of all speeds
 
 
@@ -59,9 +58,9 @@ class Display:
     pixels_per_degree, fps : float
         Pixels and images per second.
     mean_cd_m2 : float
-        Luminance of a texture whose mean is a half.
+        Luminance of a texture of mean 0.5.
     persistence : float
-        Share of a frame's time for which it is lit.
+        Share of a frame's time for which the display is lit.
     """
 
     pixels_per_degree: float
@@ -70,7 +69,7 @@ class Display:
     persistence: float = 1.0
 
     def viewing(self, width_px: int, height_px: int) -> Viewing:
-        """Viewing conditions of an image on it."""
+        """Viewing conditions of an image on this display."""
         square = screen(width_px, self.pixels_per_degree, fps=self.fps, peak_cd_m2=2.0 * self.mean_cd_m2)
         return dataclasses.replace(square.cropped(width_px, height_px), persistence=self.persistence)
 
@@ -78,7 +77,7 @@ class Display:
 DISPLAYS = {
     "pc": Display(50.0, 144.0, 150.0),
     "phone": Display(90.0, 60.0, 75.0),
-    "headset": Display(26.0, 144.0, 2.5, persistence=0.04),  # as the published answers list it
+    "headset": Display(26.0, 144.0, 2.5, persistence=0.04),  # as in the published data
 }
 TEXTURES = frozenset({"checkerboard", "gradient", "grass", "noise"})
 SCREENS = frozenset(DISPLAYS)
@@ -86,7 +85,7 @@ SCREENS = frozenset(DISPLAYS)
 
 @dataclass(frozen=True)
 class Condition:
-    """A texture on a display at a speed, shaded more coarsely."""
+    """A coarsely shaded texture on a display at a speed."""
 
     texture: str
     columns_per_sample: int
@@ -96,52 +95,51 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Losses:
-    """What people and the metric say of each condition.
+    """Quality losses by the observers and by the metric, for each condition.
 
     Attributes
     ----------
     conditions : tuple of Condition
-        72 of them.
-    people_jnd : (N,) float64
-        Quality lost against shading in every pixel; below 0 where people preferred the coarse one.
+        All 72.
+    observers_jnd : (N,) float64
+        Quality loss against shading in every pixel; below 0 where the observers preferred coarse shading.
     low_jnd, high_jnd : (N,) float64
-        From there down and up to the ends of the confidence interval.
+        Distance down and up to the ends of the confidence interval.
     metric_jnd : (N,) float64
         Score of the sequence.
     """
 
     conditions: tuple[Condition, ...]
-    people_jnd: Float64Array
+    observers_jnd: Float64Array
     low_jnd: Float64Array
     high_jnd: Float64Array
     metric_jnd: Float64Array
 
     def spearman(self, *, textures: frozenset[str] = TEXTURES, displays: frozenset[str] = SCREENS) -> float:
-        """Rank correlation between people and metric.
+        """Rank correlation between observers and metric.
 
         Parameters
         ----------
         textures, displays : frozenset of str
-            The conditions that count have one of each.
+            Conditions with one of each are counted.
         """
         chosen = np.array([c.texture in textures and c.display in displays for c in self.conditions])
-        found = scipy.stats.spearmanr(self.people_jnd[chosen], self.metric_jnd[chosen])
+        found = scipy.stats.spearmanr(self.observers_jnd[chosen], self.metric_jnd[chosen])
         return float(found.statistic)
 
 
-def shown(texture: Float32Array, shift_px: float, columns_per_sample: int) -> Float32Array:
-    """Shade a texture as graphics hardware does, which has moved to the right.
+def shade(texture: Float32Array, shift_px: float, columns_per_sample: int) -> Float32Array:
+    """Shade a texture that is shifted to the right, as graphics hardware does.
 
-    A sample for n columns takes the texture's mipmap level of n by n texels (hardware that does not
-    filter anisotropically blurs both ways) and interpolates in it, at the middle of the columns. They stay
-    where they are on the screen.
+    A sample for n columns interpolates in the mipmap level of n by n texels at the centre of the columns
+    (without anisotropic filtering, which blurs along both axes). The columns are fixed on the screen.
 
     Parameters
     ----------
     texture : (H, W) float32
         One texel a pixel, periodic; sides are multiples of `columns_per_sample`.
     shift_px : float
-        0 or more; may be a fraction.
+        0 or more; fractions are allowed.
     columns_per_sample : int
         1, 2 or 4.
 
@@ -159,14 +157,14 @@ def shown(texture: Float32Array, shift_px: float, columns_per_sample: int) -> Fl
     return np.repeat(samples, size, axis=1)
 
 
-def _interpolated(texels: Float32Array, places: Float64Array, axis: int) -> Float32Array:
+def _interpolated(texels: Float32Array, positions: Float64Array, axis: int) -> Float32Array:
     """Periodic texels, the centre of the first at 0.5, linearly interpolated along an axis."""
-    first = np.floor(places - 0.5)
-    part = (places - 0.5 - first).astype(np.float32)
-    part = part[None, :] if axis == 1 else part[:, None]
+    first = np.floor(positions - 0.5)
+    weight = (positions - 0.5 - first).astype(np.float32)
+    weight = weight[None, :] if axis == 1 else weight[:, None]
     near = texels.take(first.astype(np.int64), axis=axis, mode="wrap")
     far = texels.take(first.astype(np.int64) + 1, axis=axis, mode="wrap")
-    mixed: Float32Array = near + part * (far - near)
+    mixed: Float32Array = near + weight * (far - near)
     return mixed
 
 
@@ -181,12 +179,12 @@ def conditions() -> tuple[Condition, ...]:
 
 
 def frames(condition: Condition, texture: Float32Array) -> Iterator[tuple[Float32Array, Float32Array]]:
-    """The coarse and the full version of each frame, cd/m2.
+    """Coarsely and fully shaded version of each frame, cd/m2.
 
     Parameters
     ----------
     condition : Condition
-        How the texture moves and is shaded.
+        Motion and shading of the texture.
     texture : (512, 512) float32
         Linear, 1 is white.
     """
@@ -194,12 +192,12 @@ def frames(condition: Condition, texture: Float32Array) -> Iterator[tuple[Float3
     white = np.float32(2.0 * display.mean_cd_m2)
     for frame in range(FRAMES):
         shift_px = frame * step_px(condition)
-        coarse, full = (shown(texture, shift_px, n)[ROWS] for n in (condition.columns_per_sample, 1))
+        coarse, full = (shade(texture, shift_px, n)[ROWS] for n in (condition.columns_per_sample, 1))
         yield white * coarse, white * full
 
 
 def step_px(condition: Condition) -> float:
-    """How far the texture moves from frame to frame, pixels."""
+    """Motion of the texture from frame to frame, pixels."""
     display = DISPLAYS[condition.display]
     speed_deg_s = abs(condition.speed_deg_s - ROTATION_DEG_S)
     return speed_deg_s * display.pixels_per_degree / display.fps
@@ -228,19 +226,19 @@ def score(condition: Condition, texture: Float32Array, mode: Mode) -> float:
 
 
 def measure(mode: Mode, monitor: Monitor) -> Losses:
-    """What the metric says of all conditions, beside what people said.
+    """Scores of the metric for all conditions, beside the losses by the observers.
 
     Parameters
     ----------
     mode : Mode
         The metric.
     monitor : Monitor
-        Is told of each condition.
+        Shows the progress over the conditions.
     """
     textures = read_textures()
-    _, people = read_columns("moving_texture.csv", "jnd", "jnd_low", "jnd_high")
+    _, observers = read_columns("moving_texture.csv", "jnd", "jnd_low", "jnd_high")
     chosen = conditions()
     scores = np.zeros(len(chosen))
     for index, condition in enumerate(counted(chosen, f"moving texture, {mode.name}", monitor)):
         scores[index] = score(condition, textures[condition.texture], mode)
-    return Losses(chosen, -people["jnd"], people["jnd_high"], people["jnd_low"], scores)
+    return Losses(chosen, -observers["jnd"], observers["jnd_high"], observers["jnd_low"], scores)

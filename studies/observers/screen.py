@@ -1,4 +1,4 @@
-"""Screens of laboratories, which are described by pixels per degree."""
+"""Viewing conditions of experiments that state pixels per degree."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enfilade.viewing import Viewing
 
 __all__ = ["screen"]
 
-DISTANCE_M = 1.0  # any: only the angle of a pixel counts
+DISTANCE_M = 1.0  # arbitrary: only the angle of a pixel matters
 
 
 def screen(

@@ -1,4 +1,4 @@
-"""The measurements of people that this package carries, as they lie in `data/`."""
+"""Readers of the published measurements in `data/`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_columns(name: str, *numbers: str) -> tuple[list[dict[str, str]], dict[s
     Returns
     -------
     list of dict
-        A row each, by the heading of the column.
+        One for each row, by the heading of the column.
     dict of (N,) float64
         The converted columns.
     """

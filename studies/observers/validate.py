@@ -1,4 +1,4 @@
-"""The whole validation: both modes over all measurements of observers, and the fits with data left out."""
+"""The whole validation: both modes on all measurements of observers, and cross-validation of the fits."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from enfilade.monitor import Monitor
 from studies.observers import fits, flicker, foley, modelfest, moving_texture, sensitivity
-from studies.observers.figures import Figure, Measured
+from studies.observers.figures import Figure, ModeResults
 from studies.observers.fits import Fit
 from studies.observers.mode import MODERN, PAPER, Mode
 
@@ -16,22 +16,22 @@ __all__ = ["Validation", "measure", "validate"]
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Measurements of both modes.
+    """Results of both modes.
 
     Attributes
     ----------
-    modes : tuple of Measured
+    modes : tuple of ModeResults
         The paper's and the modern mode.
     fits : tuple of Fit
-        Fitted constants, assessed by data left out.
+        Cross-validation of the fitted constants.
     """
 
-    modes: tuple[Measured, ...]
+    modes: tuple[ModeResults, ...]
     fits: tuple[Fit, ...]
 
     @property
     def missed(self) -> tuple[Figure, ...]:
-        """Figures that do not keep to what is asked of them."""
+        """Figures that miss their targets."""
         figures = (figure for mode in self.modes for figure in mode.figures())
         return tuple(figure for figure in figures if not figure.is_met)
 
@@ -41,29 +41,29 @@ class Validation:
             "is_met": not self.missed,
             "missed": [figure.name for figure in self.missed],
             "modes": [mode.to_dict() for mode in self.modes],
-            "fits": [found.to_dict() for found in self.fits],
+            "fits": [fit.to_dict() for fit in self.fits],
         }
 
 
-def measure(mode: Mode, monitor: Monitor, *, is_bound: bool) -> Measured:
-    """Show one mode of the metric all that people were shown.
+def measure(mode: Mode, monitor: Monitor, *, has_targets: bool) -> ModeResults:
+    """Apply one mode of the metric to all stimuli.
 
     Parameters
     ----------
     mode : Mode
         The metric.
     monitor : Monitor
-        Is told of each stimulus.
-    is_bound : bool
-        Whether anything is asked of this mode.
+        Shows the progress over the stimuli.
+    has_targets : bool
+        Whether the targets apply to this mode.
 
     Notes
     -----
     About a minute and a quarter of CPU time.
     """
-    return Measured(
+    return ModeResults(
         mode=mode.name,
-        is_bound=is_bound,
+        has_targets=has_targets,
         thresholds=modelfest.measure(mode, monitor),
         masking=foley.measure(mode, monitor),
         sensitivities={study: sensitivity.measure(study, mode) for study in sensitivity.STUDIES},
@@ -73,12 +73,12 @@ def measure(mode: Mode, monitor: Monitor, *, is_bound: bool) -> Measured:
 
 
 def validate(monitor: Monitor) -> Validation:
-    """Both modes, of which something is asked of the modern one, and what was fitted.
+    """Measure both modes, the modern one with targets, and cross-validate the fitted constants.
 
     Parameters
     ----------
     monitor : Monitor
-        Is told of each stimulus.
+        Shows the progress over the stimuli.
     """
-    modes = (measure(PAPER, monitor, is_bound=False), measure(MODERN, monitor, is_bound=True))
+    modes = (measure(PAPER, monitor, has_targets=False), measure(MODERN, monitor, has_targets=True))
     return Validation(modes, fits.measure(monitor))

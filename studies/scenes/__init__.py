@@ -1,6 +1,6 @@
 """The two generated case-study scenes, ROOM and ATRIUM (§6).
 
-Nothing heavy loads until a scene is written.
+Heavy libraries are imported when a scene is written.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ PRESETS = ("full", "small")
 
 @dataclass(frozen=True)
 class SceneFiles:
-    """Where a written scene is.
+    """Files of a written scene.
 
     Attributes
     ----------
     scene
-        Mitsuba 3 XML; meshes and textures lie beside it.
+        Mitsuba 3 XML; meshes and textures are in adjacent folders.
     path
         The camera path, nerfstudio's `camera_path.json`.
     """
@@ -38,14 +38,14 @@ def write_scene(
     Parameters
     ----------
     name
-        `room`: diffuse, a walk that rests and hurries, 448 frames. `atrium`: mirrors, glass,
+        `room`: diffuse, a walk of varying speed with rests, 448 frames. `atrium`: mirrors, glass,
         metal and a polished floor, a steady walk, 200 frames.
     folder
-        Made if absent; files of the same names are replaced.
+        Created if absent; files of the same names are replaced.
     preset
         `full` (640 x 480) or `small` (320 x 240, fewer frames, coarser shapes).
     size
-        Width and height of the frames, pixels, in place of the preset's. The vertical angle of view stays.
+        Width and height of the frames, pixels, instead of the preset's. The vertical field of view is kept.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def write_scene(
         from studies.scenes.build import build_scene
     except ModuleNotFoundError as error:
         raise SettingsError(
-            f"{error.name} is not installed; `make setup` or the group `studies` brings it"
+            f"{error.name} is not installed; run `make setup`, or install the group `studies`"
         ) from error
 
     scene, path = build_scene(name, Path(folder), preset, size)

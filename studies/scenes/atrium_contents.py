@@ -1,4 +1,4 @@
-"""What ATRIUM holds: mirrors, lamps, doors, the sculpture and the trees."""
+"""Contents of ATRIUM: mirrors, lamps, doors, the sculpture and the trees."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def add_lamps(writer: SceneWriter, preset: Preset) -> None:
     z = GALLERY - SLAB - 0.012
     spots = [(x, y) for x in BAYS_X for y in (1.4, WIDTH - 1.4)] + [(20.2, 4.0), (20.2, 10.0)]
     writer.mesh("lamps", join(disc.bare().at(x, y, z) for x, y in spots), "glow")
-    writer.light("#ffdcae", 7.0, share=2.0)
+    writer.light("#ffdcae", 7.0, weight=2.0)
     writer.mesh("lamp-rims", join(rim.bare().at(x, y, z) for x, y in spots), "brass")
 
 

@@ -1,4 +1,4 @@
-"""``enfilade scene``: write one of the two generated scenes with its camera path."""
+"""``python -m studies scene``: write one of the two generated scenes with its camera path."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from studies.scenes import PRESETS, SCENES
     "folder",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="The folder that receives the scene; made if absent.",
+    help="Folder of the scene; created if absent.",
 )
 @click.option(
     "--preset",
     type=click.Choice(PRESETS),
     default="full",
     show_default=True,
-    help="The whole walk at 640x480, or a short one at 320x240.",
+    help="full: the whole walk at 640x480; small: a short walk at 320x240.",
 )
 @click.option(
     "--size",
     type=Size(),
-    help="Width and height of the frames, pixels, of any aspect.  [default: the preset's]",
+    help="Width and height of the frames, pixels; any aspect.  [default: the preset's]",
 )
 @json_option
 @debug_option
@@ -46,7 +46,7 @@ def command(*, name: str, folder: Path, preset: str, size: tuple[int, int] | Non
         return
     click.echo(f"scene   {files.scene}")
     click.echo(f"path    {files.path}")
-    click.echo("\nNext, see what it would take, then render it:")
+    click.echo("\nNext, estimate the cost and render:")
     arguments = shlex.join([str(files.scene), "--path", str(files.path)])
     click.echo(f"  enfilade plan {arguments}")
     click.echo(f"  enfilade render {arguments} --out {shlex.quote(f'runs/{name}')}")

@@ -1,4 +1,4 @@
-"""Furniture, each piece standing on z = 0 with its front towards -y unless it says otherwise."""
+"""Furniture; each piece stands on z = 0 with its front towards -y unless stated otherwise."""
 
 from __future__ import annotations
 

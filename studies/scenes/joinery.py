@@ -64,7 +64,7 @@ GILT: list[Point2] = [
     (0.0, 0.0),
 ]
 
-NORTH, WEST, SOUTH, EAST = 0.0, 90.0, 180.0, 270.0  # the wall a thing hangs on: turn about z
+NORTH, WEST, SOUTH, EAST = 0.0, 90.0, 180.0, 270.0  # rotation about z of objects on a wall
 
 
 def wall(outline: shapely.Polygon, openings: Sequence[shapely.Polygon], thickness: float) -> Mesh:

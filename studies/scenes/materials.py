@@ -51,7 +51,7 @@ class Material:
     roughness: float = 0.1
 
     def element(self) -> ET.Element:
-        """Return the BSDF, two-sided unless it lets light through."""
+        """Return the BSDF, two-sided unless it is transmissive."""
         match self.finish:
             case "matte":
                 inner = self._bsdf("diffuse", "reflectance")
@@ -77,7 +77,7 @@ class Material:
         return outer
 
     def _bsdf(self, kind: str, colour_name: str) -> ET.Element:
-        """Begin a BSDF with its colour."""
+        """Create a BSDF with its colour."""
         element = ET.Element("bsdf", type=kind)
         element.append(pigment(colour_name, self.colour))
         return element

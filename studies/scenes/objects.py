@@ -1,4 +1,4 @@
-"""Small things that furnish: lamps, vases, plants and fruit."""
+"""Small objects: lamps, vases, plants and fruit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces that both scenes and several parts of them place: flat sheets, poses and pictures."""
+"""Shared pieces of both scenes: flat sheets, poses and pictures."""
 
 from __future__ import annotations
 

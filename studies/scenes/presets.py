@@ -1,4 +1,4 @@
-"""How large a generated scene is: frames, pixels, and the fineness of shapes and textures."""
+"""Presets of the generated scenes: frames, pixels, and detail of shapes and textures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Preset:
-    """The size of a scene.
+    """Size and detail of a scene.
 
     Attributes
     ----------
@@ -16,7 +16,7 @@ class Preset:
     size
         Width and height of the frames, pixels.
     segments
-        Sides of a round thing the size of a chair leg; larger things take a multiple.
+        Sides of a round object of the size of a chair leg; larger objects have a multiple.
     texture
         Side of the large textures, pixels.
     """

@@ -1,7 +1,7 @@
-"""ROOM: a furnished room of matte, chequered surfaces, walked at a changing pace (§6).
+"""ROOM: a furnished room of matte, chequered surfaces, with a walk of varying speed (§6).
 
-The eye rests, crosses the room close by a hanging lamp, turns fast, and rests again. Every
-material is diffuse. x runs east, y north; the windows look west.
+The camera rests, crosses the room close to a hanging lamp, turns fast, and rests again. All
+materials are diffuse. x runs east, y north; the windows look west.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What stands in ROOM: tables, chairs, lamps, sofa, books, sideboard and plants."""
+"""Contents of ROOM: tables, chairs, lamps, sofa, books, sideboard and plants."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def add_lamps(writer: SceneWriter, preset: Preset) -> None:
         rose = joinery.rosette(0.34, 12, 6 * preset.segments).at(x, y, HEIGHT)
         writer.mesh(f"ceiling-rose-{k}", rose, "plaster", crease_deg=70)
     writer.mesh("bulbs", join(bulbs), "bulb")
-    writer.light("#ffd9a0", 4.0, share=0.6)
+    writer.light("#ffd9a0", 4.0, weight=0.6)
     stand, cloth = objects.floor_lamp(preset.segments)
     writer.mesh("floor-lamp", stand.at(6.72, 1.25), "brass")
     writer.mesh("floor-lamp-shade", cloth.at(6.72, 1.25), "shade-cloth", crease_deg=80)
-    writer.light("#ffcf8f", 1.1, share=0.4)
+    writer.light("#ffcf8f", 1.1, weight=0.4)
 
 
 def add_seating(writer: SceneWriter, preset: Preset) -> None:

@@ -93,7 +93,7 @@ def add_lantern(writer: SceneWriter) -> None:
     writer.mesh("lantern", join([*walls, *bars, rim]), "plaster")
     sky = flat(x1 - x0, y1 - y0).turned(180, "x")
     writer.mesh("lantern-sky", sky.at((x0 + x1) / 2, (y0 + y1) / 2, HEIGHT + 0.05), "plaster")
-    writer.light("#f4f8ff", 7.2, share=5.0)
+    writer.light("#f4f8ff", 7.2, weight=5.0)
 
 
 def add_windows(writer: SceneWriter, preset: Preset) -> None:
@@ -116,8 +116,8 @@ def add_windows(writer: SceneWriter, preset: Preset) -> None:
     writer.mesh("curtains", join(folds), "curtain", crease_deg=80)
     garden = flat(9.0, 4.0).turned(90, "x").turned(WEST).at(-1.9, WIDTH / 2, 1.15)
     writer.mesh("garden", garden, "soot")
-    writer.light(writer.radiance("garden", pictures.garden(preset.texture // 4, 1.6)), share=0.7)
-    writer.sun((0.72, 0.2, -1.0), "#fff0d2", 5.0, share=2.5)
+    writer.light(writer.radiance("garden", pictures.garden(preset.texture // 4, 1.6)), weight=0.7)
+    writer.sun((0.72, 0.2, -1.0), "#fff0d2", 5.0, weight=2.5)
 
 
 def add_hearth(writer: SceneWriter, preset: Preset) -> None:

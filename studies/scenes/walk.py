@@ -1,4 +1,4 @@
-"""Camera walks: a smooth line through stations, walked at a changing pace."""
+"""Camera walks: a smooth curve through stations, at a varying speed."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Walk:
     Attributes
     ----------
     stations
-        Places of the eye and what it looks at there, (eye, target), metres.
+        Positions of the eye and of its target, (eye, target), metres.
     pace
         Knots (time, pace): time from 0 to 1 over the path, pace in any unit. The pace between
         knots is smooth and without overshoot, so that motion eases in and out.
     reach
-        The part of the line that is walked, 0 to 1.
+        Fraction of the curve that is walked, 0 to 1.
     fov_deg
-        Vertical angle of view.
+        Vertical field of view.
     """
 
     stations: Sequence[tuple[Vector, Vector]]
@@ -47,10 +47,10 @@ class Walk:
         along = self._progress(frames) * self.reach * knots[-1]
         eye = CubicSpline(knots, eyes)(along)
         gaze = CubicSpline(knots, targets)(along)
-        return np.stack([looking(e, g) for e, g in zip(eye, gaze, strict=True)])
+        return np.stack([look_at(e, g) for e, g in zip(eye, gaze, strict=True)])
 
     def _progress(self, frames: int) -> Floats:
-        """Return how much of the walk is done at each frame, 0 to 1."""
+        """Return the fraction of the walk that is done at each frame, 0 to 1."""
         times, paces = np.array(self.pace, dtype=float).T
         fine = np.linspace(0.0, 1.0, (frames - 1) * STEPS_PER_FRAME + 1)
         pace = PchipInterpolator(times, paces)(fine)
@@ -58,7 +58,7 @@ class Walk:
         return np.asarray(done[::STEPS_PER_FRAME] / done[-1])
 
 
-def looking(eye: Floats, target: Floats) -> Floats:
+def look_at(eye: Floats, target: Floats) -> Floats:
     """Return the camera-to-world matrix of an eye that looks at a target, z up."""
     back = (eye - target) / np.linalg.norm(eye - target)
     right = np.cross([0.0, 0.0, 1.0], back)

@@ -20,13 +20,13 @@ FACE = np.dtype([("count", "u1"), ("corners", "<i4", (3,))])
 class SceneWriter:
     """Collects a scene and writes it below one folder.
 
-    Materials and meshes are written once and named; shapes refer to them. File names in the XML
+    Materials and meshes are written once under a name, to which shapes refer. File names in the XML
     are relative to the scene file.
 
     Parameters
     ----------
     folder
-        Receives `scene.xml`, `meshes/` and `textures/`. Made if absent.
+        Receives `scene.xml`, `meshes/` and `textures/`; created if absent.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -42,7 +42,7 @@ class SceneWriter:
     def texture(self, name: str, image: npt.NDArray[np.uint8]) -> str:
         """Store an sRGB image, (height, width, 3), top row first, and return its relative name.
 
-        Mitsuba puts v = 0 at a file's first row, so it is stored upside down: v points up.
+        Mitsuba puts v = 0 at the first row of a file; rows are stored bottom-up, so that v points up.
         """
         relative = f"textures/{name}.png"
         Image.fromarray(image[::-1]).save(self.folder / relative, compress_level=3)
@@ -91,14 +91,14 @@ class SceneWriter:
         shape.append(transform(to_world))
         return shape
 
-    def light(self, radiance: Colour, strength: float = 1.0, *, share: float = 1.0) -> None:
-        """Make the shape added last glow with a colour, or with a texture's file name.
+    def light(self, radiance: Colour, strength: float = 1.0, *, weight: float = 1.0) -> None:
+        """Make the last added shape an area emitter of a colour, or of a texture (a file name).
 
-        `share` is its part of the light samples, relative to the other emitters.
+        `weight` is its sampling weight, relative to the other emitters.
         """
         shape = self._shapes[-1]
         emitter = ET.SubElement(shape, "emitter", type="area")
-        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(share))
+        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(weight))
         if not radiance.startswith("#"):
             texture = ET.SubElement(emitter, "texture", type="bitmap", name="radiance")
             ET.SubElement(texture, "string", name="filename", value=radiance)
@@ -106,19 +106,19 @@ class SceneWriter:
             emitter.append(rgb("radiance", linear(radiance) * strength))
 
     def sky(self, colour: Colour, strength: float) -> None:
-        """Surround the scene by an even sky."""
+        """Add a constant environment."""
         emitter = ET.Element("emitter", type="constant", id="sky")
         emitter.append(rgb("radiance", linear(colour) * strength))
         self._emitters.append(emitter)
 
     def sun(
-        self, direction: tuple[float, float, float], colour: Colour, strength: float, *, share: float = 1.0
+        self, direction: tuple[float, float, float], colour: Colour, strength: float, *, weight: float = 1.0
     ) -> None:
         """Add parallel light that travels along `direction`, irradiance `strength`."""
         emitter = ET.Element("emitter", type="directional", id="sun")
         x, y, z = direction
         ET.SubElement(emitter, "vector", name="direction", x=repr(x), y=repr(y), z=repr(z))
-        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(share))
+        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(weight))
         emitter.append(rgb("irradiance", linear(colour) * strength))
         self._emitters.append(emitter)
 
@@ -145,7 +145,7 @@ class SceneWriter:
         return path
 
     def _shape(self, kind: str, name: str, material: str) -> ET.Element:
-        """Begin a shape with an id and a reference to its material."""
+        """Create a shape with an id and a reference to its material."""
         shape = ET.Element("shape", type=kind, id=name)
         ET.SubElement(shape, "ref", id=f"material-{material}")
         self._shapes.append(shape)

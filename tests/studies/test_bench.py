@@ -1,4 +1,4 @@
-"""The bench on a small room, from the command line to its files; and its rivals."""
+"""The bench on a small room, from the command line to its files; and its baselines."""
 
 import json
 from dataclasses import replace
@@ -17,7 +17,7 @@ from enfilade.runs.render import render
 from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
 from studies.__main__ import main
 from studies.bench.bench import bench
-from studies.bench.configurations import chosen, lineup
+from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import SCALES
 from studies.bench.measuring import available
 from studies.bench.tables import bench_tables
@@ -117,11 +117,11 @@ def test_an_unknown_configuration_is_refused(run, line):
     assert "no configuration is called 'best'; there are: traced-1" in result.stderr
 
 
-def test_missing_rivals_and_measures_are_reported(tmp_path, monkeypatch):
+def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
     job = room_job(tmp_path, 2, method="reference")
     monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
     with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
-        bench(job, lineup(job, traced=(), denoised=(1,)), tmp_path / "bench", reference_spp=4)
+        bench(job, all_configurations(job, traced=(), denoised=(1,)), tmp_path / "bench", reference_spp=4)
     reasons = {name: "" if name == "psnr" else f"no {name}" for name in SCALES}
     monkeypatch.setattr("studies.bench.measuring.why_no_measure", reasons.get)
     assert available((), job) == (["psnr"], [why for why in reasons.values() if why])
@@ -138,24 +138,26 @@ def test_a_single_frame_has_no_changes_to_measure(tmp_path):
     assert set(names) < {name for name in SCALES if not why_missing(name)}
 
 
-def test_the_lineup(tmp_path):
-    found = lineup(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
+def test_all_configurations(tmp_path):
+    found = all_configurations(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
     names = [c.name for c in found]
     assert names[:5] == ["traced-1", "traced-4", "denoised-2", "denoised-2-fast", "minterpolate-4"]
-    assert [c.name for c in chosen(found, ["denoised-*", "paper-16"])] == [
+    assert [c.name for c in selected(found, ["denoised-*", "paper-16"])] == [
         "denoised-2",
         "denoised-2-fast",
         "paper-16",
     ]
-    denoised, paper, ours = (found[names.index(name)] for name in ("denoised-2", "paper-16", "decoupled-30"))
+    denoised, paper, decoupled = (
+        found[names.index(name)] for name in ("denoised-2", "paper-16", "decoupled-30")
+    )
     assert denoised.job.settings[ReferenceSettings].pixel_filter is denoised.pixel_filter is SampleFilter.BOX
     assert (denoised.spp, paper.spp) == (2, 16)
-    assert ours.job.settings[DecoupledSettings].quality == 30.0
-    assert not ours.is_rival
+    assert decoupled.job.settings[DecoupledSettings].quality == 30.0
+    assert not decoupled.is_baseline
 
 
 def interpolated(folder, path=None, **tables):
-    job = room_job(folder, 5, method="studies.bench.rivals:Interpolated", **tables)
+    job = room_job(folder, 5, method="studies.bench.baselines:Interpolated", **tables)
     render(job if path is None else replace(job, path=path), folder / "run", Silence())
     return frames_of(folder / "run")
 

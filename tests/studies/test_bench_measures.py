@@ -16,7 +16,7 @@ SHIFT = 1.5  # pixels a frame
 
 
 def _error(name: str, size: float) -> float:
-    """Error of a moving picture with noise drawn afresh in each frame."""
+    """Error of a moving picture with independent noise in each frame."""
     measure, values = open_measure(name, VIEWING, Pursuit.BOTH), []
     for frame in range(FRAMES):
         reference = picture(SHIFT * frame)
@@ -54,7 +54,7 @@ def test_an_error_that_moves_with_its_surface_does_not_flicker():
     assert measure.measure(pair(picture(2) + 0.2 * stain, picture(2), shift=2.0)) > 0.003
 
 
-def test_noise_drawn_afresh_counts_by_the_root_of_two():
+def test_independent_noise_counts_by_the_root_of_two():
     measure = Temporal()
     values = [
         measure.measure(pair(picture() + noise(f, 0.05), picture(), is_first=f == 0)) for f in range(FRAMES)
@@ -101,7 +101,7 @@ def _layers(shapes: np.ndarray, z: np.ndarray, shift: float) -> dict[str, np.nda
     return {"shape_index": shapes, "P": position, "N": normal, "Z": depth, "backward": backward}
 
 
-def test_what_was_hidden_or_outside_was_not_visible_before():
+def test_disoccluded_and_entering_pixels_were_not_visible_before():
     shapes = np.ones((3, 6), np.uint32)
     shapes[:, 3:] = 2
     flat = np.zeros((3, 6), np.float32)

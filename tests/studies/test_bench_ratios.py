@@ -8,7 +8,7 @@ from studies.bench.__main__ import missed
 from studies.bench.ratios import Point, cost_at, front, ratio_at, ratio_over, ratios
 
 # Monte Carlo: four times the paths, half the error.
-RIVAL = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
+BASELINE = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
 
 
 def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
@@ -17,43 +17,43 @@ def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
 
 
 def test_between_points_both_axes_are_logarithmic():
-    cost, kind = cost_at(RIVAL, 0.1 * math.sqrt(2.0))
+    cost, kind = cost_at(BASELINE, 0.1 * math.sqrt(2.0))
     assert cost == pytest.approx(80.0)
     assert kind == "equal"
-    assert cost_at(RIVAL, 0.5) == (10.0, "at most")
-    assert cost_at(RIVAL, 0.05) == (160.0, "at least")
+    assert cost_at(BASELINE, 0.5) == (10.0, "at most")
+    assert cost_at(BASELINE, 0.05) == (160.0, "at least")
 
 
 @pytest.mark.parametrize(
-    ("ours", "times", "least", "kind"),
+    ("decoupled", "times", "least", "kind"),
     [
-        ([Point(p.cpu_s / 5.0, p.error) for p in RIVAL], 5.0, 5.0, "equal"),
+        ([Point(p.cpu_s / 5.0, p.error) for p in BASELINE], 5.0, 5.0, "equal"),
         ([Point(5.0, 0.4), Point(320.0, 0.1)], 1.0, 0.5, "equal"),  # curves that cross
         ([Point(8.0, 0.05), Point(16.0, 0.02)], 20.0, 20.0, "at least"),  # no quality in common
         ([Point(1.0, 0.9), Point(2.0, 0.8)], 5.0, 5.0, "at most"),
         ([Point(1.0, 0.0)], 160.0, 160.0, "at least"),  # identical sequences
     ],
 )
-def test_ratios_over_common_qualities(ours, times, least, kind):
-    ratio = ratio_over(RIVAL, ours)
+def test_ratios_over_common_qualities(decoupled, times, least, kind):
+    ratio = ratio_over(BASELINE, decoupled)
     assert ratio.times == pytest.approx(times)
     assert ratio.least == pytest.approx(least)
     assert ratio.kind == kind
 
 
 def test_against_one_rival_a_margin_counts():
-    ours = [Point(1.0, 0.4), Point(4.0, 0.2)]
-    assert ratio_at(RIVAL[2], ours).kind == "at most"
-    near = ratio_at(RIVAL[2], ours, margin=0.1)
+    decoupled = [Point(1.0, 0.4), Point(4.0, 0.2)]
+    assert ratio_at(BASELINE[2], decoupled).kind == "at most"
+    near = ratio_at(BASELINE[2], decoupled, margin=0.1)
     assert (near.kind, near.times) == ("equal", pytest.approx(40.0))
-    assert ratio_at(RIVAL[2], ours, margin=0.5).kind == "at least"
+    assert ratio_at(BASELINE[2], decoupled, margin=0.5).kind == "at least"
 
 
 def row(name, family, cpu_s, jnd, psnr_db):
     return {"name": name, "family": family, "cost": {"cpu_s": cpu_s}, "scores": {"aqm": jnd, "psnr": psnr_db}}
 
 
-def test_ratios_of_made_up_configurations():
+def test_ratios_of_synthetic_configurations():
     rows = [
         row("traced-256", "traced", 100.0, 1.0, 40.0),
         row("denoised-4", "denoised", 20.0, 1.0, 40.0),
@@ -62,7 +62,7 @@ def test_ratios_of_made_up_configurations():
         row("decoupled-b", "decoupled", 10.0, 0.5, 50.0),
     ]
     found = ratios(rows, ["aqm", "psnr"])
-    # Within 0.1 JND of its score the cheapest is good enough already; PSNR has no margin.
+    # Within 0.1 JND of its score the cheapest is good enough; PSNR has no margin.
     assert found["traced"]["traced-256"]["aqm"] == {"times": 20.0, "least": 20.0, "kind": "at least"}
     assert found["traced"]["traced-256"]["psnr"]["times"] == pytest.approx(20.0)
     assert found["paper"] == {"paper-64": ["decoupled-a", "decoupled-b"]}

@@ -16,19 +16,19 @@ from enfilade.records import SurfaceClass
 from enfilade.settings import KeyframeSettings, Placement
 from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
 from studies.cases.blocks import BLOCKS
-from studies.cases.case import Case, Result, begin
+from studies.cases.case import Case, Result, open_folder
 from studies.cases.document import check_blocks, replaced, write_document
+from studies.cases.extent import EXTENTS
 from studies.cases.runner import ITEMS, measure
-from studies.cases.seen import score_in
-from studies.cases.speed import mean_cost, spread_over
-from studies.cases.terms import TERMS
+from studies.cases.speed import even_positions, mean_cost
+from studies.cases.visibility import score_in
 from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 from support.example_scenes import room, room_walk
 from support.study_runs import room_job, windows_of
 
 TEMPLATE = Path(__file__).parents[2] / "studies" / "cases" / "README.md"
 TINY = dataclasses.replace(
-    TERMS["small"], size=(48, 36), window_size=(48, 36), window_spp=4, window_reference_spp=16, windows=1,
+    EXTENTS["small"], size=(48, 36), window_size=(48, 36), window_spp=4, window_reference_spp=16, windows=1,
     traced_windows=1, reference_spp=32, crop=(32, 24), crops=1, most_spp=8, spp=4,
 )  # fmt: skip
 
@@ -63,7 +63,7 @@ def test_predictions_by_hand():
     segments = [
         segment(0, 10, 0, 20.0, 8.0, is_split=True),
         segment(0, 4, 1, 4.0, 2.0, is_split=False),
-        segment(4, 10, 1, 12.0, 11.0, is_split=False),  # splitting helped no more
+        segment(4, 10, 1, 12.0, 11.0, is_split=False),  # splitting did not help
         segment(10, 14, 0, 2.0, 1.0, is_split=False),
         segment(14, 15, 0, 0.0, 0.0, is_split=False, middle=None),  # nothing between its keyframes
     ]
@@ -74,7 +74,9 @@ def test_predictions_by_hand():
     assert (found["split_before"], found["split_after"]) == (20.0, (3 * 4.0 + 5 * 12.0) / 8)
     assert found["before_still"] == pytest.approx((9 * 8.0 + 3 * 1.0) / 12)
     assert found["after_still"] == pytest.approx((3 * 2.0 + 5 * 11.0 + 3 * 1.0) / 11)
-    assert [found[key] for key in ("split_not_seen_still", "seen_still_not_split", "given_up")] == [1, 1, 1]
+    assert [
+        found[key] for key in ("split_only_by_pursuit", "unsplit_above_limit_still", "remaining_above_limit")
+    ] == [1, 1, 1]
     assert statistics.predictions(segments[3:], 10.0)["split_before"] is None
 
 
@@ -94,12 +96,12 @@ def test_equal_quality_is_interpolated():
 
 
 def test_crops_places_and_costs():
-    rows, columns = times.middle((64, 48), 10, 8)
+    rows, columns = times.central_crop((64, 48), 10, 8)
     assert np.ones((48, 64))[rows, columns].shape == (8, 10)
     assert (rows.start, columns.start) == (20, 27)
-    assert times.middle((64, 48), 999, 999) == (slice(0, 48), slice(0, 64))
-    assert spread_over(200, 4) == [25, 75, 124, 174]
-    assert spread_over(3, 1) == [1]
+    assert times.central_crop((64, 48), 999, 999) == (slice(0, 48), slice(0, 64))
+    assert even_positions(200, 4) == [25, 75, 124, 174]
+    assert even_positions(3, 1) == [1]
     slow, fast = ({"centre": {"wall": s, "cpu": 2.0 * s}} for s in (3.0, 1.0))
     assert mean_cost([slow, fast]) == {"centre": {"wall": 2.0, "cpu": 4.0}}
 
@@ -126,7 +128,7 @@ def test_all_traced_is_no_difference_and_nothing_traced_is_all_of_it():
 def test_the_threshold_is_the_least_from_which_on_little_is_visible():
     def chosen(*percents):
         rows = [{"threshold_deg_s": float(k), "reused_visible_percent": p} for k, p in enumerate(percents)]
-        return threshold.chosen(rows, 1.0)
+        return threshold.least_threshold(rows, 1.0)
 
     assert chosen(30.0, 5.0, 0.5, 0.2) == 2.0
     assert chosen(0.5, 5.0, 0.5, None) == 2.0  # differences that come back count
@@ -153,9 +155,9 @@ def test_ghosts_are_away_from_outlines_and_antialiasing_is_at_them():
     assert found["example"] == most["frame"]
     assert 0.0 < most["ghosts"]["pixels"] < 20.0
     viewer, near = windows.viewer, separation.outlines(windows.geometry(most["frame"] - 1).shape_index)
-    changed = separation.changed_pixels(viewer, example["together"], example["apart"])
-    wanted = viewer.shown(example["reference"])
-    errors = [np.abs(viewer.shown(example[name]) - wanted) for name in ("together", "apart")]
+    changed = separation.changed_pixels(viewer, example["unseparated"], example["separated"])
+    wanted = viewer.luminance(example["reference"])
+    errors = [np.abs(viewer.luminance(example[name]) - wanted) for name in ("unseparated", "separated")]
     ghosts = changed & ~near & (errors[0] > errors[1])
     np.testing.assert_array_equal(example["ghost"] > 0.0, ghosts)
     assert most["ghosts"]["count"] == ghosts.sum()
@@ -178,10 +180,10 @@ def test_the_motion_of_the_reflection_preserves_it():
     back = Quad((-3, 0, -1), (6, 0, 0), (0, 3, 0), mirror, "mirror")
     front = Quad((-20, -10, 8), (0, 20, 0), (40, 0, 0), checks, "wall")
     windows = windows_of(AnalyticScene((back, front)), path=room_walk(24, size=(64, 48), turn_deg=0.0))
-    found = reflections.compare(windows, reflections.most_mirrors(windows, 1)[0])
+    found = reflections.compare(windows, reflections.largest_mirrors(windows, 1)[0])
     by_filter = {name: of["motion"]["score"] for name, of in found["filters"].items()}
     assert by_filter["reflected"] < min(by_filter["full"], by_filter["none"])
-    assert reflections.most_mirrors(plain(), 3) == []
+    assert reflections.largest_mirrors(plain(), 3) == []
 
 
 def small_case(folder, job):
@@ -210,12 +212,12 @@ def test_all_items_agree_with_each_other(results):
     assert initial[0] == initial[1] == [(1, 7), (7, 13), (13, 14)]
     assert found["statistics"]["plain"]["before"] > found["statistics"]["predictions"]["before"]
     assert found["shares"]["frames"] == len(found["statistics"]["per_frame"]) == 14
-    assert 0.0 < found["shares"]["specular_seen"] < 50.0
-    ways = found["times"]["ways"]
-    assert all(way["cpu_s"] > 0.0 and way["worth_paths"] > 0.0 for way in ways.values())
-    assert ways["art"]["spp"] == 8
-    stages = [spent["cpu_s"] for spent in ways["ibr_rt"]["stages"].values()]
-    assert sum(stages) == pytest.approx(ways["ibr_rt"]["cpu_s"])
+    assert 0.0 < found["shares"]["specular_percent"] < 50.0
+    methods = found["times"]["methods"]
+    assert all(method["cpu_s"] > 0.0 and method["equivalent_paths"] > 0.0 for method in methods.values())
+    assert methods["art"]["spp"] == 8
+    stages = [spent["cpu_s"] for spent in methods["ibr_rt"]["stages"].values()]
+    assert sum(stages) == pytest.approx(methods["ibr_rt"]["cpu_s"])
     assert [row["spp"] for row in found["times"]["art_series"]] == [4, 8]
     assert found["reflections"]["frames"]
     assert found["threshold"]["traced"]["spp"] == 4
@@ -275,16 +277,16 @@ def test_a_block_is_replaced_and_the_rest_stays():
     assert replaced(new, "a", r"new \1") == new
 
 
-def test_a_folder_on_other_terms_is_refused(tmp_path):
-    begin(tmp_path, TINY)
-    begin(tmp_path, TINY)
-    with pytest.raises(RunFolderError, match=r"other terms \(spp\); choose another --out"):
+def test_a_folder_of_another_extent_is_refused(tmp_path):
+    open_folder(tmp_path, TINY)
+    open_folder(tmp_path, TINY)
+    with pytest.raises(RunFolderError, match=r"another extent \(spp\); choose another --out"):
         measure(("room",), (), dataclasses.replace(TINY, spp=9), tmp_path, Silence())
 
 
 def test_results_of_earlier_calls_are_returned_too(tmp_path):
     (tmp_path / "atrium").mkdir()
-    (tmp_path / "atrium" / "shares.json").write_text(json.dumps({"made": {"date": "today"}, "result": 7}))
+    (tmp_path / "atrium" / "shares.json").write_text(json.dumps({"origin": {"date": "today"}, "result": 7}))
     found = measure(("room",), (), TINY, tmp_path, Silence())
     assert found.pop("shares") == {"atrium": Result(7, {"date": "today"})}
     assert not any(found.values())

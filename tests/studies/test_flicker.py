@@ -1,4 +1,4 @@
-"""The made examples of flicker."""
+"""Synthetic examples of flicker."""
 
 import numpy as np
 import pytest

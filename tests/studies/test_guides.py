@@ -1,4 +1,4 @@
-"""Guides of the denoiser: without noise, filtered by a box, seen in mirrors."""
+"""Guides of the denoiser: noise-free, box filtered, traced through mirrors."""
 
 import numpy as np
 import pytest

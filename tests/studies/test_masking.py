@@ -27,9 +27,9 @@ def test_target_and_mask_are_in_phase_and_of_contrast_1():
 
 
 def test_the_table_has_ten_masks():
-    _, people = read_columns("foley.csv", "mask_db", "threshold_db")
-    assert len(people["mask_db"]) == 10
-    assert (np.diff(people["mask_db"]) > 0).all()
+    _, observers = read_columns("foley.csv", "mask_db", "threshold_db")
+    assert len(observers["mask_db"]) == 10
+    assert (np.diff(observers["mask_db"]) > 0).all()
 
 
 def test_a_strong_mask_raises_the_threshold():
@@ -40,7 +40,7 @@ def test_a_strong_mask_raises_the_threshold():
     assert masked > 2.0 * alone
 
 
-def test_errors_are_the_metrics_less_peoples():
+def test_errors_are_the_metrics_less_the_observers():
     masking = Masking(np.array([-20.0, -10.0]), np.array([-25.0, -15.0]), np.array([-22.0, -19.0]), 0.0)
     np.testing.assert_allclose(masking.error_db, [3.0, -4.0])
     assert masking.rms_db == pytest.approx(np.sqrt(12.5))

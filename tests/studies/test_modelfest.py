@@ -83,13 +83,13 @@ def test_the_checkerboards_fundamental_is_4_cpd_along_the_diagonals():
 
 def test_one_gain_is_taken_off():
     number = np.arange(3)
-    people = np.array([30.0, 20.0, 10.0])
-    found = Thresholds(number, people, people - np.array([3.0, 4.0, 5.0]), np.ones(3))
+    observers = np.array([30.0, 20.0, 10.0])
+    found = Thresholds(number, observers, observers - np.array([3.0, 4.0, 5.0]), np.ones(3))
     assert found.gain_db == pytest.approx(4.0)
     np.testing.assert_allclose(found.error_db, [1.0, 0.0, -1.0])
     assert found.rms_db == pytest.approx(math.sqrt(2.0 / 3.0))
     # Each error with the gain of the other two: 1.5, 0, -1.5.
-    assert found.left_out_rms_db == pytest.approx(math.sqrt(1.5))
+    assert found.cross_validation_rms_db == pytest.approx(math.sqrt(1.5))
 
 
 def test_a_threshold_is_where_the_response_is_1_jnd():
@@ -97,17 +97,17 @@ def test_a_threshold_is_where_the_response_is_1_jnd():
     pattern = target(4)
     contrast = threshold_contrast(observer, pattern, 30.0, guess=0.2)
     background = np.full(pattern.shape, 30.0, np.float32)
-    shown = (30.0 * (1.0 + contrast * pattern)).astype(np.float32)
-    assert response_jnd(observer, shown, background) == pytest.approx(1.0, abs=0.01)
-    assert 0.002 < contrast < 0.02  # people: 0.0078
+    test = (30.0 * (1.0 + contrast * pattern)).astype(np.float32)
+    assert response_jnd(observer, test, background) == pytest.approx(1.0, abs=0.01)
+    assert 0.002 < contrast < 0.02  # observers: 0.0078
 
 
-class Dull:
-    """Sees half a JND in a contrast of 1, and nothing of how."""
+class LinearMetric:
+    """A metric of half a JND for a contrast of 1."""
 
     def compare(self, test, background):
         return SimpleNamespace(jnd=0.5 * np.abs(test - background) / background)
 
 
-def test_a_threshold_beyond_all_light_is_above_1():
-    assert threshold_contrast(Dull(), -target(29), 30.0) == pytest.approx(2.0, rel=1e-3)
+def test_a_threshold_beyond_the_range_of_the_display_is_above_1():
+    assert threshold_contrast(LinearMetric(), -target(29), 30.0) == pytest.approx(2.0, rel=1e-3)

@@ -5,7 +5,7 @@ import pytest
 
 from studies.observers import moving_texture
 from studies.observers.mode import PAPER
-from studies.observers.moving_texture import DISPLAYS, Condition, Losses, conditions, frames, shown
+from studies.observers.moving_texture import DISPLAYS, Condition, Losses, conditions, frames, shade
 from studies.observers.tables import read_columns, read_textures
 
 
@@ -14,25 +14,25 @@ def texels(seed=1):
 
 
 def test_a_texture_moves_to_the_right_and_comes_in_again():
-    np.testing.assert_array_equal(shown(texels(), 0.0, 1), texels())
-    np.testing.assert_allclose(shown(texels(), 3.0, 1), np.roll(texels(), 3, axis=1), atol=1e-6)
+    np.testing.assert_array_equal(shade(texels(), 0.0, 1), texels())
+    np.testing.assert_allclose(shade(texels(), 3.0, 1), np.roll(texels(), 3, axis=1), atol=1e-6)
     half = 0.5 * (texels() + np.roll(texels(), 1, axis=1))
-    np.testing.assert_allclose(shown(texels(), 0.5, 1), half, atol=1e-6)
+    np.testing.assert_allclose(shade(texels(), 0.5, 1), half, atol=1e-6)
     texture = np.repeat(texels()[:, :1], 32, axis=1)  # bars that lie lose nothing
-    np.testing.assert_allclose(shown(texture, 5.3, 2), shown(texture, 0.0, 2), atol=1e-6)
+    np.testing.assert_allclose(shade(texture, 5.3, 2), shade(texture, 0.0, 2), atol=1e-6)
 
 
 @pytest.mark.parametrize("columns", [2, 4])
 def test_a_sample_fills_its_columns_which_stay_on_the_screen(columns):
     for shift_px in (0.0, 1.3, 2.7):
-        screen = shown(texels(), shift_px, columns).reshape(16, -1, columns)
+        screen = shade(texels(), shift_px, columns).reshape(16, -1, columns)
         assert (screen == screen[..., :1]).all()
 
 
 @pytest.mark.parametrize("columns", [1, 2, 4])
 def test_the_mean_light_stays(columns):
     texture = texels()
-    assert shown(texture, 0.7, columns).mean() == pytest.approx(texture.mean(), abs=1e-3)
+    assert shade(texture, 0.7, columns).mean() == pytest.approx(texture.mean(), abs=1e-3)
 
 
 def test_textures_are_linear_and_the_grass_is_dark():
@@ -48,8 +48,8 @@ def test_there_are_72_conditions_and_more_motion_hides_more():
     listed = conditions()
     assert len(set(listed)) == 72
     assert {c.columns_per_sample for c in listed} == {2, 4}
-    _, people = read_columns("moving_texture.csv", "jnd")
-    loss = dict(zip(listed, -people["jnd"], strict=True))
+    _, observers = read_columns("moving_texture.csv", "jnd")
+    loss = dict(zip(listed, -observers["jnd"], strict=True))
     assert loss[Condition("noise", 4, "pc", 0.0)] == pytest.approx(6.7868, abs=1e-4)
     for texture in ("checkerboard", "noise"):
         still, fast = (loss[Condition(texture, 2, "pc", speed)] for speed in (0.0, 30.0))
@@ -68,11 +68,13 @@ def test_frames_have_the_displays_luminance():
 
 def test_ranks_are_correlated_over_the_chosen_conditions():
     listed = conditions()
-    people = np.arange(72.0)
-    agreed = Losses(listed, people, people, people, people**3)
+    observers = np.arange(72.0)
+    agreed = Losses(listed, observers, observers, observers, observers**3)
     assert agreed.spearman() == pytest.approx(1.0)
     is_grass = np.array([c.texture == "grass" for c in listed])
-    wrong_on_grass = Losses(listed, people, people, people, np.where(is_grass, -people, people))
+    wrong_on_grass = Losses(
+        listed, observers, observers, observers, np.where(is_grass, -observers, observers)
+    )
     assert wrong_on_grass.spearman() < 0.9
     assert wrong_on_grass.spearman(textures=moving_texture.TEXTURES - {"grass"}) == pytest.approx(1.0)
 

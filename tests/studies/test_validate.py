@@ -1,4 +1,4 @@
-"""The verdict: figures, bounds, exit status, plots; with made-up measurements but for one slow run."""
+"""The validation command: figures, targets, exit status, plots; one slow run with real measurements."""
 
 import json
 
@@ -11,7 +11,7 @@ from enfilade.monitor import Silence
 from studies.__main__ import main
 from studies.observers import flicker, foley, modelfest, moving_texture, sensitivity
 from studies.observers import validate as validation
-from studies.observers.figures import ASKED, Asked, Figure, Measured
+from studies.observers.figures import TARGETS, Figure, ModeResults, Target
 from studies.observers.fits import Fit
 from studies.observers.flicker import Pair
 from studies.observers.foley import Masking
@@ -23,20 +23,20 @@ from studies.observers.tables import read_columns, read_textures
 from studies.observers.validate import Validation
 
 
-def made_up(mode, *, error_db=0.5, flicker_jnd=2.0, is_bound=True):
-    """A mode that misses people's thresholds by turns by so much."""
+def synthetic(mode, *, error_db=0.5, flicker_jnd=2.0, has_targets=True):
+    """A mode with errors of this size and alternating sign."""
     error = error_db * np.array([1.0, -1.0] * 5)
-    people = np.linspace(20.0, 40.0, 10)
+    observers = np.linspace(20.0, 40.0, 10)
     rates = np.array([1.0] * 5 + [16.0] * 5)
     cpd = np.array([0.5, 1.0, 2.0, 4.0, 8.0] * 2)
-    shown = (cpd, rates, np.full(10, 20.0), np.ones(10))
-    csf = Sensitivities(*shown, people, people * 10.0 ** (error / 20.0))
+    stimuli = (cpd, rates, np.full(10, 20.0), np.ones(10))
+    csf = Sensitivities(*stimuli, observers, observers * 10.0 ** (error / 20.0))
     loss = np.arange(72.0)
-    return Measured(
+    return ModeResults(
         mode=mode,
-        is_bound=is_bound,
-        thresholds=Thresholds(np.arange(10), people, people + error, np.ones(10)),
-        masking=Masking(-people, -people, error - people, 3.0),
+        has_targets=has_targets,
+        thresholds=Thresholds(np.arange(10), observers, observers + error, np.ones(10)),
+        masking=Masking(-observers, -observers, error - observers, 3.0),
         sensitivities=dict.fromkeys(STUDIES, csf),
         losses=Losses(conditions(), loss, np.ones(72), np.ones(72), loss + 1.0),
         flicker={"sparks": Pair(flicker_jnd, 1.0)},
@@ -44,37 +44,37 @@ def made_up(mode, *, error_db=0.5, flicker_jnd=2.0, is_bound=True):
 
 
 def run(monkeypatch, *arguments, **measured):
-    modes = (made_up("paper", error_db=9.0, is_bound=False), made_up("modern", **measured))
-    found = Validation(modes, (Fit("number", "made up", (0.5,), 1.25, 1.375, (0.25,), (0.5,)),))
+    modes = (synthetic("paper", error_db=9.0, has_targets=False), synthetic("modern", **measured))
+    found = Validation(modes, (Fit("constant", "data", (0.5,), 1.25, 1.375, (0.25,), (0.5,)),))
     monkeypatch.setattr(validation, "validate", lambda _: found)
     return CliRunner().invoke(main, ["validate", "--quiet", *arguments])
 
 
 def test_bounds_are_strict():
-    assert Asked(2.0).is_met(2.0)
-    assert not Asked(2.0).is_met(2.004)
-    assert Asked(0.9, is_least=True).is_met(0.9)
-    assert not Asked(0.9, is_least=True).is_met(0.897)
-    assert not Asked(2.0).is_met(float("nan"))
+    assert Target(2.0).is_met(2.0)
+    assert not Target(2.0).is_met(2.004)
+    assert Target(0.9, is_least=True).is_met(0.9)
+    assert not Target(0.9, is_least=True).is_met(0.897)
+    assert not Target(2.0).is_met(float("nan"))
 
 
-def test_nothing_is_asked_of_a_figure_without_a_bound():
+def test_a_figure_without_a_target_is_met():
     assert Figure("gain", "dB", 99.0).is_met
 
 
-def test_every_bound_has_its_figure():
-    names = [figure.name for figure in made_up("modern").figures() if figure.asked is not None]
-    assert sorted(names) == sorted(ASKED)
+def test_every_target_has_its_figure():
+    names = [figure.name for figure in synthetic("modern").figures() if figure.target is not None]
+    assert sorted(names) == sorted(TARGETS)
 
 
-def test_nothing_is_asked_of_the_papers_mode():
-    assert not Validation((made_up("paper", error_db=9.0, is_bound=False),), ()).missed
+def test_the_papers_mode_has_no_targets():
+    assert not Validation((synthetic("paper", error_db=9.0, has_targets=False),), ()).missed
 
 
 def test_all_met_exits_with_0(monkeypatch):
     found = run(monkeypatch)
     assert found.exit_code == 0, found.output
-    assert "Missed" not in found.output
+    assert "missed" not in found.output
     assert "ModelFest Gabors" in found.output
     assert "0.25 to 0.5" in found.output
     assert "1.375" in found.output
@@ -83,13 +83,13 @@ def test_all_met_exits_with_0(monkeypatch):
 def test_a_missed_figure_is_named_and_exits_with_1(monkeypatch):
     found = run(monkeypatch, error_db=2.5)
     assert found.exit_code == 1
-    assert "Missed: ModelFest, Foley masking." in found.output
+    assert "Targets missed: ModelFest, Foley masking." in found.output
 
 
 def test_flicker_must_be_scored_worse_than_blur(monkeypatch):
     found = run(monkeypatch, flicker_jnd=1.0)
     assert found.exit_code == 1
-    assert "Missed: flicker against blur." in found.output
+    assert "Targets missed: flicker against blur." in found.output
 
 
 def test_json_has_figures_and_points(monkeypatch):
@@ -100,7 +100,7 @@ def test_json_has_figures_and_points(monkeypatch):
     assert paper["mode"] == "paper"
     figures = {figure["name"]: figure for figure in modern["figures"]}
     assert figures["ModelFest"]["value"] == pytest.approx(0.5)
-    assert figures["ModelFest"]["asked"] == {"bound": 2.0, "is_least": False}
+    assert figures["ModelFest"]["target"] == {"bound": 2.0, "is_least": False}
     assert len(modern["moving_texture"]["conditions"]) == 72
 
 
@@ -121,7 +121,7 @@ def test_the_modern_mode_keeps_its_bounds():
         "ModelFest Gabors": sensitivity.measure("modelfest", MODERN).rms_db,
         "flicker against blur": min(pair.ratio for pair in flicker.measure(MODERN, Silence()).values()),
     }
-    assert all(ASKED[name].is_met(value) for name, value in measured.items()), measured
+    assert all(TARGETS[name].is_met(value) for name, value in measured.items()), measured
     listed, textures = conditions(), read_textures()
     chosen = [i for i, c in enumerate(listed) if c.display == "pc" and c.texture != "grass"]
     scores = [moving_texture.score(listed[i], textures[listed[i].texture], MODERN) for i in chosen]

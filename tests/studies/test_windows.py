@@ -1,4 +1,4 @@
-"""Short sequences, plain light, virtual images of mirrors, and scores of parts of maps."""
+"""Short sequences, the noise-free renderer, virtual images of mirrors, and scores of regions of maps."""
 
 from functools import cache
 
@@ -10,10 +10,10 @@ from enfilade.gbuffer import find_geometry, image_flow
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import MetricSettings
-from studies.cases.mirrored import VIRTUAL, mirror_pixels, mirrored
-from studies.cases.seen import Viewer, score_in, visible_percent
 from studies.cases.supports import uniform
-from studies.cases.windows import probes_of
+from studies.cases.virtual_images import VIRTUAL, mirror_pixels, reflected_geometry
+from studies.cases.visibility import Viewer, score_in, visible_percent
+from studies.cases.windows import probe_frames
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Checker, Material, Quad
 from support.example_scenes import room
@@ -25,7 +25,7 @@ def plain():
     return windows_of(room())
 
 
-def test_plain_light_has_no_noise_and_paths_through_a_pixel_antialias():
+def test_the_noise_free_renderer_has_no_noise_and_paths_through_a_pixel_antialias():
     camera, pixels = plain().walk.path.cameras[3], np.arange(64 * 48, dtype=np.uint32)
 
     def trace(seed, pixel_filter, spp=4):
@@ -41,9 +41,9 @@ def test_plain_light_has_no_noise_and_paths_through_a_pixel_antialias():
     np.testing.assert_allclose(centre.color[is_flat], box.color[is_flat], atol=0.02)
 
 
-def test_plain_light_shows_reflections():
+def test_the_noise_free_renderer_shows_reflections():
     windows = windows_of(room(specular=True), 8)
-    geometry, reflected = windows.geometry(5), windows.reflected(5)
+    geometry, reflected = windows.geometry(5), windows.reflected_geometry(5)
     mirror = mirror_pixels(geometry)
     assert mirror.any()
     np.testing.assert_array_equal(reflected.shape_index[~mirror], geometry.shape_index[~mirror])
@@ -64,20 +64,22 @@ def test_the_virtual_image_of_a_plane_mirror_is_static():
     cameras = [Camera(look_at((0.1 * k, 0, 3), (0.1 * k + 0.3, 0.1, 0)), 50.0, 32, 24) for k in range(2)]
     real, virtual = (AnalyticRenderer(AnalyticScene(shapes)) for shapes in ((glass, wall), (image,)))
     geometry, wanted = (find_geometry(renderer, cameras[0]) for renderer in (real, virtual))
-    reflected = mirrored(real, geometry)
+    reflected = reflected_geometry(real, geometry)
     np.testing.assert_allclose(reflected.depth, wanted.depth, rtol=2e-3)  # rays begin beside the mirror
-    motion, truth, own = (image_flow(g, None, cameras[1]).forward for g in (reflected, wanted, geometry))
+    motion, truth, of_mirror = (
+        image_flow(g, None, cameras[1]).forward for g in (reflected, wanted, geometry)
+    )
     np.testing.assert_allclose(motion, truth, atol=0.01)
-    assert np.abs(motion - own).max() > 0.3
+    assert np.abs(motion - of_mirror).max() > 0.3
 
 
 def test_probes_go_from_slow_to_fast_each_once():
     analysis = plain().analysis
-    probes = probes_of(analysis, 4)
+    probes = probe_frames(analysis, 4)
     speeds = [analysis.frames[f].speed_deg_s for f in probes]
     assert speeds == sorted(speeds)
     assert len(set(probes)) == len(probes) == 4
-    assert probes_of(analysis, 100) == probes_of(analysis, 99)
+    assert probe_frames(analysis, 100) == probe_frames(analysis, 99)
 
 
 def test_a_keyframe_is_reused_as_it_was_traced():
@@ -94,7 +96,7 @@ def test_traced_frames_are_kept_and_read_again(tmp_path):
     assert np.abs(windows.reference(2).color - first).max() > 0.0  # other random numbers, another filter
 
 
-def test_scores_of_parts_of_a_map():
+def test_scores_of_regions_of_a_map():
     jnd = np.array([[0.5, 2.0], [2.0, 4.0]], np.float32)
     everywhere, nowhere = np.ones((2, 2), bool), np.zeros((2, 2), bool)
     assert visible_percent(jnd, everywhere) == 75.0

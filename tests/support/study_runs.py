@@ -14,7 +14,7 @@ from enfilade.monitor import Silence
 from enfilade.runs.job import Job
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
-from studies.cases.plain import PlainlyLit
+from studies.cases.noise_free import NoiseFreeRenderer
 from studies.cases.windows import Windows
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene
@@ -57,9 +57,9 @@ def settings_of(**tables: dict[str, Any]) -> Settings:
 def windows_of(
     scene: AnalyticScene, count: int = 24, *, path: CameraPath | None = None, folder: Path | None = None
 ) -> Windows:
-    """Without noise, or path traced with a folder."""
+    """Windows of a scene: without noise, or path traced with a folder."""
     renderer = AnalyticRenderer(scene)
-    source = PlainlyLit(renderer) if folder is None else renderer
+    source = NoiseFreeRenderer(renderer) if folder is None else renderer
     walk = Walkthrough(path or room_walk(count, size=(64, 48)), settings_of(), source)
     analysis = Analysis(walk.path, walk.settings, tuple(analyze(walk, f) for f in range(len(walk.path))))
     return Windows(walk, analysis, Silence(), probes=2, reference_spp=64, folder=folder)

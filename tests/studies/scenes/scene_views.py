@@ -1,4 +1,4 @@
-"""What a coarse grid of rays sees in a frame of a generated scene."""
+"""Views of a generated scene through a coarse grid of rays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GRID = (64, 48)
 
 @dataclass(frozen=True)
 class View:
-    """What a coarse grid of rays sees in one frame of a walk."""
+    """Surfaces along a coarse grid of rays in one frame of a walk."""
 
     distance: np.ndarray  # (n,), metres, infinite where nothing is hit
     is_view_dependent: np.ndarray  # (n,)

@@ -1,4 +1,4 @@
-"""Rivals as methods: path tracing denoised frame by frame, and keyframes interpolated by FFmpeg."""
+"""Baselines as methods: path tracing denoised frame by frame, and keyframes interpolated by FFmpeg."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSet
 from studies.bench.guides import guides
 from studies.bench.interpolate import interpolate, why_no_interpolation
 
-QUALITIES = ("high", "fast")  # of Open Image Denoise: its best, and five times cheaper
+QUALITIES = ("high", "fast")  # of Open Image Denoise: the best, and one at a fifth of its cost
 
 
 @dataclass(frozen=True)
 class DenoiserSettings(Section):
-    """Open Image Denoise, as a rival."""
+    """Open Image Denoise, as a baseline."""
 
     table = "denoiser"
 
@@ -31,7 +31,7 @@ class DenoiserSettings(Section):
 
 
 class Denoised(Method):
-    """Every frame path traced and denoised by itself, with guides without noise."""
+    """Path tracing of every frame, denoised frame by frame with noise-free guides."""
 
     name = "denoised"
     settings = (*Reference.settings, DenoiserSettings)
@@ -57,7 +57,7 @@ class Denoised(Method):
 
 
 class Interpolated(Method):
-    """Keyframes path traced, the frames between them made by FFmpeg from the images alone.
+    """Path-traced keyframes, with in-betweens interpolated by FFmpeg from the images alone.
 
     The keyframes are the initial ones of the paper's method. A task holds all frames of a shot in memory.
     """
@@ -80,7 +80,7 @@ class Interpolated(Method):
             yield from (Task(FRAMES, frame, number, (TaskId("shots", shot.start),)) for frame in shot)
 
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Do a task."""
+        """Run a task of any pass."""
         match task.pass_name:
             case "keyframes":
                 return Reference().run(task, inputs, walk)
@@ -91,23 +91,23 @@ class Interpolated(Method):
 
 
 def _interpolated(task: Task, inputs: Inputs, walk: Walkthrough) -> dict[int, Frame]:
-    """All frames of a shot; keyframes and their repetitions as they were traced."""
+    """All frames of a shot; keyframes and repeated poses as traced."""
     path, shot = walk.path, walk.path.shots()[task.shot]
-    chosen = keyframes_of(inputs.analysis.segments()[task.shot])
-    traced = {frame: inputs.record("keyframes", frame) for frame in chosen}
+    numbers = keyframes_of(inputs.analysis.segments()[task.shot])
+    traced = {frame: inputs.record("keyframes", frame) for frame in numbers}
     static = {frame: path.static_frame(frame) for frame in shot}
     keyframes = {frame: traced[first] for frame, first in static.items() if first in traced}
     frames = {frame: keyframes[max(k for k in keyframes if k <= frame)] for frame in shot}
     if len(keyframes) > 1:
-        # The filter takes images as they are displayed.
+        # The filter expects exposed images.
         exposure = np.float32(2.0 ** walk.settings[ViewingSettings].exposure_ev)
-        shown = {frame: of.color * exposure for frame, of in keyframes.items()}
+        exposed = {frame: of.color * exposure for frame, of in keyframes.items()}
         reused = np.full((path.height, path.width), Provenance.REUSED, np.uint8)
-        for frame, image in interpolate(shown, exact_fps(path.fps)):
+        for frame, image in interpolate(exposed, exact_fps(path.fps)):
             frames[frame] = keyframes.get(frame, Frame(image / exposure, reused))
     return frames
 
 
 def why_missing(family: str) -> str:
-    """Why a rival can't be had here, and how to get it; empty where it can."""
+    """Reason why a baseline is not available, and how to install it; empty if it is available."""
     return {"denoised": why_no_denoiser, "interpolated": why_no_interpolation}.get(family, str)()

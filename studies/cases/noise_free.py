@@ -1,7 +1,7 @@
-"""A scene under a distant light without shadows: exact outlines and textures, and no noise.
+"""Noise-free renderer: a distant light without shadows, with exact outlines and textures.
 
-The paper's ray tracer has no noise. Under path tracing, the metric's results for reuse and filters are mixed
-with its results for noise; this renderer removes the noise, and with it the scene's own illumination.
+The paper's ray tracer has no noise. Under path tracing, differences by reuse and filters are mixed with
+noise. This renderer removes the noise, and with it the illumination of the scene.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ OFFSET = 1e-4  # of the distance: start of reflected and transmitted rays
 CHUNK = 4_194_304  # rays in flight
 
 
-class PlainlyLit:
-    """A renderer that shades the surfaces of another one with albedo times a cosine.
+class NoiseFreeRenderer:
+    """A renderer that shades the surfaces of another renderer with albedo times a cosine.
 
     Emitters are white and the background is black. Mirrors show the reflected surface and panes the
     transmitted one, one interaction deep and without loss. Glossy surfaces show their albedo.
@@ -33,7 +33,7 @@ class PlainlyLit:
     Parameters
     ----------
     renderer
-        Of the scene; only its surfaces are used.
+        Renderer of the scene, used for its surfaces.
     """
 
     def __init__(self, renderer: Renderer) -> None:
@@ -58,7 +58,7 @@ class PlainlyLit:
     ) -> Shading:
         """Shade a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`.
 
-        All rays through a pixel's centre are the same: one is traced, and the variance is 0.
+        All rays through a pixel's centre are identical: one is traced, and the variance is 0.
         """
         return estimate(
             camera,

@@ -26,7 +26,7 @@ def mirror_pixels(geometry: Geometry) -> Mask:
     return is_mirror
 
 
-def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
+def reflected_geometry(renderer: Renderer, geometry: Geometry) -> Geometry:
     """Geometry in which the pixels of mirrors contain the reflected surface, one reflection deep.
 
     Exact for plane mirrors. The depth is that of the virtual image along the camera's axis, 0 where the
@@ -59,7 +59,7 @@ def mirrored(renderer: Renderer, geometry: Geometry) -> Geometry:
         "surface": np.array(dr.select(hit.is_hit, hit.surface, 0)).astype(np.uint8),
     }
 
-    # Write them over the mirrors.
+    # Replace the pixels of mirrors.
     layers = {}
     for name, values in found.items():
         layer = getattr(geometry, name).copy()

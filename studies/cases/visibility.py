@@ -1,4 +1,4 @@
-"""Visible differences between two frames: in motion and as stills, by both modes of the metric."""
+"""Visible differences between frames, in motion and as stills, by both modes of the metric."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from enfilade.viewing import Viewing
 
 Scores = dict[str, float | None]
 
-VISIBLE_JND = 1.0  # seen by 75 % of observers who look for it (§6)
+VISIBLE_JND = 1.0  # detected in 75 % of trials (§6)
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,16 @@ class Viewer:
     viewing: Viewing
     settings: Settings
 
-    def shown(self, color: F32) -> F32:
-        """Luminance of the screen for linear colours, (H, W) cd/m2."""
-        of = self.viewing
+    def luminance(self, color: F32) -> F32:
+        """Displayed luminance of linear colours, (H, W) cd/m2."""
         exposure_ev = self.settings[ViewingSettings].exposure_ev
-        luminance: F32 = display_luminance(
-            color, exposure_ev=exposure_ev, peak_cd_m2=of.peak_cd_m2, black_cd_m2=of.black_cd_m2
+        displayed: F32 = display_luminance(
+            color,
+            exposure_ev=exposure_ev,
+            peak_cd_m2=self.viewing.peak_cd_m2,
+            black_cd_m2=self.viewing.black_cd_m2,
         )
-        return luminance
+        return displayed
 
     def paper(
         self,
@@ -52,7 +54,7 @@ class Viewer:
         noise: F32 | None = None,
         noise_blur_px: F32 | None = None,
     ) -> F32:
-        """JND map by the paper's metric, with the worse of pursuit and none (§3.3).
+        """JND map by the paper's mode, the worse of pursuit and the eye at rest (§3.3).
 
         Parameters
         ----------
@@ -63,16 +65,16 @@ class Viewer:
         valid : (H, W) bool, optional
             Pixels to compare.
         noise : (H, W) float32, optional
-            Variance of the difference of both, of linear luminance, which does not count.
+            Variance of the noise of the difference, linear luminance, which is discounted.
         noise_blur_px : (H, W) float32, optional
-            Standard deviation of the spatial filter that was applied to both since, pixels.
+            Standard deviation of the spatial filter that was applied to the noise, pixels.
         """
         # Exposure and display are linear up to the clipping.
         slope = 2.0 ** self.settings[ViewingSettings].exposure_ev
         slope *= self.viewing.peak_cd_m2 - self.viewing.black_cd_m2
         return self._paper.compare(
-            self.shown(test),
-            self.shown(reference),
+            self.luminance(test),
+            self.luminance(reference),
             velocity=velocity_deg_s,
             valid=valid,
             noise_variance=None if noise is None else (noise * slope**2).astype(np.float32),
@@ -81,9 +83,9 @@ class Viewer:
         ).jnd
 
     def modern(self, test: F32, reference: F32, velocity_deg_s: F32 | None) -> F32:
-        """JND map by the modern mode for one frame, without flicker."""
-        shown = self.shown(test), self.shown(reference)
-        return self._modern.compare(*shown, velocity=velocity_deg_s, pursuit=Pursuit.BOTH).jnd
+        """JND map by the modern mode, of single frames (no flicker)."""
+        images = self.luminance(test), self.luminance(reference)
+        return self._modern.compare(*images, velocity=velocity_deg_s, pursuit=Pursuit.BOTH).jnd
 
     @cached_property
     def _paper(self) -> Aqm:
@@ -95,17 +97,17 @@ class Viewer:
 
 
 def score_in(jnd: F32, where: Mask) -> float | None:
-    """Score of a part of a map, JND, (mean J^3.5)^(1/3.5); None for no pixel."""
+    """Score of a region of a map, JND, (mean J^3.5)^(1/3.5); None for no pixel."""
     if not where.any():
         return None
     return float(np.mean(jnd[where].astype(np.float64) ** POOLING_EXPONENT) ** (1.0 / POOLING_EXPONENT))
 
 
 def visible_percent(jnd: F32, where: Mask) -> float | None:
-    """Share of a part of a map above 1 JND, percent; None for no pixel."""
+    """Share of a region of a map above 1 JND, percent; None for no pixel."""
     return 100.0 * float((jnd[where] > VISIBLE_JND).mean()) if where.any() else None
 
 
 def scores_in(jnd: F32, where: Mask) -> Scores:
-    """``score`` and ``visible_percent`` of a part of a map."""
+    """``score`` and ``visible_percent`` of a region of a map."""
     return {"score": score_in(jnd, where), "visible_percent": visible_percent(jnd, where)}
