@@ -15,7 +15,7 @@ from enfilade.methods.base import FRAMES, Pass, Task, TaskId
 from enfilade.records import F32, Frame
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
-from enfilade.settings import OutputSettings, VideoSettings, ViewingSettings
+from enfilade.settings import LAYERS, OutputSettings, VideoSettings, ViewingSettings
 
 ANALYSIS, CLIPS, VIDEO = Pass("analysis"), Pass("clips", reads=(FRAMES,)), Pass("video", is_shared=False)
 ANALYZED_FRAMES = 16  # of an analysis task
@@ -69,7 +69,7 @@ def write_frame(stem: Path, frame: Frame, view: View, job: Job) -> Path:
     file = stem.with_name(f"{stem.name}.exr")
     write_exr(
         file,
-        {"RGB": to_half(frame.color), **{name: layer() for name, layer in layers.items() if name in chosen}},
+        {"RGB": to_half(frame.color), **{name: layers[name]() for name in LAYERS if name in chosen}},
         attributes={"framesPerSecond": exact_fps(job.path.fps)},
         is_portable=True,
     )
