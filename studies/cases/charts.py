@@ -44,7 +44,7 @@ def draw_placement(results: Values, file: Path) -> Path:
         right.axhline(by_a[None]["mean"], color=GREEN, linestyle=":", label="equal flow")
         _titled(right, "mean over all frames", "A", "pixels, %")
         for ax in (left, right):
-            ax.set_ylim(bottom=0.0)
+            ax.set_ylim(0.0, 1.08 * ax.dataLim.y1)  # markers stay within
             ax.legend(fontsize=8, frameon=False)
     return save(figure, file)
 
