@@ -151,6 +151,9 @@ def _refined(task: Task, context: _Context) -> Output:
         return context.keyframe_of(frame, lambda: inserted[frame])
 
     results = context.refinement.refine(segment, keyframe)
+    for result in results:
+        if result.is_split and result.middle is not None:
+            keyframe(result.middle)  # not traced yet where its halves have no in-betweens to compare
     facts = [result.to_table(walk.path.numbers) for result in results]
     return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
 
