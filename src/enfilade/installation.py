@@ -79,8 +79,7 @@ def _packages() -> Iterator[Check]:
         try:
             found, remedy = importlib.metadata.version(name), ""
         except importlib.metadata.PackageNotFoundError:
-            what = f"enfilade[{extra}]" if extra else requirement
-            found, remedy = "", f"pip install '{what}'"
+            found, remedy = "", f"pip install '{requirement.partition(';')[0].strip()}'"
         yield Check(f"{name} (extra {extra})" if extra else name, found, extra is None, remedy)
 
 

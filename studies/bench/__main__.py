@@ -83,7 +83,7 @@ def missed(scene: str, ratios: dict[str, Any]) -> list[str]:
             if ratio["times"] < 1.0 or ratio["kind"] == "at most"
         ]
     else:
-        found.append("no denoised baseline was rendered: pip install 'enfilade[denoise]'")
+        found.append("no denoised baseline was rendered: pip install pyoidn")
     return found + [
         f"better than {name} at less cost" for name, better in ratios["paper"].items() if not better
     ]

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -27,6 +28,7 @@ from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.files import read_json, write_json
 from enfilade.kernels.estimate import SPP_PER_SUM
 from enfilade.monitor import Silence
+from enfilade.resource_limits import die_with
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
@@ -236,7 +238,8 @@ def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quie
         return
     context = get_context("spawn")
     # The device is chosen before the job is unpickled: Dr.Jit's array types bind to it at import.
-    with ProcessPoolExecutor(1, mp_context=context, initializer=activate, initargs=(device,)) as pool:
+    arguments = os.getpid(), device
+    with ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=arguments) as pool:
         try:
             pool.submit(_render, job, folder, is_warm=is_warm, quiet=quiet).result()
         except BrokenProcessPool as error:
@@ -244,6 +247,11 @@ def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quie
                 f"the process that rendered {folder} was killed, perhaps for lack of memory; the same "
                 "command continues"
             ) from error
+
+
+def _begin(parent: int, device: Choice) -> None:
+    die_with(parent)
+    activate(device)
 
 
 def _is_finished(job: Job, folder: Path) -> bool:

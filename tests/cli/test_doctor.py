@@ -41,7 +41,7 @@ def test_a_missing_package_is_named_with_its_remedy(run, monkeypatch):
     checks = {check.name: check for check in examine()}
     assert "mitsuba" in checks["mitsuba"].remedy
     extra = checks["opencolorio (extra ocio)"]
-    assert (extra.is_required, extra.remedy) == (False, "pip install 'enfilade[ocio]'")
+    assert (extra.is_required, extra.remedy) == (False, "pip install 'opencolorio>=2.4'")
 
 
 def test_a_missing_system_library_is_named(run, monkeypatch):

@@ -38,7 +38,7 @@ def test_flip_is_that_of_its_own_package_at_our_pixels_per_degree():
 
 def test_without_its_package_flip_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "flip_evaluator", None)
-    with pytest.raises(SettingsError, match=r"pip install 'enfilade\[measures\]'"):
+    with pytest.raises(SettingsError, match=r"pip install flip-evaluator"):
         Flip(VIEWING)
 
 

@@ -89,5 +89,5 @@ def test_a_configuration_that_lacks_something(tmp_path):
 
 def test_opencolorio_that_is_not_installed(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
-    with pytest.raises(SettingsError, match=r"pip install 'enfilade\[ocio\]'"):
+    with pytest.raises(SettingsError, match=r"pip install opencolorio"):
         open_view(VideoSettings(ocio=config(tmp_path)), 0.0)

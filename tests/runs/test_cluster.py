@@ -31,7 +31,7 @@ NODE, BIG = {"CPU": 8.0, "GPU": 2.0}, {"CPU": 16.0}
 @pytest.mark.ray
 def test_a_cluster_whose_workers_crash_makes_the_same_run(tmp_path, whole):
     if importlib.util.find_spec("ray") is None:
-        pytest.skip("Ray is not installed: pip install 'enfilade[cluster]'")
+        pytest.skip("Ray is not installed: pip install ray")
     if subprocess.run([*ALONE, "true"], check=False, capture_output=True).returncode:  # noqa: S603
         pytest.skip("no network namespace can be made here, and Ray would listen to the network")
     order(tmp_path, light_1="kill", mean_1="raise")
@@ -129,7 +129,7 @@ def test_clusters_that_can_not_be_used(joined, monkeypatch):
     def unreachable(_ray, **_how):
         raise ConnectionError("timed out")
 
-    with pytest.raises(EnfiladeError, match=r"pip install 'enfilade\[cluster\]'"):
+    with pytest.raises(EnfiladeError, match=r"pip install ray"):
         joined()
     with pytest.raises(EnfiladeError, match=r"no GPU, .* add --device cpu"):
         joined(BIG, device="gpu")

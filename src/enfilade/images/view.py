@@ -90,7 +90,7 @@ def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
         import PyOpenColorIO
     except ImportError as error:
         raise SettingsError(
-            "[video] ocio needs OpenColorIO, which is not installed: pip install 'enfilade[ocio]'"
+            "[video] ocio needs OpenColorIO, which is not installed: pip install opencolorio"
         ) from error
     try:
         config = PyOpenColorIO.Config.CreateFromFile(file)

@@ -61,5 +61,5 @@ def denoiser_name() -> str:
 def why_no_denoiser() -> str:
     """The reason why the denoiser is not available, with the remedy; empty if it is."""
     if find_spec("pyoidn") is None:
-        return "Open Image Denoise is not installed: pip install 'enfilade[denoise]' brings it"
+        return "Open Image Denoise is not installed: pip install pyoidn"
     return ""

@@ -48,9 +48,7 @@ class Cluster:
         try:
             import ray
         except ImportError as error:
-            raise EnfiladeError(
-                "--executor ray needs Ray: install it with: pip install 'enfilade[cluster]'"
-            ) from error
+            raise EnfiladeError("--executor ray needs Ray: install it with: pip install ray") from error
         self._ray = ray
         self._in_hand: dict[Any, int] = {}
         threads = max(workers.threads, 1)

@@ -165,7 +165,7 @@ def submit(
     try:
         import submitit
     except ImportError as error:
-        raise EnfiladeError("Slurm needs submitit: pip install 'enfilade[farm]'") from error
+        raise EnfiladeError("Slurm needs submitit: pip install submitit") from error
     made: list[str] = []
     previous: list[str] = []
     most = 1 if cluster == "local" else _most_tasks()  # one by one: each takes all cores, and memory

@@ -67,7 +67,7 @@ def open_measure(name: str, viewing: Viewing) -> Measure:
 def why_missing(name: str) -> str:
     """Reason why a measure is not available, with the remedy; empty where it is."""
     if name == "flip" and find_spec("flip_evaluator") is None:
-        return "FLIP is left out; install it with: pip install 'enfilade[measures]'"
+        return "FLIP is left out; install it with: pip install flip-evaluator"
     if name == "cvvdp" and find_spec("pycvvdp") is None:
         return "ColorVideoVDP is left out; install it with: pip install cvvdp"
     return ""

@@ -37,7 +37,7 @@ class Flip:
             from flip_evaluator import evaluate
         except ImportError as error:
             raise SettingsError(
-                f"FLIP is not available: {error}; install it with: pip install 'enfilade[measures]'"
+                f"FLIP is not available: {error}; install it with: pip install flip-evaluator"
             ) from error
         self._evaluate = evaluate
         self._parameters = {"ppd": float(viewing.pixels_per_degree)}

@@ -40,6 +40,7 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
     SceneError
         The scene is malformed, a file is missing, or one of the above. The message names the file.
     """
+    _check_there(scene)
     roots = [scene.resolve().parent, *(Path(p).resolve() for p in limits.allow.split(os.pathsep) if p)]
     with _parsed(scene) as (state, resolver):
         for node in state.nodes:
@@ -48,12 +49,12 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
                 where = mi.parser.file_location(state, node)
                 raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
         for file in _files(state, resolver):
+            if not file.is_file():
+                raise SceneError(f"{scene} uses {file}, which is missing or not a regular file")
             if not any(file.is_relative_to(root) for root in roots):
                 raise SceneError(
                     f"{scene} uses {file}, outside the scene's folder; allow it with --allow {file.parent}"
                 )
-            if not file.is_file():
-                raise SceneError(f"{scene} uses {file}, which is missing or not a regular file")
 
 
 def fingerprint(scene: Path) -> str:
@@ -89,8 +90,7 @@ def reason(error: Exception) -> str:
 @contextmanager
 def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
     """The parsed scene, and the file resolver with all folders in which its files are looked for."""
-    if not scene.is_file():
-        raise SceneError(f"there is no scene file {scene}")
+    _check_there(scene)
     untyped: Any = mi  # its stubs lack the functions of the file resolver
     before = untyped.file_resolver()
     resolver = mi.FileResolver(before)
@@ -107,6 +107,11 @@ def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
         raise SceneError(f"can't read {error.filename}, which {scene} uses: {error.strerror}") from error
     finally:
         untyped.set_file_resolver(before)
+
+
+def _check_there(scene: Path) -> None:
+    if not scene.is_file():  # nor a loop of links, which Path.resolve does not survive
+        raise SceneError(f"there is no scene file {scene}")
 
 
 def _is_own_plugin(name: str, resolver: Any) -> bool:
