@@ -13,7 +13,7 @@ from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, Ta
 from enfilade.methods.denoise import denoise, why_no_denoiser
 from enfilade.methods.reference import Reference
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import Frame, Provenance
+from enfilade.records import F32, Frame, Provenance
 from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
 from studies.bench.guides import guides
 from studies.bench.interpolate import interpolate, why_no_interpolation
@@ -28,10 +28,15 @@ class DenoiserSettings(Section):
     table = "denoiser"
 
     quality: str = option("high", "Quality of its networks.", choices=("high", "balanced", "fast"))
+    guides: str = option(
+        "first-hit",
+        "Surfaces of the guides: first, or behind mirrors and glass.",
+        choices=("first-hit", "followed"),
+    )
 
 
 class Denoised(Method):
-    """Path tracing of every frame, denoised frame by frame with noise-free guides."""
+    """Path tracing of every frame, denoised frame by frame with guides of 16 rays a pixel."""
 
     name = "denoised"
     settings = (*Reference.settings, DenoiserSettings)
@@ -45,15 +50,22 @@ class Denoised(Method):
         """Trace and denoise a frame."""
         traced = Reference().run(task, inputs, walk)
         frame = traced.records[task.frame]
-        albedo, normal = guides(
-            walk.renderer,
-            walk.path.cameras[task.frame],
-            seed=walk.settings[TraceSettings].seed,
-            frame=walk.path.numbers[task.frame],
-            chunk=walk.settings[LimitSettings].paths_in_flight,
-        )
-        color = denoise(frame.color, albedo, normal, quality=walk.settings[DenoiserSettings].quality)
+        color = denoised(walk, task.frame, frame.color)
         return Output({task.frame: Frame(color, frame.provenance)}, traced.facts)
+
+
+def denoised(walk: Walkthrough, frame: int, color: F32) -> F32:
+    """An image of a frame, denoised."""
+    settings = walk.settings[DenoiserSettings]
+    albedo, normal = guides(
+        walk.renderer,
+        walk.path.cameras[frame],
+        seed=walk.settings[TraceSettings].seed,
+        frame=walk.path.numbers[frame],
+        chunk=walk.settings[LimitSettings].paths_in_flight,
+        is_followed=settings.guides == "followed",
+    )
+    return denoise(color, albedo, normal, quality=settings.quality)
 
 
 class Interpolated(Method):
