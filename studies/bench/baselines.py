@@ -13,12 +13,20 @@ from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, Ta
 from enfilade.methods.denoise import denoise, why_no_denoiser
 from enfilade.methods.reference import Reference
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, Frame, Provenance
+from enfilade.records import F32, U8, Frame, Provenance
 from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
+from studies.bench.accumulation import History, accumulate
 from studies.bench.guides import guides
 from studies.bench.interpolate import interpolate, why_no_interpolation
 
-QUALITIES = ("high", "fast")  # of Open Image Denoise: the best, and one at a fifth of its cost
+VARIANTS: dict[str, dict[str, str]] = {  # of denoised baselines: settings
+    "": {},
+    "fast": {"quality": "fast"},  # at a fifth of the cost of the best quality
+    "followed": {"guides": "followed"},
+    "accumulated": {"accumulation": "before"},
+    "accumulated-fast": {"accumulation": "before", "quality": "fast"},
+    "accumulated-after": {"accumulation": "after"},
+}
 
 
 @dataclass(frozen=True)
@@ -29,29 +37,57 @@ class DenoiserSettings(Section):
 
     quality: str = option("high", "Quality of its networks.", choices=("high", "balanced", "fast"))
     guides: str = option(
-        "first-hit",
-        "Surfaces of the guides: first, or behind mirrors and glass.",
-        choices=("first-hit", "followed"),
+        "first-hit", "Surface of the guides: first, or behind mirrors.", choices=("first-hit", "followed")
+    )
+    accumulation: str = option(
+        "none",
+        "Accumulation over time: before denoising or after.",
+        choices=("none", "before", "after"),
     )
 
 
 class Denoised(Method):
-    """Path tracing of every frame, denoised frame by frame with guides of 16 rays a pixel."""
+    """Path tracing of every frame, denoised; accumulated over time before or after on request."""
 
     name = "denoised"
-    settings = (*Reference.settings, DenoiserSettings)
-    passes = Reference.passes
+    settings = (*Reference.settings, DenoiserSettings, ViewingSettings)
+    passes = (
+        Pass("history", History, reads=("history",)),
+        Pass(FRAMES, Frame, reads=("history",)),
+    )
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """One task a frame."""
-        return Reference().tasks(analysis)
+        """One task a frame, and one for its history."""
+        is_accumulated = analysis.settings[DenoiserSettings].accumulation != "none"
+        for number, shot in enumerate(analysis.path.shots()):
+            for frame in shot:
+                here, before = TaskId("history", frame), TaskId("history", frame - 1)
+                if is_accumulated:
+                    yield Task("history", frame, number, (before,) if frame > shot.start else ())
+                yield Task(FRAMES, frame, number, (here,) if is_accumulated else ())
 
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Trace and denoise a frame."""
+        """Trace a frame and accumulate it, or deliver it."""
+        frame, order = task.frame, walk.settings[DenoiserSettings].accumulation
+        if task.pass_name == FRAMES and order != "none":
+            color = inputs.record("history", frame).color
+            color = denoised(walk, frame, color) if order == "before" else color
+            return Output({frame: Frame(color, _traced_everywhere(color))})
         traced = Reference().run(task, inputs, walk)
-        frame = traced.records[task.frame]
-        color = denoised(walk, task.frame, frame.color)
-        return Output({task.frame: Frame(color, frame.provenance)}, traced.facts)
+        color = traced.records[frame].color
+        if order != "before":
+            color = denoised(walk, frame, color)
+        if order == "none":
+            return Output({frame: Frame(color, _traced_everywhere(color))}, traced.facts)
+        history = History(color, np.ones(color.shape[:2], np.float32))
+        if task.needs:
+            before = task.needs[0].frame
+            history = accumulate(color, walk.view(frame), inputs.record("history", before), walk.view(before))
+        return Output({frame: history}, traced.facts)
+
+
+def _traced_everywhere(color: F32) -> U8:
+    return np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8)
 
 
 def denoised(walk: Walkthrough, frame: int, color: F32) -> F32:

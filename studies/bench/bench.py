@@ -54,7 +54,8 @@ from studies.versions import machine, origin, package_versions
 PATHS_PER_CPU_S = 1.0e6  # measured in a furnished room on one core of 2026; for the forecast
 WARM_FRAMES = 3  # rendered and discarded before the measurement, to compile the kernels
 UNCHARGED = (CLIPS.name, VIDEO.name)  # baselines need no video
-BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name, "gbuffer")  # nor G-buffers
+BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name)  # nor statistics of the path
+GBUFFER = "gbuffer"  # not charged to baselines that do not accumulate over time
 
 
 def bench(
@@ -178,7 +179,7 @@ class _Bench:
             "spp": one.spp,
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
-            "cost": _cost(RunFolder.read(folder), BASELINES_UNCHARGED if one.is_baseline else UNCHARGED),
+            "cost": _cost(RunFolder.read(folder), _uncharged(one)),
             "scores": self._scores(one.name, folder, self._reference(one.pixel_filter)),
         }
 
@@ -222,6 +223,13 @@ class _Bench:
 
     def _reference(self, pixel_filter: SampleFilter) -> Path:
         return self._folder / "references" / pixel_filter.value
+
+
+def _uncharged(one: Configuration) -> tuple[str, ...]:
+    """Passes and stages that a configuration does not need."""
+    if not one.is_baseline:
+        return UNCHARGED
+    return BASELINES_UNCHARGED if "accumulated" in one.variant else (*BASELINES_UNCHARGED, GBUFFER)
 
 
 def _cost(run: RunFolder, uncharged: Sequence[str]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from enfilade.errors import SettingsError
 from enfilade.runs.job import Job
 from enfilade.settings import OutputSettings, ReferenceSettings, SampleFilter, SamplingSettings, Settings
-from studies.bench.baselines import QUALITIES, DenoiserSettings
+from studies.bench.baselines import VARIANTS, DenoiserSettings
 
 FAMILIES = {  # in the order of tables: title
     "traced": "path tracing",
@@ -77,9 +77,9 @@ def all_configurations(job: Job, *, traced: Iterable[int], denoised: Iterable[in
     spps = sorted(set(traced))
     found = [_baseline("traced", f"traced-{n}", job, n) for n in spps]
     for n in sorted(set(denoised)):
-        for quality in QUALITIES:
-            name = f"denoised-{n}" if quality == QUALITIES[0] else f"denoised-{n}-{quality}"
-            found.append(_baseline("denoised", name, job, n, quality))
+        for variant in VARIANTS:
+            name = f"denoised-{n}-{variant}".removesuffix("-")
+            found.append(_baseline("denoised", name, job, n, variant))
     if spps:
         found.append(_baseline("interpolated", f"minterpolate-{spps[-1]}", job, spps[-1]))
     for name, (method, tables) in PRESETS.items():
@@ -99,12 +99,12 @@ def selected(configurations: Sequence[Configuration], patterns: Sequence[str]) -
     ]
 
 
-def _baseline(family: str, name: str, job: Job, spp: int, quality: str = "") -> Configuration:
+def _baseline(family: str, name: str, job: Job, spp: int, variant: str = "") -> Configuration:
     settings = job.settings.replace(SamplingSettings, spp=spp).replace(OutputSettings, layers="none")
     if family == "denoised":
         settings = settings.replace(ReferenceSettings, pixel_filter=SampleFilter.BOX)
-        settings = settings.replace(DenoiserSettings, quality=quality)
-    return Configuration(name, family, replace(job, method=BASELINES[family], settings=settings), quality)
+        settings = settings.replace(DenoiserSettings, **VARIANTS[variant])
+    return Configuration(name, family, replace(job, method=BASELINES[family], settings=settings), variant)
 
 
 def _overridden(settings: Settings, tables: Mapping[str, Mapping[str, Any]]) -> Settings:

@@ -16,6 +16,7 @@ from enfilade.monitor import Silence
 from enfilade.runs.render import render
 from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
 from studies.__main__ import main
+from studies.bench.baselines import DenoiserSettings
 from studies.bench.bench import bench
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import SCALES
@@ -141,15 +142,15 @@ def test_a_single_frame_has_no_changes_to_measure(tmp_path):
 def test_all_configurations(tmp_path):
     found = all_configurations(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
     names = [c.name for c in found]
-    assert names[:5] == ["traced-1", "traced-4", "denoised-2", "denoised-2-fast", "minterpolate-4"]
-    assert [c.name for c in selected(found, ["denoised-*", "paper-16"])] == [
-        "denoised-2",
-        "denoised-2-fast",
-        "paper-16",
-    ]
-    denoised, paper, decoupled = (
-        found[names.index(name)] for name in ("denoised-2", "paper-16", "decoupled-30")
+    variants = ("", "-fast", "-followed", "-accumulated", "-accumulated-fast", "-accumulated-after")
+    assert names[:9] == ["traced-1", "traced-4", *(f"denoised-2{v}" for v in variants), "minterpolate-4"]
+    assert [c.name for c in selected(found, ["traced-*", "paper-16"])] == ["traced-1", "traced-4", "paper-16"]
+    denoised, accumulated, paper, decoupled = (
+        found[names.index(name)]
+        for name in ("denoised-2-fast", "denoised-2-accumulated", "paper-16", "decoupled-30")
     )
+    assert (denoised.job.settings[DenoiserSettings].quality, accumulated.variant) == ("fast", "accumulated")
+    assert accumulated.job.settings[DenoiserSettings].accumulation == "before"
     assert denoised.job.settings[ReferenceSettings].pixel_filter is denoised.pixel_filter is SampleFilter.BOX
     assert (denoised.spp, paper.spp) == (2, 16)
     assert decoupled.job.settings[DecoupledSettings].quality == 30.0

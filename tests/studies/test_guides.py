@@ -1,4 +1,4 @@
-"""Guides of the denoiser: noise-free, box filtered, traced through mirrors."""
+"""Guides of the denoiser: noise-free, box filtered, of the first surface or behind mirrors."""
 
 import numpy as np
 import pytest
@@ -43,13 +43,18 @@ def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
     np.testing.assert_array_equal(normal, again[1])
 
 
+@pytest.mark.parametrize(
+    ("is_followed", "reflectance", "facing"), [(True, [0.7, 0.2, 0.1], -1.0), (False, [0.0, 0.0, 0.0], 1.0)]
+)
 @pytest.mark.parametrize("frame", [1, 2])
-def test_a_mirror_shows_the_reflected_surface(tmp_path, frame):
+def test_a_mirror_shows_the_reflected_surface_to_rays_that_continue(
+    tmp_path, frame, is_followed, reflectance, facing
+):
     file = tmp_path / "mirror.xml"
     file.write_text(MIRROR)
     renderer = Scene(file).open(Settings())
     camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 30.0, 32, 24)
-    albedo, normal = guides(renderer, camera, seed=0, frame=frame, chunk=CHUNK)
+    albedo, normal = guides(renderer, camera, seed=0, frame=frame, chunk=CHUNK, is_followed=is_followed)
     for pick in (np.min, np.max):
-        assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx([0.7, 0.2, 0.1], abs=1e-3)
-    assert np.abs(normal[..., 2] + 1.0).max() < 1e-4  # the wall's, which faces the mirror
+        assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx(reflectance, abs=1e-3)
+    assert np.abs(normal[..., 2] - facing).max() < 1e-4  # the wall's, which faces the mirror, or the mirror's
