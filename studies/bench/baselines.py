@@ -14,9 +14,10 @@ from enfilade.methods.denoise import denoise, why_no_denoiser
 from enfilade.methods.reference import Reference
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U8, Frame, Provenance
+from enfilade.renderer import Renderer
 from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
 from studies.bench.accumulation import History, accumulate
-from studies.bench.guides import guides
+from studies.bench.guides import Guides
 from studies.bench.interpolate import interpolate, why_no_interpolation
 
 VARIANTS: dict[str, dict[str, str]] = {  # of denoised baselines: settings
@@ -56,6 +57,9 @@ class Denoised(Method):
         Pass(FRAMES, Frame, reads=("history",)),
     )
 
+    def __init__(self) -> None:
+        self._guides: tuple[Renderer, Guides] | None = None
+
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """One task a frame, and one for its history."""
         is_accumulated = analysis.settings[DenoiserSettings].accumulation != "none"
@@ -71,12 +75,12 @@ class Denoised(Method):
         frame, order = task.frame, walk.settings[DenoiserSettings].accumulation
         if task.pass_name == FRAMES and order != "none":
             color = inputs.record("history", frame).color
-            color = denoised(walk, frame, color) if order == "before" else color
+            color = self._denoised(walk, frame, color) if order == "before" else color
             return Output({frame: Frame(color, _traced_everywhere(color))})
         traced = Reference().run(task, inputs, walk)
         color = traced.records[frame].color
         if order != "before":
-            color = denoised(walk, frame, color)
+            color = self._denoised(walk, frame, color)
         if order == "none":
             return Output({frame: Frame(color, _traced_everywhere(color))}, traced.facts)
         history = History(color, np.ones(color.shape[:2], np.float32))
@@ -85,23 +89,23 @@ class Denoised(Method):
             history = accumulate(color, walk.view(frame), inputs.record("history", before), walk.view(before))
         return Output({frame: history}, traced.facts)
 
+    def _denoised(self, walk: Walkthrough, frame: int, color: F32) -> F32:
+        """An image of a frame, denoised."""
+        settings = walk.settings[DenoiserSettings]
+        if self._guides is None or self._guides[0] is not walk.renderer:
+            self._guides = walk.renderer, Guides(walk.renderer)
+        albedo, normal = self._guides[1].images(
+            walk.path.cameras[frame],
+            seed=walk.settings[TraceSettings].seed,
+            frame=walk.path.numbers[frame],
+            chunk=walk.settings[LimitSettings].paths_in_flight,
+            is_followed=settings.guides == "followed",
+        )
+        return denoise(color, albedo, normal, quality=settings.quality)
+
 
 def _traced_everywhere(color: F32) -> U8:
     return np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8)
-
-
-def denoised(walk: Walkthrough, frame: int, color: F32) -> F32:
-    """An image of a frame, denoised."""
-    settings = walk.settings[DenoiserSettings]
-    albedo, normal = guides(
-        walk.renderer,
-        walk.path.cameras[frame],
-        seed=walk.settings[TraceSettings].seed,
-        frame=walk.path.numbers[frame],
-        chunk=walk.settings[LimitSettings].paths_in_flight,
-        is_followed=settings.guides == "followed",
-    )
-    return denoise(color, albedo, normal, quality=settings.quality)
 
 
 class Interpolated(Method):

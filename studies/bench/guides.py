@@ -12,7 +12,7 @@ from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, m
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import streams
 from enfilade.kernels.rays import pinhole_directions
-from enfilade.kernels.replay import padded
+from enfilade.kernels.replay import padded, recorded
 from enfilade.records import F32, SurfaceClass
 from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
@@ -21,51 +21,105 @@ BOUNCES = 6  # reflections and transmissions, before a path ends
 SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
 
-def guides(
-    renderer: Renderer, camera: Camera, *, seed: int, frame: int, chunk: int, is_followed: bool = False
-) -> tuple[F32, F32]:
-    """Albedo and normal of an image, through a box filter.
+class Guides:
+    """Guides of the images of a scene.
 
     Parameters
     ----------
     renderer
-    camera
-    seed, frame
-        Of the random numbers.
-    chunk
-        Rays in flight; no result depends on it.
-    is_followed
-        Whether rays continue through mirrors and clear glass, as Open Image Denoise recommends, with a
-        :class:`LobeRenderer`; otherwise they end at the first surface.
-
-    Returns
-    -------
-    albedo : (H, W, 3) float32
-        Diffuse reflectance times the throughput of mirrors and glass in front; 0 to 1, 0 where nothing is
-        hit.
-    normal : (H, W, 3) float32
-        World-space normal of the surface where the path ends, averaged over the pixel (not normalized).
     """
-    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-    step = max(chunk // SIDE**2, 1)
-    random = RandomKey(seed, frame, Purpose.GUIDE)
-    batches = [
-        _pixel_guides(renderer, camera, pixels[i : i + step], random, is_followed)
-        for i in range(0, len(pixels), step)
-    ]
-    found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
-    albedo = np.clip(found[..., :3], 0.0, 1.0)
-    return np.ascontiguousarray(albedo), np.ascontiguousarray(found[..., 3:])
+
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer = renderer
+        if isinstance(renderer, LobeRenderer):
+            self._extend = recorded(self._extend_kernel, lambda: renderer.state)
+
+    def images(
+        self, camera: Camera, *, seed: int, frame: int, chunk: int, is_followed: bool = False
+    ) -> tuple[F32, F32]:
+        """Albedo and normal of an image, through a box filter.
+
+        Parameters
+        ----------
+        camera
+        seed, frame
+            Of the random numbers.
+        chunk
+            Rays in flight; no result depends on it.
+        is_followed
+            Whether rays continue through mirrors and clear glass, as Open Image Denoise recommends, with a
+            :class:`LobeRenderer`; otherwise they end at the first surface.
+
+        Returns
+        -------
+        albedo : (H, W, 3) float32
+            Diffuse reflectance times the throughput of mirrors and glass in front; 0 to 1, 0 where nothing is
+            hit.
+        normal : (H, W, 3) float32
+            World-space normal of the surface where the path ends, averaged over the pixel (not normalized).
+        """
+        pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+        step = max(chunk // SIDE**2, 1)
+        random = RandomKey(seed, frame, Purpose.GUIDE)
+        batches = []
+        for first in range(0, len(pixels), step):
+            rays, rng = _stratified_rays(camera, pixels[first : first + step], random)
+            albedo, normal, is_sharp = self._first(rays, rng)
+            if is_followed and isinstance(self._renderer, LobeRenderer):
+                self._follow(albedo, normal, is_sharp, rays, rng)
+            sums = [np.array(dr.block_sum(v, SIDE * SIDE)) for v in (*albedo, *normal)]
+            batches.append(np.stack(sums) / np.float32(SIDE * SIDE))
+        found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
+        albedo_image = np.clip(found[..., :3], 0.0, 1.0)
+        return np.ascontiguousarray(albedo_image), np.ascontiguousarray(found[..., 3:])
+
+    def _first(self, rays: Rays, rng: Any) -> tuple[Any, Any, Any]:
+        """Albedo and normal of the first surfaces, and whether they are sharp."""
+        hit = self._renderer.surfaces(rays)
+        found = *_guides_of(hit), _is_sharp(hit)
+        dr.eval(found, rays, rng)
+        return found
+
+    def _follow(self, albedo: Any, normal: Any, is_sharp: Any, rays: Rays, rng: Any) -> None:
+        """Replace the guides of sharp surfaces by those of the surfaces behind."""
+        lane = dr.arange(UInt, dr.width(is_sharp))
+        throughput = dr.full(Array3f, 1, dr.width(is_sharp))
+        rays = Rays(rays.origin + dr.zeros(Array3f, dr.width(is_sharp)), rays.direction)
+        for _ in range(BOUNCES):
+            # Keep the paths at sharp surfaces.
+            active: Any = dr.compress(is_sharp)
+            if not dr.width(active):
+                return
+            chosen, is_real = padded(active)
+            lane, throughput = dr.gather(UInt, lane, chosen), dr.gather(Array3f, throughput, chosen)
+            rays, rng = dr.gather(Rays, rays, chosen), dr.gather(PCG32, rng, chosen)
+            dr.eval(lane, throughput, rays, rng)
+
+            # Reflect or transmit them, and find the next surfaces.
+            rays, rng, factor, next_albedo, next_normal, is_sharp = self._extend(rays, rng)
+            throughput *= factor
+
+            # Add their albedo, and take their normal.
+            for target, value in zip(albedo, throughput * next_albedo, strict=True):
+                dr.scatter_add(target, Float(value), lane, is_real, dr.ReduceMode.NoConflicts)
+            for target, value in zip(normal, next_normal, strict=True):
+                dr.scatter(target, value, lane, is_real)
+            is_sharp &= is_real
+            dr.eval(albedo, normal, is_sharp, throughput)
+
+    def _extend_kernel(self, rays: Rays, rng: Any) -> tuple[Any, ...]:
+        """Scatter paths at a sharp surface, and find the next one."""
+        assert isinstance(self._renderer, LobeRenderer)  # noqa: S101  (`__init__`)
+        rng = PCG32(rng)
+        point = self._renderer.intersect(rays, opaque_only=True)
+        sample = self._renderer.sample_specular(point, rng)
+        hit = self._renderer.intersect(sample.rays, sample.bounce).surfaces
+        throughput = Array3f(dr.select(sample.is_alive, sample.throughput, 0))
+        return sample.rays, rng, throughput, *_guides_of(hit), Bool(_is_sharp(hit) & sample.is_alive)
 
 
-def _pixel_guides(
-    renderer: Renderer,
-    camera: Camera,
-    pixels: npt.NDArray[np.uint32],
-    random: RandomKey,
-    is_followed: bool,
-) -> npt.NDArray[np.float32]:
-    # Trace one ray for each stratum of each pixel, in neighbouring lanes.
+def _stratified_rays(camera: Camera, pixels: npt.NDArray[np.uint32], random: RandomKey) -> tuple[Rays, Any]:
+    """One ray for each stratum of each pixel, in neighbouring lanes, and their random generators."""
     count = SIDE * SIDE
     lane = dr.arange(UInt, len(pixels) * count)
     slot = lane // count
@@ -76,57 +130,7 @@ def _pixel_guides(
     inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
     at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE
     direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    albedo, normal = _trace_guides(renderer, Rays(vector3(camera.eye), direction), rng, is_followed)
-
-    # Average over the strata.
-    dr.eval(albedo, normal)
-    sums = [np.array(dr.block_sum(v, count)) for v in (*albedo, *normal)]
-    return np.asarray(np.stack(sums) / count, np.float32)
-
-
-def _trace_guides(
-    renderer: Renderer,
-    rays: Rays,
-    rng: Any,
-    is_followed: bool,
-) -> tuple[Any, Any]:
-    """Albedo and normal of the first surface, or behind mirrors and clear glass."""
-    # Find the first surface.
-    hit = renderer.surfaces(rays)
-    albedo, normal = _guides_of(hit)
-    is_sharp = _is_sharp(hit)
-    dr.eval(albedo, normal, is_sharp, rng)
-    if not is_followed or not isinstance(renderer, LobeRenderer):
-        return albedo, normal
-    lane = dr.arange(UInt, dr.width(is_sharp))
-    throughput = dr.full(Array3f, 1, dr.width(lane))
-    for _ in range(BOUNCES):
-        # Keep the paths at sharp surfaces.
-        active: Any = dr.compress(is_sharp)
-        if not len(active):
-            break
-        lane, rng = dr.gather(UInt, lane, active), dr.gather(PCG32, rng, active)
-        rays, throughput = dr.gather(Rays, rays, active), dr.gather(Array3f, throughput, active)
-
-        # Reflect or transmit them.
-        point = renderer.intersect(rays, opaque_only=True)
-        sample = renderer.sample_specular(point, rng)
-        throughput = dr.select(sample.is_alive, throughput * sample.throughput, 0)
-        rays = sample.rays
-
-        # Find the next surface, with lanes padded to the size of a recorded kernel.
-        dr.eval(rays, throughput, rng)
-        every = dr.arange(UInt, len(lane))
-        padded_lanes, _ = padded(every)
-        hit = dr.gather(Surfaces, renderer.surfaces(dr.gather(Rays, rays, padded_lanes)), every)
-        next_albedo, next_normal = _guides_of(hit)
-        for target, value in zip(albedo, throughput * next_albedo, strict=True):
-            dr.scatter_add(target, Float(value), lane, mode=dr.ReduceMode.NoConflicts)
-        for target, value in zip(normal, next_normal, strict=True):
-            dr.scatter(target, value, lane)
-        is_sharp = _is_sharp(hit) & sample.is_alive
-        dr.eval(albedo, normal, is_sharp, throughput)
-    return albedo, normal
+    return Rays(vector3(camera.eye), direction), rng
 
 
 def _guides_of(hit: Surfaces) -> tuple[Any, Any]:

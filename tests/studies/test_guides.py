@@ -7,7 +7,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
-from studies.bench.guides import guides
+from studies.bench.guides import Guides
 from support.analytic import AnalyticRenderer
 from support.example_scenes import room, room_walk
 
@@ -27,7 +27,7 @@ MIRROR = """<scene version="3.0.0">
 
 def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
     renderer, camera = AnalyticRenderer(room()), room_walk(1).cameras[0]
-    albedo, normal = guides(renderer, camera, seed=0, frame=1, chunk=CHUNK)
+    albedo, normal = Guides(renderer).images(camera, seed=0, frame=1, chunk=CHUNK)
     seen = find_geometry(renderer, camera)
     inner = np.zeros(seen.shape_index.shape, bool)
     same = seen.shape_index[1:-1, 1:-1]
@@ -38,7 +38,7 @@ def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
     assert np.abs(normal - seen.normal)[is_flat].max() < 1e-4
     assert np.median(np.abs(albedo - seen.albedo)[inner]) < 0.01
     # Neither chunks nor anything but the seed change them.
-    again = guides(renderer, camera, seed=0, frame=1, chunk=5000)
+    again = Guides(renderer).images(camera, seed=0, frame=1, chunk=5000)
     np.testing.assert_array_equal(albedo, again[0])
     np.testing.assert_array_equal(normal, again[1])
 
@@ -54,7 +54,9 @@ def test_a_mirror_shows_the_reflected_surface_to_rays_that_continue(
     file.write_text(MIRROR)
     renderer = Scene(file).open(Settings())
     camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 30.0, 32, 24)
-    albedo, normal = guides(renderer, camera, seed=0, frame=frame, chunk=CHUNK, is_followed=is_followed)
+    albedo, normal = Guides(renderer).images(
+        camera, seed=0, frame=frame, chunk=CHUNK, is_followed=is_followed
+    )
     for pick in (np.min, np.max):
         assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx(reflectance, abs=1e-3)
     assert np.abs(normal[..., 2] - facing).max() < 1e-4  # the wall's, which faces the mirror, or the mirror's
