@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -45,7 +45,7 @@ from enfilade.settings import (
 )
 from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
-from studies.bench.measures import SCALES
+from studies.bench.measures import NOISE_FREE, SCALES
 from studies.bench.measuring import available, measure
 from studies.bench.ratios import ratios
 from studies.progress import Prefixed
@@ -82,7 +82,7 @@ def bench(
     folder
         Created if it does not exist.
     reference_spp
-        Paths a pixel of the references, whose noise is a lower bound of all errors.
+        Paths a pixel of the references, half of them in each of two independent halves.
     measures
         Names; empty: all that are available.
     reference_device
@@ -113,7 +113,8 @@ def bench(
     runs = _Bench(job, folder, names, quiet=quiet)
     filters = dict.fromkeys(c.pixel_filter for c in available_configurations)
     references = {kind.value: runs.reference(kind, reference_spp, reference_device) for kind in filters}
-    rows = [runs.row(configuration) for configuration in available_configurations]
+    floors = {kind.value: runs.noise_floor(kind) for kind in filters}
+    rows = [runs.row(one, floors[one.pixel_filter.value]) for one in available_configurations]
     found = {
         **origin(),
         "machine": machine(),
@@ -127,7 +128,7 @@ def bench(
         "reference": {
             "spp": reference_spp,
             "filters": references,
-            "noise_floor": runs.noise_floor(available_configurations, reference_spp),
+            "noise_floor": floors,
         },
         "measures": {
             name: {key: getattr(SCALES[name], key) for key in ("title", "unit", "is_more_better")}
@@ -156,23 +157,29 @@ class _Bench:
         self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
 
     def reference(self, pixel_filter: SampleFilter, spp: int, device: Choice) -> dict[str, Any]:
-        """Render a reference with independent random numbers; return its cost and the renderer's variant."""
-        seed = (self._job.settings[TraceSettings].seed + 1) % 2**32
-        settings = (
-            self._job.settings.replace(TraceSettings, seed=seed)
-            .replace(SamplingSettings, spp=spp)
-            .replace(ReferenceSettings, pixel_filter=pixel_filter)
-            .replace(OutputSettings, layers="all")
-        )
-        folder, job = self._reference(pixel_filter), replace(self._job, method="reference", settings=settings)
-        _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
-        run = RunFolder.read(folder)
-        return {**_cost(run, UNCHARGED), "variant": run.identity["scene"]["variant"]}
+        """Render both halves of a reference; return their cost and the renderer's variant."""
+        costs, variant = [], ""
+        for half, folder in enumerate(self._halves(pixel_filter), 1):
+            seed = (self._job.settings[TraceSettings].seed + half) % 2**32  # not those of configurations
+            settings = (
+                self._job.settings.replace(TraceSettings, seed=seed)
+                .replace(SamplingSettings, spp=max(spp // 2, 1))
+                .replace(ReferenceSettings, pixel_filter=pixel_filter)
+                .replace(OutputSettings, layers="all")
+            )
+            job = replace(self._job, method="reference", settings=settings)
+            _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
+            run = RunFolder.read(folder)
+            costs.append(_cost(run, UNCHARGED))
+            variant = run.identity["scene"]["variant"]
+        total = {key: sum(cost[key] for cost in costs) for key in ("cpu_s", "wall_s")}
+        return {**total, "variant": variant}
 
-    def row(self, one: Configuration) -> dict[str, Any]:
+    def row(self, one: Configuration, floor: Mapping[str, float | None]) -> dict[str, Any]:
         """Render and measure a configuration; return its row of the result."""
         folder = self._run(one)
         _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
+        scores = self._scores(one.name, folder, self._halves(one.pixel_filter))
         return {
             "name": one.name,
             "family": one.family,
@@ -180,30 +187,21 @@ class _Bench:
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
             "cost": _cost(RunFolder.read(folder), _uncharged(one)),
-            "scores": self._scores(one.name, folder, self._reference(one.pixel_filter)),
+            "scores": scores,
+            "undecided": [name for name, least in floor.items() if _is_near(scores[name], least)],
         }
 
-    def noise_floor(
-        self, configurations: Sequence[Configuration], reference_spp: int
-    ) -> dict[str, float | None]:
-        """Scores of a perfect configuration: all of its error is the noise of the reference.
+    def noise_floor(self, pixel_filter: SampleFilter) -> dict[str, float | None]:
+        """Scores of one half of a reference against the other, by the measures that contain their noise."""
+        first, second = self._halves(pixel_filter)
+        found = self._scores(f"noise floor, {pixel_filter.value}", first, (second, second))
+        return {name: score for name, score in found.items() if name not in NOISE_FREE}
 
-        A path-traced configuration of N paths and a reference of R paths differ by noise of 1/N + 1/R of the
-        variance of a path; a perfect configuration differs from the reference by 1/R of it.
-        """
-        traced = [c for c in configurations if c.family == "traced"]
-        if not traced:
-            return {}
-        one = max(traced, key=lambda c: c.spp)
-        weight = (1.0 + reference_spp / one.spp) ** -0.5
-        return self._scores("noise floor", self._run(one), self._reference(one.pixel_filter), weight)
-
-    def _scores(self, name: str, test: Path, reference: Path, weight: float = 1.0) -> dict[str, float | None]:
+    def _scores(self, name: str, test: Path, halves: tuple[Path, Path]) -> dict[str, float | None]:
         """Scores of a run folder by measure; read from their file if they are there, else measured."""
         settings = self._job.settings
         identity = {
-            "runs": [RunFolder.read(folder).digest() for folder in (test, reference)],
-            "weight": weight,
+            "runs": [RunFolder.read(folder).digest() for folder in (test, *halves)],
             **settings.to_tables([ViewingSettings]),
             "metering": settings[MetricSettings].metering.value,
         }
@@ -214,15 +212,21 @@ class _Bench:
         if missing := [measure for measure in self._names if measure not in found["measures"]]:
             with watch(quiet=self._quiet) as monitor:
                 prefixed = Prefixed(monitor, name)
-                found["measures"] |= measure(test, reference, self._job, missing, prefixed, weight=weight)
+                found["measures"] |= measure(test, halves, self._job, missing, prefixed)
             write_json(file, found)
         return {measure: found["measures"][measure]["score"] for measure in self._names}
 
     def _run(self, one: Configuration) -> Path:
         return self._folder / "configurations" / one.name
 
-    def _reference(self, pixel_filter: SampleFilter) -> Path:
-        return self._folder / "references" / pixel_filter.value
+    def _halves(self, pixel_filter: SampleFilter) -> tuple[Path, Path]:
+        folder = self._folder / "references"
+        return folder / f"{pixel_filter.value}-1", folder / f"{pixel_filter.value}-2"
+
+
+def _is_near(score: float | None, floor: float | None) -> bool:
+    """Whether a score is nearer to the noise floor of its measure than a third of it."""
+    return score is not None and floor is not None and abs(score - floor) < abs(floor) / 3.0
 
 
 def _uncharged(one: Configuration) -> tuple[str, ...]:

@@ -65,10 +65,10 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str, of: Mapping[str, Any]) 
         }
         if points:
             _curve(ax, list(points.values()), family, sign)
-    floor = found["reference"]["noise_floor"].get(name)
-    if floor is not None:
+    floors = [floor[name] for floor in found["reference"]["noise_floor"].values() if floor.get(name)]
+    for label, floor in zip(("noise floor", ""), floors, strict=False):
         dots = (0, (1, 3))
-        ax.axhline(floor, color="#7A7A7A", linewidth=1.0, linestyle=dots, label="noise floor", zorder=2)
+        ax.axhline(floor, color="#7A7A7A", linewidth=1.0, linestyle=dots, label=label or None, zorder=2)
     ax.set_xscale("log")
     scales: list[tuple[Any, tuple[float, ...]]] = [(ax.xaxis, (1.0, 2.0, 5.0))]
     if not of["is_more_better"]:

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.comparison import measures
-from enfilade.comparison.measures import DisplayedPair, Scale
+from enfilade.comparison.measures import DisplayedPair, Psnr, Scale
+from enfilade.comparison.measures.psnr import psnr_db
 from enfilade.metric import Aqm, Pursuit, SequenceAqm, sequence_score
 from enfilade.records import F32, Flow, Mask
 from enfilade.viewing import Viewing
@@ -31,10 +32,14 @@ class TrackedPair(DisplayedPair):
     visible_before : (H, W) bool or None
         Pixels whose surface the previous frame shows, at the end of `flow.backward`; None in the first
         frame of a shot.
+    halves : tuple of (H, W, 3) float32
+        The two halves of the reference, of independent random numbers, encoded as it is. The mean of
+        products (test - first) (test - second) has no contribution of their noise.
     """
 
     flow: Flow
     visible_before: Mask | None
+    halves: tuple[F32, F32]
 
 
 class Measure(Protocol):
@@ -94,29 +99,61 @@ class Temporal:
     consistency"), applied to the error instead of the image, so that changes of the reference (moving
     highlights) are no error.
 
-    The previous error is interpolated bilinearly, which smooths fine noise and slightly favours noisy
-    configurations.
+    The square is the product of the changes against both halves of the reference, whose noise it does not
+    contain. The previous error is interpolated bilinearly, which smooths fine noise and slightly favours
+    noisy configurations.
     """
 
     SCALE = Scale("temporal", "temporal", "RMS")
     name = SCALE.name
 
     def __init__(self) -> None:
-        self._previous: F32 | None = None
+        self._previous: tuple[F32, F32] | None = None
 
     def measure(self, pair: TrackedPair) -> float | None:
-        """Change of the error; None in the first frame of a shot, or where no surface is in both frames."""
-        error = pair.test - pair.reference
-        previous, self._previous = self._previous, error
+        """Change of the error; None in the first frame of a shot, or where no surface is in both frames.
+
+        Negative where noise of the references makes the product negative.
+        """
+        errors = pair.test - pair.halves[0], pair.test - pair.halves[1]
+        previous, self._previous = self._previous, errors
         if previous is None or pair.visible_before is None or not pair.visible_before.any():
             return None
-        change = (error - _bilinear(previous, pair.flow.backward))[pair.visible_before]
-        return math.sqrt(float(np.mean(np.square(change, dtype=np.float64))))
+        first, second = (
+            (now - _bilinear(before, pair.flow.backward))[pair.visible_before]
+            for now, before in zip(errors, previous, strict=True)
+        )
+        square = float(np.mean(np.multiply(first, second, dtype=np.float64)))
+        return math.copysign(math.sqrt(abs(square)), square)
 
     def pool(self, values: Sequence[float | None]) -> float:
         """RMS over frames; 0 where no frame has a previous one."""
-        known = [value for value in values if value is not None]
-        return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
+        known = [value * abs(value) for value in values if value is not None]
+        return math.sqrt(max(sum(known) / len(known), 0.0)) if known else 0.0
+
+
+class HalvesPsnr:
+    """PSNR without the noise of the reference: its squared error is the product of those against both halves.
+
+    Infinite where that product is not positive.
+    """
+
+    SCALE = Psnr.SCALE
+    name = SCALE.name
+
+    def __init__(self) -> None:
+        self._squares: list[float] = []
+
+    def measure(self, pair: TrackedPair) -> float:
+        """PSNR of the next frame, dB."""
+        first, second = (pair.test - half for half in pair.halves)
+        self._squares.append(float(np.mean(np.multiply(first, second, dtype=np.float64))))
+        return psnr_db(max(self._squares[-1], 0.0))
+
+    def pool(self, values: Sequence[float | None]) -> float:
+        """PSNR of the whole sequence: of the mean squared error over all frames."""
+        del values
+        return psnr_db(max(sum(self._squares) / len(self._squares), 0.0))
 
 
 def visible_before(layers: Mapping[str, npt.NDArray[Any]], previous: Mapping[str, npt.NDArray[Any]]) -> Mask:
@@ -167,7 +204,7 @@ SCALES = {
     for scale in (
         AqmMeasure.SCALE,
         measures.SCALES["flip"],
-        measures.SCALES["psnr"],
+        HalvesPsnr.SCALE,
         Temporal.SCALE,
         measures.SCALES["cvvdp"],
     )
@@ -181,5 +218,10 @@ def open_measure(name: str, viewing: Viewing, pursuit: Pursuit) -> Measure:
             return AqmMeasure(viewing, pursuit=pursuit)
         case "temporal":
             return Temporal()
+        case "psnr":
+            return HalvesPsnr()
         case _:
             return measures.open_measure(name, viewing)
+
+
+NOISE_FREE = frozenset({HalvesPsnr.name, Temporal.name})  # measures without the noise of the reference

@@ -46,27 +46,21 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
 
 
 def measure(
-    test: Path,
-    reference: Path,
-    job: Job,
-    names: Sequence[str],
-    monitor: Monitor,
-    *,
-    weight: float = 1.0,
+    test: Path, halves: tuple[Path, Path], job: Job, names: Sequence[str], monitor: Monitor
 ) -> dict[str, Any]:
-    """Measure the frames of a run folder against those of another, each frame read once.
+    """Measure the frames of a run folder against a reference, each frame read once.
 
     Parameters
     ----------
-    test, reference
-        Run folders; the frames of the reference carry all AOVs.
+    test
+        A run folder.
+    halves
+        Run folders of both halves of the reference, whose mean it is; their frames carry all AOVs.
     job
         Camera path and viewing conditions of both.
     names
         Names of measures.
     monitor
-    weight
-        Factor of the difference between test and reference; 1 measures the test itself.
 
     Returns
     -------
@@ -76,7 +70,7 @@ def measure(
     pursuit = Pursuit(job.settings[MetricSettings].metering.value)
     measures = {name: open_measure(name, job.viewing, pursuit) for name in names}
     values: dict[str, list[float | None]] = {name: [] for name in names}
-    for done, pair in enumerate(pairs(test, reference, job, weight=weight), 1):
+    for done, pair in enumerate(pairs(test, halves, job), 1):
         for name, one in measures.items():
             values[name].append(one.measure(pair))
         monitor.progress("measures", done, len(job.path))
@@ -89,21 +83,25 @@ def measure(
     }
 
 
-def pairs(test: Path, reference: Path, job: Job, *, weight: float = 1.0) -> Iterator[TrackedPair]:
-    """Pairs of frames of two run folders, in order; see :func:`measure`."""
+def pairs(test: Path, halves: tuple[Path, Path], job: Job) -> Iterator[TrackedPair]:
+    """Pairs of frames of a run and its reference, in order; see :func:`measure`."""
     path, exposure_ev = job.path, job.settings[ViewingSettings].exposure_ev
-    runs = RunFolder.read(test), RunFolder.read(reference)
+    runs = [RunFolder.read(folder) for folder in (test, *halves)]
     previous: dict[str, Any] | None = None
     for frame, number in enumerate(path.numbers):
-        tested, layers = (read_exr(run.file_of(FRAMES, number)) for run in runs)
+        tested, layers, others = (read_exr(run.file_of(FRAMES, number)) for run in runs)
         before, after = path.neighbours(frame)
         flow = Flow(layers["backward"], layers["forward"], before is not None, after is not None)
         is_visible = visible_before(layers, previous) if previous is not None and before is not None else None
-        color, wanted = (np.ascontiguousarray(of["RGB"], np.float32) for of in (tested, layers))
-        if weight != 1.0:
-            color = wanted + np.float32(weight) * (color - wanted)
+        color, first, second = (
+            np.ascontiguousarray(of["RGB"], np.float32) for of in (tested, layers, others)
+        )
+        wanted = np.float32(0.5) * (first + second)
         pair = display_pair(color, wanted, job.viewing, exposure_ev=exposure_ev)
-        yield TrackedPair(**vars(pair), flow=flow, visible_before=is_visible)
+        shown = display_pair(first, second, job.viewing, exposure_ev=exposure_ev)
+        yield TrackedPair(
+            **vars(pair), flow=flow, visible_before=is_visible, halves=(shown.test, shown.reference)
+        )
         previous = layers
 
 

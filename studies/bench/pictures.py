@@ -34,19 +34,21 @@ class Frames:
         self._folder = folder
         self.configurations = {of["name"]: of for of in found["configurations"]}
 
-    def displayed(self, folder: str, number: int) -> F32:
-        """A frame of a run folder of the bench, such as ``references/box``."""
-        file = RunFolder.read(self._folder / folder).file_of(FRAMES, number)
-        linear = read_exr(file)["RGB"].astype(np.float32)
+    def displayed(self, number: int, *folders: str) -> F32:
+        """The mean of a frame over some run folders of the bench, such as ``references/box-1``."""
+        runs = [RunFolder.read(self._folder / folder) for folder in folders]
+        frames = [read_exr(run.file_of(FRAMES, number))["RGB"].astype(np.float32) for run in runs]
+        linear = np.asarray(np.mean(frames, axis=0), np.float32)
         return srgb_encode(np.clip(linear * self._scale, 0.0, 1.0)).astype(np.float32)
 
     def of(self, name: str, number: int) -> F32:
         """A frame of a configuration."""
-        return self.displayed(f"configurations/{name}", number)
+        return self.displayed(number, f"configurations/{name}")
 
     def reference(self, name: str, number: int) -> F32:
         """The same frame of the configuration's reference."""
-        return self.displayed(f"references/{self.configurations[name]['pixel_filter']}", number)
+        kind = self.configurations[name]["pixel_filter"]
+        return self.displayed(number, f"references/{kind}-1", f"references/{kind}-2")
 
     def selected(self) -> list[str]:
         """Names of a few configurations of each family, in the order of the bench."""

@@ -27,12 +27,17 @@ def _configurations(found: Mapping[str, Any]) -> Table:
             table.add_section()
         family = row["family"]
         cells = [_number_text(row["cost"][key]) for key in ("cpu_s", "wall_s")]
-        table.add_row(row["name"], *cells, *(score_text(row["scores"][name]) for name in measures))
-    if floor := found["reference"]["noise_floor"]:
-        table.add_section()
-        table.add_row("noise floor", "", "", *(score_text(floor[name]) for name in measures))
-    filters = " and ".join(found["reference"]["filters"])
-    table.caption = f"references of {found['reference']['spp']} paths a pixel, filter {filters}"
+        scores = {name: score_text(row["scores"][name]) for name in measures}
+        marked = (f"{text} *" if name in row["undecided"] else text for name, text in scores.items())
+        table.add_row(row["name"], *cells, *marked)
+    table.add_section()
+    for kind, floor in found["reference"]["noise_floor"].items():
+        scores = {name: score_text(score) for name, score in floor.items()}
+        table.add_row(f"noise floor, {kind}", "", "", *(scores.get(name, "") for name in measures))
+    table.caption = (
+        f"references of {found['reference']['spp']} paths a pixel in two halves; floor: one half against the "
+        "other; *: nearer to it than a third, not decided"
+    )
     return table
 
 

@@ -75,15 +75,21 @@ def test_more_paths_score_better_and_the_noise_floor_better_still(held):
     rows = {row["name"]: row for row in found["configurations"]}
     for name, of in found["measures"].items():
         few, many = rows["traced-1"]["scores"][name], rows["traced-4"]["scores"][name]
-        floor = found["reference"]["noise_floor"][name]
-        assert sorted((few, many, floor), reverse=not of["is_more_better"]) == [few, many, floor]
+        assert sorted((few, many), reverse=not of["is_more_better"]) == [few, many]
+    for kind, floor in found["reference"]["noise_floor"].items():
+        assert set(floor) == {"aqm"}  # the others do not contain the noise of the reference
+        scores = {n: of["scores"]["aqm"] for n, of in rows.items() if of["pixel_filter"] == kind}
+        assert all(
+            (abs(score - floor["aqm"]) < floor["aqm"] / 3.0) == ("aqm" in rows[name]["undecided"])
+            for name, score in scores.items()
+        )
     filters = {rows[name]["pixel_filter"] for name in NAMES}
     assert filters == set(found["reference"]["filters"])
     seeds = [
         json.loads((folder / run / "run.json").read_text())["identity"]["settings"]["trace"]["seed"]
-        for run in ("references/gaussian", "configurations/traced-1")
+        for run in ("references/gaussian-1", "references/gaussian-2", "configurations/traced-1")
     ]
-    assert seeds[0] != seeds[1]
+    assert len(set(seeds)) == 3
 
 
 def test_finished_configurations_are_not_rendered_again(held, line, run):

@@ -1,13 +1,14 @@
 """Measures of the bench: nothing for identical sequences, more for more noise; the temporal error."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from enfilade.comparison.measures import why_missing
 from enfilade.metric import Pursuit
-from studies.bench.measures import SCALES, Temporal, open_measure, visible_before
+from studies.bench.measures import SCALES, HalvesPsnr, Temporal, open_measure, visible_before
 from support.displayed_frames import VIEWING, noise, pair, picture
 from twins.temporal_error import temporal_error
 
@@ -79,6 +80,22 @@ def test_the_temporal_error_is_that_of_its_twin():
     errors = [p.test - p.reference for p in pairs]
     twin = temporal_error(errors[1], errors[0], pairs[1].flow.backward, pairs[1].visible_before)
     assert found == pytest.approx(twin, rel=1e-5)
+
+
+def test_noise_of_the_reference_does_not_count():
+    """A test with noise of 0.05 has the same scores against clean and against noisy halves."""
+    measures = {kind: (HalvesPsnr(), Temporal()) for kind in ("clean", "noisy")}
+    values = {kind: ([], []) for kind in measures}
+    for frame in range(FRAMES):
+        seen = pair(picture() + noise(frame, 0.05), picture(), is_first=frame == 0)
+        halves = tuple(seen.reference + noise(100 * k + frame, 0.1) for k in (1, 2))
+        for kind, given in (("clean", seen), ("noisy", replace(seen, halves=halves))):
+            for measure, found in zip(measures[kind], values[kind], strict=True):
+                found.append(measure.measure(given))
+    psnr, temporal = ([measures[k][i].pool(values[k][i]) for k in ("clean", "noisy")] for i in (0, 1))
+    assert psnr[1] == pytest.approx(psnr[0], abs=0.3)
+    assert psnr[0] == pytest.approx(26.0, abs=0.2)
+    assert temporal[1] == pytest.approx(temporal[0], rel=0.05)
 
 
 def test_a_cut_is_no_flicker():

@@ -36,4 +36,5 @@ def pair(
     seen = (x >= 0.0) & (x <= WIDTH - 1)
     flow = Flow(np.zeros_like(backward) if is_first else backward, -backward, not is_first, True)
     shown = display_pair(srgb_decode(test), srgb_decode(reference), VIEWING)
-    return TrackedPair(**vars(shown), flow=flow, visible_before=None if is_first else seen)
+    halves = shown.reference, shown.reference
+    return TrackedPair(**vars(shown), flow=flow, visible_before=None if is_first else seen, halves=halves)
