@@ -60,7 +60,7 @@ def accumulate(color: F32, view: View, previous: History, previous_view: View) -
     # Clip the history to the neighbourhood of the new image.
     mean = cv2.blur(color, (CLIP_SIDE, CLIP_SIDE))
     deviation = np.sqrt(np.maximum(cv2.blur(color * color, (CLIP_SIDE, CLIP_SIDE)) - mean * mean, 0.0))
-    history = _fetched(previous.color, x, y, cv2.INTER_LINEAR)
+    history = _fetched(previous.color, x, y, cv2.INTER_CUBIC)  # bilinear reads blur from frame to frame
     history = np.clip(history, mean - CLIP_SIGMAS * deviation, mean + CLIP_SIGMAS * deviation)
 
     # Blend.
