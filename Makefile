@@ -1,7 +1,8 @@
 # make demo    set up, render a small walkthrough into runs/demo, and write its report
 # make test    set up, run the tests in two processes (JOBS=4: four); installs Chromium by apt if it is missing
 # make validate-metric   set up, validate the metric on published experiments with observers (five minutes)
-# make bench   set up, compare enfilade's methods with baselines on ROOM and ATRIUM; prints a forecast of the time
+# make bench   set up, compare enfilade's methods with baselines on the generated scenes (BENCH=--quick: ten minutes)
+# make judge   set up ColorVideoVDP in .venv-judge, for the bench (two minutes, 1.7 GB)
 # make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
 # make check   set up, check formatting, lint, types and import rules
 # make setup   create .venv with the locked versions; installs system libraries by apt if they are missing
@@ -12,7 +13,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup python libraries browser demo test validate-metric bench case-studies check format lock clean
+.PHONY: help setup judge python libraries browser demo test validate-metric bench case-studies check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -44,6 +45,9 @@ validate-metric: setup
 bench: setup
 	$(BIN)/python -m studies.bench $(BENCH)
 
+judge:
+	@test -e .venv-judge/.ready || sh studies/bench/colorvideovdp/setup.sh .venv-judge
+
 case-studies: setup
 	$(BIN)/python -m studies.cases --preset $(or $(PRESET),full) $(CASES)
 
@@ -61,5 +65,5 @@ lock: setup
 	@sh setup/lock.sh $(VENV)
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
+	rm -rf $(VENV) .venv-judge build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
 	find src tests studies -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,92 +1,91 @@
-"""Run the bench on the generated scenes and check the required ratios: `make bench`.
+"""Run the bench on the generated scenes, or on a folder of scenes: `make bench`.
 
-    python -m studies.bench [--scenes room atrium] [--size 320x180] [--frames 40] [--reference-spp 256]
+    python -m studies.bench [--quick] [--scene NAME ...] [--scenes FOLDER] [--sizes 320x180 1280x720] [--frames 40]
 
-Writes the small scenes, runs or continues the bench on each, prints missed requirements, and writes the
-results of all scenes into studies/bench/results/, with machine and date.
+Runs or continues the bench of each scene and size, prints the geometric means of the ratios by camp, and writes all
+results with date, machine and code as one JSON file, and one page of figures. Further options go to
+`python -m studies bench`, such as --reference-spp and --references.
 """
 
 import argparse
 import json
-import math
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+from rich.table import Table
+
+from enfilade.errors import EnfiladeError
+from studies.bench.charts import plot_page
+from studies.bench.measures import QUALITIES
+from studies.bench.suite import (
+    GENERATED,
+    QUICK_SCENES,
+    found_in,
+    generated,
+    only_for,
+    run_case,
+    summary,
+)
 from studies.bench.tables import ratio_text
 
 HERE = Path(__file__).resolve().parent
-PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
-BASELINE = "traced-256"
-TIMES_TRACED = {"room": 30.0, "atrium": 15.0}  # times less CPU time than BASELINE, within 0.1 JND
-TIMES_DENOISED = 3.0  # geometric mean over the measures, at equal quality; no measure below 1
+QUICK_FRAMES, FRAMES = 16, 40
+QUICK_SPP = "512"
 
 
 def main() -> int:
-    """Run the bench on each scene; the exit status is 1 where a requirement is missed."""
+    """Run the bench on each scene and size; the exit status is 1 where one fails."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", default=["room", "atrium"], choices=["room", "atrium"])
-    parser.add_argument("--size", default="320x180")
-    parser.add_argument("--frames", type=int, default=40)
-    parser.add_argument("--reference-spp", type=int, default=256)
+    parser.add_argument("--quick", action="store_true", help="two scenes, one size, few configurations")
+    parser.add_argument("--scene", nargs="+", choices=GENERATED, help="generated scenes; all by default")
+    parser.add_argument("--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones")
+    parser.add_argument("--sizes", nargs="+", default=None, help="320x180 1280x720 by default")
+    parser.add_argument("--frames", type=int, default=None, help=f"{FRAMES} by default")
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
     arguments, options = parser.parse_known_args()
-    missing = []
-    for scene in arguments.scenes:
-        found = run(scene, arguments, options)
-        arguments.keep.mkdir(parents=True, exist_ok=True)
-        (arguments.keep / f"{scene}.json").write_text(json.dumps(found, indent=1) + "\n")
-        missing += [f"{scene}: {text}" for text in missed(scene, found["ratios"])]
-    print("\n".join(["", "Requirements missed:", *missing] if missing else ["", "All requirements are met."]))
-    return 1 if missing else 0
+    sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
+    frames = arguments.frames or (QUICK_FRAMES if arguments.quick else FRAMES)
+    if arguments.quick and "--reference-spp" not in options:
+        options += ["--reference-spp", QUICK_SPP]
+    names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
+    benches: list[dict[str, Any]] = []
+    failed = []
+    for size in sizes:
+        try:
+            cases = found_in(arguments.scenes) if arguments.scenes else generated(names, size, arguments.out / "scenes")
+        except EnfiladeError as error:
+            parser.error(str(error))
+        only = only_for(size, is_quick=arguments.quick)
+        for case in cases:
+            try:
+                benches.append(run_case(case, size, frames, only, arguments.out, options))
+            except EnfiladeError as error:
+                failed.append(str(error))
+    if benches:
+        keep(benches, arguments.keep)
+    print("\n".join(failed), file=sys.stderr)
+    return 1 if failed else 0
 
 
-def run(scene: str, arguments: argparse.Namespace, options: list[str]) -> dict[str, Any]:
-    """Write a scene and run the bench on it, with further options of the command."""
-    files, folder = arguments.out / "scenes" / scene, arguments.out / scene
-    studies = [sys.executable, "-m", "studies"]
-    write = [*studies, "scene", scene, "--preset", "small", "--size", arguments.size, "--out", files]
-    subprocess.run([*map(str, write)], check=True, stdout=subprocess.DEVNULL)
-    bench = [*studies, "bench", files / "scene.xml", "--path", files / "camera_path.json", "--out", folder]
-    bench += ["--size", arguments.size, "--frames", f"11-{10 + arguments.frames}"]
-    diagonal_m = math.hypot(*map(int, arguments.size.split("x"))) * PIXEL_M
-    bench += [
-        "--reference-spp",
-        arguments.reference_spp,
-        "--set",
-        f"viewing.diagonal_m={diagonal_m}",
-        *options,
-    ]
-    subprocess.run([*map(str, bench)], check=True)
-    found: dict[str, Any] = json.loads((folder / "bench.json").read_text())
-    return found
-
-
-def missed(scene: str, ratios: dict[str, Any]) -> list[str]:
-    """Messages about the requirements that the ratios of a bench miss."""
-    found = []
-    traced = ratios["traced"].get(BASELINE, {}).get("aqm")
-    if traced is None or traced["kind"] == "at most" or traced["times"] < TIMES_TRACED[scene]:
-        text = "none" if traced is None else ratio_text(traced)
-        found.append(
-            f"{TIMES_TRACED[scene]:g} times less CPU time than {BASELINE} within 0.1 JND; found {text}"
-        )
-    if denoised := ratios["denoised"]:
-        if denoised["geometric_mean"] < TIMES_DENOISED or denoised["kind"] not in ("equal", "at least"):
-            mean = ratio_text({"times": denoised["geometric_mean"], "kind": denoised["kind"]})
-            found.append(f"{TIMES_DENOISED:g} times less CPU time than denoised; found {mean}")
-        found += [
-            f"no slower than denoised by any measure; by {name} {ratio_text(ratio)}"
-            for name, ratio in denoised["by_measure"].items()
-            if ratio["times"] < 1.0 or ratio["kind"] == "at most"
-        ]
-    else:
-        found.append("no denoised baseline was rendered: pip install pyoidn")
-    return found + [
-        f"better than {name} at less cost" for name, better in ratios["paper"].items() if not better
-    ]
+def keep(benches: list[dict[str, Any]], folder: Path) -> None:
+    """Write the results and the page of figures, named by their date, and print the summary."""
+    folder.mkdir(parents=True, exist_ok=True)
+    means = summary(benches)
+    file = folder / f"{benches[-1]['date']}.json"
+    file.write_text(json.dumps({"summary": means, "benches": benches}, indent=1) + "\n")
+    page = plot_page(benches, file.with_suffix(".png"))
+    measures = [name for name in QUALITIES if all(name in one["ratios"] for one in means)]
+    table = Table(title="CPU time of the strongest rival over ours, at equal quality: geometric means over scenes")
+    for heading in ("size", "camp", "scenes", "configuration", *(QUALITIES[name].title for name in measures)):
+        table.add_column(heading)
+    for one in means:
+        cells = [ratio_text(one["ratios"][name]) for name in measures]
+        table.add_row(one["size"], one["camp"], str(len(one["scenes"])), one["configuration"], *cells)
+    Console().print(table)
+    print(file, page, sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,22 +1,26 @@
-"""A bench in one folder: references and configurations rendered, measured, and compared.
+"""A bench in one folder: configurations rendered, measured in windows, and compared at equal quality.
 
 ::
 
-    references/box/ gaussian/    run folders of the references, with all AOVs
+    windows.json                 where it measures; drawn before any configuration is rendered
     configurations/NAME/         run folders of the configurations
-    scores/NAME.json             measures of the configurations
+    costs/NAME.json  scores/NAME.json
     bench.json  bench.png  crops.png
+
+References are in a folder of their own; see `studies/bench/references.py`.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import tempfile
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -24,9 +28,10 @@ from typing import Any
 from enfilade.camera.path import CameraPath
 from enfilade.cli.progress import watch
 from enfilade.device import Choice, activate
-from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.errors import EnfiladeError, InputError, SettingsError
 from enfilade.files import read_json, write_json
 from enfilade.kernels.estimate import SPP_PER_SUM
+from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Silence
 from enfilade.resource_limits import die_with
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
@@ -34,34 +39,45 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
-from enfilade.settings import (
-    MetricSettings,
-    OutputSettings,
-    ReferenceSettings,
-    SampleFilter,
-    SamplingSettings,
-    TraceSettings,
-    ViewingSettings,
-)
+from enfilade.settings import SampleFilter, SamplingSettings, Settings, ViewingSettings
 from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
-from studies.bench.measures import NOISE_FREE, SCALES
-from studies.bench.measuring import available, measure
+from studies.bench.measures import QUALITIES
+from studies.bench.measuring import available, measure, windows_of_run
 from studies.bench.ratios import ratios
+from studies.bench.references import FILTERS, References
+from studies.bench.windows import Window, draw_windows, windows_of
 from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
 
-PATHS_PER_CPU_S = 1.0e6  # measured in a furnished room on one core of 2026; for the forecast
+PATHS_PER_CPU_S = 6.0e5  # measured in six interiors on one core of 2026; for the forecast
 WARM_FRAMES = 3  # rendered and discarded before the measurement, to compile the kernels
-UNCHARGED = (CLIPS.name, VIDEO.name)  # baselines need no video
+UNCHARGED = (CLIPS.name, VIDEO.name)  # equal for all
 BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name)  # nor statistics of the path
+DECIDED = 4.0 / 3.0  # times the error of the noise floor
 GBUFFER = "gbuffer"  # not charged to baselines that do not accumulate over time
+
+
+@dataclass(frozen=True)
+class Place:
+    """Folders of a bench.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the results.
+    store : Path
+        Of references, shared with other benches.
+    """
+
+    folder: Path
+    store: Path
 
 
 def bench(
     job: Job,
     configurations: Sequence[Configuration],
-    folder: Path,
+    place: Place,
     *,
     reference_spp: int,
     measures: Sequence[str] = (),
@@ -79,10 +95,11 @@ def bench(
         Scene, path and settings.
     configurations
         Rendered on the CPU.
-    folder
-        Created if it does not exist.
+    place
+        Folders; created if they do not exist.
     reference_spp
-        Paths a pixel of the references, half of them in each of two independent halves.
+        Least number of paths a pixel of the references, half of them in each of two independent halves. A
+        store that has more is used as it is.
     measures
         Names; empty: all that are available.
     reference_device
@@ -107,126 +124,173 @@ def bench(
     reasons = {family: why for family in FAMILIES if (why := why_missing(family))}
     missing = reasons.keys() & {c.family for c in configurations}
     left_out += [f"{FAMILIES[family]} is left out: {reasons[family]}" for family in sorted(missing)]
-    available_configurations = [c for c in configurations if c.family not in reasons]
-    if not available_configurations:
+    chosen = [c for c in configurations if c.family not in reasons]
+    if not chosen:
         raise SettingsError(f"no configuration can be rendered: {'; '.join(left_out)}")
-    runs = _Bench(job, folder, names, quiet=quiet)
-    filters = dict.fromkeys(c.pixel_filter for c in available_configurations)
-    references = {kind.value: runs.reference(kind, reference_spp, reference_device) for kind in filters}
-    floors = {kind.value: runs.noise_floor(kind) for kind in filters}
-    rows = [runs.row(one, floors[one.pixel_filter.value]) for one in available_configurations]
+    started = time.monotonic()
+    windows = _alone(reference_device, _prepare, job, place, reference_spp, quiet=quiet)
+    references = References(place.store, job, windows)
+    prepared_s = time.monotonic() - started
+    runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
+    floors = {kind.value: runs.floor(kind) for kind in FILTERS}
+    rows = [runs.row(one, floors[one.pixel_filter.value]) for one in chosen]
     found = {
         **origin(),
         "machine": machine(),
         "versions": package_versions(),
-        "scene": f"{job.scene.file.resolve().parent.name}/{job.scene.file.name}",
+        "scene": job.scene.file.resolve().parent.name,
         "size": [job.path.width, job.path.height],
         "fps": job.path.fps,
         "frames": list(job.path.numbers),
         "pixels_per_degree": job.viewing.pixels_per_degree,
         "exposure_ev": job.settings[ViewingSettings].exposure_ev,
+        "windows": [asdict(window) for window in windows],
         "reference": {
-            "spp": reference_spp,
-            "filters": references,
+            "spp": min(references.spp(frame) for frame in range(len(job.path))),
+            "wall_s": prepared_s,  # of this call; short where the store has them
             "noise_floor": floors,
         },
-        "measures": {
-            name: {key: getattr(SCALES[name], key) for key in ("title", "unit", "is_more_better")}
-            for name in names
-        },
+        "measures": {name: {"title": QUALITIES[name].title, "unit": QUALITIES[name].unit} for name in names},
         "left_out": left_out,
         "configurations": rows,
         "ratios": ratios(rows, names),
     }
-    write_json(folder / "bench.json", found)
+    write_json(place.folder / "bench.json", found)
     return found
 
 
-def forecast_s(job: Job, configurations: Sequence[Configuration], reference_spp: int, cores: int) -> float:
-    """Rough duration of a whole bench on CPUs, wall seconds, from its number of paths."""
+def forecast_s(job: Job, configurations: Sequence[Configuration], cores: int) -> float:
+    """Rough duration of the configurations of a bench on CPUs, wall seconds, from the number of paths."""
     pixels = job.path.width * job.path.height * len(job.path)
-    filters = len({c.pixel_filter for c in configurations})
-    spps = (c.spp for c in configurations if c.family in ("traced", "denoised"))
-    return pixels * (reference_spp * filters + sum(spps)) / PATHS_PER_CPU_S / cores
+    return pixels * sum(c.expected_spp for c in configurations) / PATHS_PER_CPU_S / cores
+
+
+def _prepare(job: Job, place: Place, spp: int, *, quiet: bool) -> list[Window]:
+    """Draw the windows of a bench, if it has none, and trace the references that the store lacks."""
+    file = place.folder / "windows.json"
+    identity = json.loads(json.dumps({k: job.identity()[k] for k in ("scene", "path")}))
+    identity["scene"].pop("variant")
+    held = read_json(file) if file.is_file() else None
+    if held is not None and held["identity"] != identity:
+        raise InputError(f"{place.folder} holds the bench of another scene or path; name another folder by --out")
+    if held is None:
+        walk = Walkthrough(job.path, job.settings, job.open_renderer())
+        windows = draw_windows(walk)
+        write_json(file, {"identity": identity, "windows": [asdict(window) for window in windows]})
+    else:
+        windows = windows_of(held["windows"])
+    references = References(place.store, job, windows)
+    if references.missing(spp):
+        with watch(quiet=quiet) as monitor:
+            references.grow(spp, Prefixed(monitor, job.scene.file.resolve().parent.name))
+    return windows
 
 
 class _Bench:
-    """References and configurations, each rendered and measured once."""
+    """Configurations, each rendered and measured once."""
 
-    def __init__(self, job: Job, folder: Path, names: Sequence[str], *, quiet: bool) -> None:
+    def __init__(
+        self,
+        job: Job,
+        folder: Path,
+        references: References,
+        windows: Sequence[Window],
+        names: Sequence[str],
+        *,
+        quiet: bool,
+    ) -> None:
         self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
+        self._references, self._windows = references, windows
 
-    def reference(self, pixel_filter: SampleFilter, spp: int, device: Choice) -> dict[str, Any]:
-        """Render both halves of a reference; return their cost and the renderer's variant."""
-        costs, variant = [], ""
-        for half, folder in enumerate(self._halves(pixel_filter), 1):
-            seed = (self._job.settings[TraceSettings].seed + half) % 2**32  # not those of configurations
-            settings = (
-                self._job.settings.replace(TraceSettings, seed=seed)
-                .replace(SamplingSettings, spp=max(spp // 2, 1))
-                .replace(ReferenceSettings, pixel_filter=pixel_filter)
-                .replace(OutputSettings, layers="all")
-            )
-            job = replace(self._job, method="reference", settings=settings)
-            _render_alone(job, folder, device, is_warm=False, quiet=self._quiet)
-            run = RunFolder.read(folder)
-            costs.append(_cost(run, UNCHARGED))
-            variant = run.identity["scene"]["variant"]
-        total = {key: sum(cost[key] for cost in costs) for key in ("cpu_s", "wall_s")}
-        return {**total, "variant": variant}
-
-    def row(self, one: Configuration, floor: Mapping[str, float | None]) -> dict[str, Any]:
+    def row(self, one: Configuration, floors: dict[str, list[float]]) -> dict[str, Any]:
         """Render and measure a configuration; return its row of the result."""
-        folder = self._run(one)
-        _render_alone(one.job, folder, "cpu", is_warm=True, quiet=self._quiet)
-        scores = self._scores(one.name, folder, self._halves(one.pixel_filter))
+        run = self._folder / "configurations" / one.name
+        self._render(one, run)
+        values = self._values(one.name, run, one.pixel_filter)
         return {
             "name": one.name,
             "family": one.family,
             "spp": one.spp,
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
-            "cost": _cost(RunFolder.read(folder), _uncharged(one)),
-            "scores": scores,
-            "undecided": [name for name, least in floor.items() if _is_near(scores[name], least)],
+            "cost": self._cost(one, run),
+            "scores": {name: QUALITIES[name].score(values[name]) for name in self._names},
+            "values": values,
+            "undecided": undecided(values, floors),
         }
 
-    def noise_floor(self, pixel_filter: SampleFilter) -> dict[str, float | None]:
-        """Scores of one half of a reference against the other, by the measures that contain their noise."""
-        first, second = self._halves(pixel_filter)
-        found = self._scores(f"noise floor, {pixel_filter.value}", first, (second, second))
-        return {name: score for name, score in found.items() if name not in NOISE_FREE}
+    def floor(self, pixel_filter: SampleFilter) -> dict[str, list[float]]:
+        """Values of one half of the references against the other, by the measures that contain their noise."""
+        found = self._values(f"noise floor, {pixel_filter.value}", None, pixel_filter)
+        return {name: values for name, values in found.items() if QUALITIES[name].has_noise}
 
-    def _scores(self, name: str, test: Path, halves: tuple[Path, Path]) -> dict[str, float | None]:
-        """Scores of a run folder by measure; read from their file if they are there, else measured."""
-        settings = self._job.settings
+    def _values(self, name: str, run: Path | None, pixel_filter: SampleFilter) -> dict[str, list[float]]:
+        """Values by measure and window; read from their file if they are there, else measured."""
+        frames = range(len(self._job.path))
         identity = {
-            "runs": [RunFolder.read(folder).digest() for folder in (test, *halves)],
-            **settings.to_tables([ViewingSettings]),
-            "metering": settings[MetricSettings].metering.value,
+            "run": run and RunFolder.read(run).digest(),
+            "windows": [asdict(window) for window in self._windows],
+            "references": [self._references.spp(frame) for frame in frames],
+            **self._job.settings.to_tables([ViewingSettings]),
         }
         file = self._folder / "scores" / f"{name}.json"
         found: dict[str, Any] = read_json(file) if file.is_file() else {}
         if found.get("identity") != identity:
-            found = {"identity": identity, "measures": {}}
-        if missing := [measure for measure in self._names if measure not in found["measures"]]:
+            found = {"identity": identity, "values": {}}
+        wanted = [m for m in self._names if run is not None or QUALITIES[m].has_noise]
+        if missing := [m for m in wanted if m not in found["values"]]:
             with watch(quiet=self._quiet) as monitor:
-                prefixed = Prefixed(monitor, name)
-                found["measures"] |= measure(test, halves, self._job, missing, prefixed)
+                source = run and windows_of_run(run, self._job.path, self._windows)
+                found["values"] |= measure(
+                    source, pixel_filter, self._references, self._windows, self._job, missing,
+                    Prefixed(monitor, name),
+                )  # fmt: skip
             write_json(file, found)
-        return {measure: found["measures"][measure]["score"] for measure in self._names}
+        return {m: found["values"][m] for m in wanted}
 
-    def _run(self, one: Configuration) -> Path:
-        return self._folder / "configurations" / one.name
+    def _render(self, one: Configuration, folder: Path) -> None:
+        """Render in a new process, unless the run is finished; note the cost of starting it."""
+        file = self._folder / "costs" / f"{one.name}.json"
+        if _is_finished(one.job, folder) and file.is_file():
+            return
+        _alone("cpu", _warm, one.job)
+        before = _ledger_cpu_s(folder)
+        spent = _alone("cpu", _render, one.job, folder, quiet=self._quiet)
+        spent["start_cpu_s"] = spent.pop("cpu_s") - (_ledger_cpu_s(folder) - before)
+        write_json(file, spent)
 
-    def _halves(self, pixel_filter: SampleFilter) -> tuple[Path, Path]:
-        folder = self._folder / "references"
-        return folder / f"{pixel_filter.value}-1", folder / f"{pixel_filter.value}-2"
+    def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
+        """CPU and wall seconds of a run, by stage and in total, over all sessions; the start included."""
+        uncharged = _uncharged(one)
+        stages = add_costs(line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged)
+        charged = {name: spent for name, spent in stages.items() if name not in uncharged}
+        total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
+        start = read_json(self._folder / "costs" / f"{one.name}.json")
+        total["cpu_s"] += start["start_cpu_s"]
+        return {**total, **start, "stages": charged}
 
 
-def _is_near(score: float | None, floor: float | None) -> bool:
-    """Whether a score is nearer to the noise floor of its measure than a third of it."""
-    return score is not None and floor is not None and abs(score - floor) < abs(floor) / 3.0
+def undecided(values: Mapping[str, Sequence[float]], floors: Mapping[str, Sequence[float]]) -> list[str]:
+    """Measures whose error is not a third above that of the noise floor.
+
+    Parameters
+    ----------
+    values, floors
+        Values of the windows by measure, of a configuration and of one half of the reference against the other.
+    """
+    return [
+        name
+        for name, floor in floors.items()
+        if QUALITIES[name].error(values[name]) < DECIDED * QUALITIES[name].error(floor)
+    ]
+
+
+def _ledger_cpu_s(folder: Path) -> float:
+    """CPU seconds of all tasks of a run folder; 0 where there is none."""
+    if not (folder / "job.json").is_file():
+        return 0.0
+    stages = add_costs(line["cost"] for line in RunFolder.read(folder).lines())
+    return sum(spent["cpu_s"] for spent in stages.values())
 
 
 def _uncharged(one: Configuration) -> tuple[str, ...]:
@@ -236,28 +300,18 @@ def _uncharged(one: Configuration) -> tuple[str, ...]:
     return BASELINES_UNCHARGED if "accumulated" in one.variant else (*BASELINES_UNCHARGED, GBUFFER)
 
 
-def _cost(run: RunFolder, uncharged: Sequence[str]) -> dict[str, Any]:
-    """CPU and wall seconds of a run, by stage and in total, over all sessions."""
-    stages = add_costs(line["cost"] for line in run.lines() if line["pass"] not in uncharged)
-    charged = {name: spent for name, spent in stages.items() if name not in uncharged}
-    total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
-    return {**total, "stages": charged}
+def _alone(device: Choice, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Call a function in a new process, which ends with this one.
 
-
-def _render_alone(job: Job, folder: Path, device: Choice, *, is_warm: bool, quiet: bool) -> None:
-    """Render in a new process, unless the run is finished."""
-    if _is_finished(job, folder):
-        return
+    The device is chosen before the arguments are unpickled: Dr.Jit's array types bind to it at import.
+    """
     context = get_context("spawn")
-    # The device is chosen before the job is unpickled: Dr.Jit's array types bind to it at import.
-    arguments = os.getpid(), device
-    with ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=arguments) as pool:
+    with ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(os.getpid(), device)) as pool:
         try:
-            pool.submit(_render, job, folder, is_warm=is_warm, quiet=quiet).result()
+            return pool.submit(function, *arguments, **options).result()
         except BrokenProcessPool as error:
             raise EnfiladeError(
-                f"the process that rendered {folder} was killed, perhaps for lack of memory; the same "
-                "command continues"
+                "a process of the bench was killed, perhaps for lack of memory; the same command continues"
             ) from error
 
 
@@ -274,13 +328,18 @@ def _is_finished(job: Job, folder: Path) -> bool:
     return bool({**wanted, "renderer": None} == {**existing, "renderer": None})
 
 
-def _render(job: Job, folder: Path, *, is_warm: bool, quiet: bool) -> None:
-    """Compile the kernels, then render; runs in the new process."""
-    if is_warm:
-        with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
-            render(_excerpt(job), Path(scratch) / "run", Silence())
+def _warm(job: Job) -> None:
+    """Render a few frames, so that the compiled kernels are in the cache on disk."""
+    with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
+        render(_excerpt(job), Path(scratch) / "run", Silence())
+
+
+def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:
+    """Render; return the CPU seconds of this process from its start, and its peak memory."""
     with watch(quiet=quiet) as monitor:
         render(job, folder, Prefixed(monitor, folder.name))
+    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return {"cpu_s": time.process_time(), "peak_mib": peak_mib}
 
 
 def _excerpt(job: Job) -> Job:
@@ -290,5 +349,5 @@ def _excerpt(job: Job) -> Job:
     frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
     spp = min(job.settings[SamplingSettings].spp, SPP_PER_SUM)  # more need no other kernel
     cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
-    settings = job.settings.replace(SamplingSettings, spp=spp)
+    settings: Settings = job.settings.replace(SamplingSettings, spp=spp)
     return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)

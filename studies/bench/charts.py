@@ -1,4 +1,4 @@
-"""The chart of a bench: quality over CPU time."""
+"""Charts of benches: quality over CPU time, with the front of rivals."""
 
 from __future__ import annotations
 
@@ -9,105 +9,119 @@ from typing import Any
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
-from studies.bench.ratios import DECOUPLED, Point, front
+from studies.bench.configurations import BASELINES
+from studies.bench.measures import LEAST_ERROR, QUALITIES
+from studies.bench.ratios import Point, front
 
 DPI = 130
-PANEL_IN = (5.6, 4.1)
-STYLES: dict[str, dict[str, Any]] = {  # by family; they differ in marker and line, too
-    "traced": {"color": "#7A7A7A", "marker": "o", "linestyle": "--", "label": "path tracing"},
-    "denoised": {
-        "color": ORANGE,
-        "marker": "s",
-        "linestyle": "-.",
-        "label": "path tracing, Open Image Denoise",
-    },
-    "interpolated": {"color": VERMILION, "marker": "X", "linestyle": "none", "label": "minterpolate"},
-    "paper": {"color": GREEN, "marker": "^", "linestyle": ":", "label": "enfilade, paper (2000)"},
-    "decoupled": {"color": BLUE, "marker": "D", "linestyle": "-", "label": "enfilade, decoupled"},
+PANEL_IN = (4.4, 3.3)
+PAGE_MEASURES = ("cvvdp", "psnr", "flip", "flicker")  # of the page of many scenes
+COLUMNS = 3  # of the chart of one scene
+STYLES: dict[str, dict[str, Any]] = {  # by family; they differ in marker, too
+    "traced": {"color": "#7A7A7A", "marker": "o", "label": "path tracing"},
+    "denoised": {"color": ORANGE, "marker": "s", "label": "path tracing, Open Image Denoise"},
+    "interpolated": {"color": VERMILION, "marker": "X", "label": "minterpolate"},
+    "paper": {"color": GREEN, "marker": "^", "label": "enfilade, paper (2000)"},
+    "decoupled": {"color": BLUE, "marker": "D", "label": "enfilade, decoupled"},
 }
-BELOW = ("traced", "denoised")  # families whose labels are below their points
-LABELLED = ("", "high")  # variants with labels; the others are close to them
-TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+FLOOR = "#7A7A7A"
 
 
 def plot_bench(found: Mapping[str, Any], file: Path) -> Path:
     """Draw a panel for each measure of ``bench.json``, CPU time to the right, quality upwards, as PNG."""
-    measures, machine = found["measures"], found["machine"]
-    columns = 2 if len(measures) > 1 else 1
-    rows = -(-len(measures) // columns)
+    names, machine = list(found["measures"]), found["machine"]
+    columns = min(COLUMNS, len(names))
+    rows = -(-len(names) // columns)
     figure = Figure(figsize=(PANEL_IN[0] * columns, PANEL_IN[1] * rows + 0.9), dpi=DPI, layout="constrained")
     figure.suptitle(
-        f"{found['scene']}, {len(found['frames'])} frames of {'x'.join(map(str, found['size']))}\n"
-        f"references of {found['reference']['spp']} paths a pixel; {machine['processor']}, "
-        f"cores: {machine['cores']}; {found['date']}",
+        f"{_title(found)}; {machine['processor']}, cores: {machine['cores']}; {found['date']}",
         fontsize=11,
         color=INK,
     )
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax, (name, of) in zip(axes, measures.items(), strict=False):
-        _panel(ax, found, name, of)
-    for ax in axes[len(measures) :]:
+    for ax, name in zip(axes, names, strict=False):
+        _panel(ax, found, name)
+        ax.set_title(f"{QUALITIES[name].title}, {QUALITIES[name].unit}", loc="left", fontsize=11, color=INK)
+    for ax in axes[len(names) :]:
         ax.set_visible(False)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9.5, frameon=False)
+    _legend(figure, axes[0])
     return save(figure, file)
 
 
-def _panel(ax: Any, found: Mapping[str, Any], name: str, of: Mapping[str, Any]) -> None:
-    ax.set_title(f"{of['title']}, {of['unit']}", loc="left", fontsize=11, color=INK)
-    ax.set_title("better ↑", loc="right", fontsize=9, color=INK)
-    sign = -1.0 if of["is_more_better"] else 1.0
-    for family in STYLES:
-        points = {
-            c["name"]: (Point(c["cost"]["cpu_s"], sign * c["scores"][name]), c)
-            for c in found["configurations"]
-            if c["family"] == family and c["scores"][name] is not None
-        }
-        if points:
-            _curve(ax, list(points.values()), family, sign)
-    floors = [floor[name] for floor in found["reference"]["noise_floor"].values() if floor.get(name)]
-    for label, floor in zip(("noise floor", ""), floors, strict=False):
-        dots = (0, (1, 3))
-        ax.axhline(floor, color="#7A7A7A", linewidth=1.0, linestyle=dots, label=label or None, zorder=2)
+def plot_page(benches: Sequence[Mapping[str, Any]], file: Path) -> Path:
+    """Draw a row of panels for each bench, a column for each of the chief measures, as PNG."""
+    names = [name for name in PAGE_MEASURES if all(name in found["measures"] for found in benches)]
+    size = (PANEL_IN[0] * len(names), PANEL_IN[1] * len(benches) + 0.6)
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    axes = figure.subplots(len(benches), len(names), squeeze=False)
+    for row, found in zip(axes, benches, strict=True):
+        for ax, name in zip(row, names, strict=True):
+            _panel(ax, found, name)
+            ax.set_title(f"{QUALITIES[name].title}, {QUALITIES[name].unit}", loc="left", fontsize=9, color=INK)
+        row[0].set_title(f"{_title(found)}\n{QUALITIES[names[0]].title}, JOD", loc="left", fontsize=9, color=INK)
+    _legend(figure, axes[0, 0])
+    return save(figure, file)
+
+
+def _title(found: Mapping[str, Any]) -> str:
+    size = "x".join(map(str, found["size"]))
+    return f"{found['scene']}, {len(found['frames'])} frames of {size}, reference {found['reference']['spp']} paths"
+
+
+def _legend(figure: Any, ax: Any) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9.5, frameon=False)
+
+
+def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
+    quality, frames = QUALITIES[name], len(found["frames"])
+    sign = -1.0 if quality.is_more_better else 1.0
+
+    def place(row: Mapping[str, Any]) -> Point:
+        return Point(row["cost"]["cpu_s"] / frames, sign * quality.score(row["values"][name]))
+
+    rows = [row for row in found["configurations"] if quality.error(row["values"][name]) > LEAST_ERROR]
+    best = front([place(row) for row in rows if row["family"] in BASELINES])
+    ax.plot(
+        [p.cpu_s for p in best], [sign * p.error for p in best],
+        color=ORANGE, linewidth=1.8, label="front of rivals", zorder=2,
+    )  # fmt: skip
+    for family, style in STYLES.items():
+        members = [(place(row), row) for row in rows if row["family"] == family]
+        if not members:
+            continue
+        line = "-" if family == "decoupled" else "none"
+        points = sorted(point.cpu_s for point, _ in members), [
+            sign * p.error for p, _ in sorted(members, key=lambda m: m[0].cpu_s)
+        ]
+        ax.plot(*points, **style, linestyle=line, markersize=6, markeredgecolor="white", zorder=4)
+        for point, row in members:
+            label = row["name"].removeprefix("denoised-").removeprefix("decoupled-").removeprefix("traced-")
+            ax.annotate(
+                label, (point.cpu_s, sign * point.error), color=style["color"], fontsize=5.5,
+                xytext=(3, 3), textcoords="offset points", zorder=5,
+            )  # fmt: skip
+    for floor in found["reference"]["noise_floor"].values():
+        if name in floor:
+            ax.axhline(quality.score(floor[name]), color=FLOOR, linewidth=1.0, linestyle=(0, (1, 3)), zorder=1)
+    _axes(ax, is_more_better=quality.is_more_better)
+
+
+def _axes(ax: Any, *, is_more_better: bool) -> None:
     ax.set_xscale("log")
     scales: list[tuple[Any, tuple[float, ...]]] = [(ax.xaxis, (1.0, 2.0, 5.0))]
-    if not of["is_more_better"]:
+    if not is_more_better:
         ax.set_yscale("log")
         ax.invert_yaxis()
-        scales.append((ax.yaxis, TICKS))
+        scales.append((ax.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
     for axis, ticks in scales:
         axis.set_major_locator(LogLocator(subs=ticks))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_locator(NullLocator())
-    ax.set_xlabel("CPU time of all frames, s", fontsize=9.5, color=INK)
+    ax.set_title("better ↑", loc="right", fontsize=8, color=INK)
+    ax.set_xlabel("CPU s a frame", fontsize=8, color=INK)
     ax.grid(color="#E4E4E4", linewidth=0.7)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(colors=INK, labelsize=8.5)
-    ax.margins(x=0.08, y=0.1)
-
-
-def _curve(ax: Any, points: Sequence[tuple[Point, Any]], family: str, sign: float) -> None:
-    """Draw a curve through the Pareto front of a family; other configurations are open marks."""
-    style, is_decoupled = STYLES[family], family == DECOUPLED
-    best = front([point for point, _ in points])
-    look = {"color": style["color"], "marker": style["marker"], "markersize": 8 if is_decoupled else 6.5}
-    ax.plot(
-        [p.cpu_s for p in best],
-        [sign * p.error for p in best],
-        **(look | {"linestyle": style["linestyle"], "label": style["label"]}),
-        linewidth=2.6 if is_decoupled else 1.5,
-        markeredgecolor="white",
-        markeredgewidth=0.8,
-        zorder=4 if is_decoupled else 3,
-    )
-    is_below = family in BELOW
-    for point, of in points:
-        position = point.cpu_s, sign * point.error
-        if point not in best:
-            ax.plot(*position, **look, linestyle="none", markerfacecolor="white", zorder=3)
-        if of["variant"] in LABELLED:
-            label = of["name"].rpartition("-")[2] if family in (DECOUPLED, "paper") else str(of["spp"])
-            text = {"ha": "center", "va": "top" if is_below else "bottom", "fontsize": 7, "zorder": 5}
-            offset = {"xytext": (0, -7 if is_below else 7), "textcoords": "offset points"}
-            ax.annotate(label, position, color=style["color"], **text, **offset)
+    ax.tick_params(colors=INK, labelsize=8)
+    ax.margins(x=0.1, y=0.12)

@@ -50,7 +50,15 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     type=click.IntRange(1, 1 << 20),
     default=2048,
     show_default=True,
-    help="Paths a pixel of the references.",
+    help="Paths a pixel of the references, in two halves.",
+)
+@click.option(
+    "--references",
+    "store",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("runs/references"),
+    show_default=True,
+    help="Folder of references, shared by benches; those of more paths are used as they are.",
 )
 @click.option(
     "--only",
@@ -87,32 +95,39 @@ def command(
     denoised: tuple[int, ...],
     only: tuple[str, ...],
     folder: Path,
+    store: Path,
     as_json: bool,
     **inputs: Any,
 ) -> None:
     """Compare enfilade's methods with baselines on SCENE (Mitsuba 3 XML), all on one path tracer.
 
     The configurations are path tracing, path tracing denoised by Open Image Denoise, keyframes interpolated
-    by FFmpeg's minterpolate, and the methods paper and decoupled, each at several settings. Each runs in its
-    own process and is compared with a reference of the same pixel filter by several measures. The command
-    writes bench.json, bench.png (quality over CPU time) and crops.png.
+    by FFmpeg's minterpolate, and the methods paper and decoupled, each at several settings. Each renders whole
+    frames in its own process, and is measured in a few windows against a reference of the same pixel filter.
+    The command writes bench.json, bench.png (quality over CPU time) and crops.png.
     """
     mark_resumable(ctx)
     activate("cpu")
-    from studies.bench.bench import bench, forecast_s
+    from studies.bench.bench import Place, bench, forecast_s
     from studies.bench.charts import plot_bench
     from studies.bench.configurations import all_configurations, selected
     from studies.bench.pictures import plot_crops
+    from studies.bench.references import References
+    from studies.bench.windows import windows_of
 
     path = {name: inputs.pop(name) for name in ("path_file", "size", "frames", "fps")}
     job = _job(ctx, scene, **path)
     configurations = selected(all_configurations(job, traced=traced, denoised=denoised), only)
     if not inputs["quiet"]:
-        seconds = forecast_s(job, configurations, inputs["reference_spp"], len(os.sched_getaffinity(0)))
+        minutes = forecast_s(job, configurations, len(os.sched_getaffinity(0))) / 60.0
         count = f"{len(configurations)} configurations"
-        click.echo(f"{count}, about {seconds / 60.0:.0f} minutes of path tracing in total", err=True)
-    found = bench(job, configurations, folder, **inputs)
-    plots = [plot_bench(found, folder / "bench.png"), plot_crops(found, folder, folder / "crops.png")]
+        click.echo(f"{count}, about {minutes:.0f} minutes once the references are there", err=True)
+    found = bench(job, configurations, Place(folder, store), **inputs)
+    references = References(store, job, windows_of(found["windows"]))
+    plots = [
+        plot_bench(found, folder / "bench.png"),
+        plot_crops(found, references, folder, folder / "crops.png"),
+    ]
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:

@@ -25,12 +25,13 @@ BASELINES = {
     "interpolated": "studies.bench.baselines:Interpolated",
 }
 PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's methods: settings that differ
-    **{f"paper-{spp}": ("paper", {"sampling": {"spp": spp}}) for spp in (16, 64)},
+    "paper-16": ("paper", {"sampling": {"spp": 16}}),
     **{
         f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
-        for quality in (60.0, 30.0, 15.0, 8.0, 4.0)
+        for quality in (60.0, 15.0, 8.0)
     },
 }
+EXPECTED_SPP = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,11 @@ class Configuration:
     def spp(self) -> int:
         """Paths a pixel, for methods that trace whole pixels."""
         return self.job.settings[SamplingSettings].spp
+
+    @property
+    def expected_spp(self) -> int:
+        """Rough number of paths a pixel, for forecasts: methods that reuse light trace about eight."""
+        return self.spp if self.family in ("traced", "denoised") else EXPECTED_SPP
 
     @property
     def pixel_filter(self) -> SampleFilter:

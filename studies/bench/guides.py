@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera.pinhole import Camera
+from enfilade.errors import SettingsError
 from enfilade.kernels.random import streams
 from enfilade.kernels.rays import pinhole_directions
 from enfilade.kernels.replay import padded, recorded
@@ -57,7 +58,17 @@ class Guides:
             hit.
         normal : (H, W, 3) float32
             World-space normal of the surface where the path ends, averaged over the pixel (not normalized).
+
+        Raises
+        ------
+        SettingsError
+            The renderer does not support guides behind mirrors.
         """
+        if is_followed and not isinstance(self._renderer, LobeRenderer):
+            name = self._renderer.describe().renderer
+            raise SettingsError(
+                f"denoiser.guides=followed needs a renderer that separates lobes; {name} does not: take first-hit"
+            )
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
         step = max(chunk // SIDE**2, 1)
         random = RandomKey(seed, frame, Purpose.GUIDE)
@@ -65,7 +76,7 @@ class Guides:
         for first in range(0, len(pixels), step):
             rays, rng = _stratified_rays(camera, pixels[first : first + step], random)
             albedo, normal, is_sharp = self._first(rays, rng)
-            if is_followed and isinstance(self._renderer, LobeRenderer):
+            if is_followed:
                 self._follow(albedo, normal, is_sharp, rays, rng)
             sums = [np.array(dr.block_sum(v, SIDE * SIDE)) for v in (*albedo, *normal)]
             batches.append(np.stack(sums) / np.float32(SIDE * SIDE))

@@ -1,227 +1,243 @@
-"""Measures of the bench: the measures of ``enfilade compare``, the AQM, and the temporal error."""
+"""Measures of the bench, each of one window over all frames.
+
+Measures of squared errors are products of the errors against both halves of the reference, (F - A)(F - B). The
+noise of the halves is independent, so its mean is 0. The other measures compare with the mean of both halves,
+and contain its noise.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from enfilade.comparison import measures
-from enfilade.comparison.measures import DisplayedPair, Psnr, Scale
+from enfilade.comparison.measures import DisplayedPair, Flip
 from enfilade.comparison.measures.psnr import psnr_db
 from enfilade.metric import Aqm, Pursuit, SequenceAqm, sequence_score
-from enfilade.records import F32, Flow, Mask
+from enfilade.records import F32, Flow
 from enfilade.viewing import Viewing
 
-PLANE_TOLERANCE = 0.01  # of the depth: distance from its plane within which a point is of the same surface
-SHAPE, POSITION, NORMAL, DEPTH = "shape_index", "P", "N", "Z"  # AOVs of a delivered frame
+FLICKER_BLOCK_PX = 8
+RELATIVE_FLOOR = 0.01  # added to the squared reference of the relative error (Rousselle et al. 2011)
+BEST_JOD = 10.0
+LEAST_ERROR = 1e-6  # of a measure that finds none, or none above its noise
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedPair(DisplayedPair):
-    """A pair of frames with the motion of the reference.
+class WindowPair(DisplayedPair):
+    """One window of a frame and of its reference, as the display shows them.
 
     Attributes
     ----------
+    linear : (S, S, 3) float32
+        The test before exposure and clipping.
+    linear_halves, halves : tuple of (S, S, 3) float32
+        The two halves of the reference, of independent random numbers: linear, and encoded.
     flow : Flow
-        Motion vectors of the reference.
-    visible_before : (H, W) bool or None
-        Pixels whose surface the previous frame shows, at the end of `flow.backward`; None in the first
-        frame of a shot.
-    halves : tuple of (H, W, 3) float32
-        The two halves of the reference, of independent random numbers, encoded as it is. The mean of
-        products (test - first) (test - second) has no contribution of their noise.
+        Motion vectors of the reference, pixels.
     """
 
-    flow: Flow
-    visible_before: Mask | None
+    linear: F32
+    linear_halves: tuple[F32, F32]
     halves: tuple[F32, F32]
+    flow: Flow
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The scale of a measure. Its values are additive: windows and frames are averaged.
+
+    Attributes
+    ----------
+    name, title, unit : str
+        For files and programs; for tables and charts.
+    has_noise : bool
+        Whether the noise of the reference adds to the values.
+    error_of : callable
+        Maps a mean value to an error, 0 for identical sequences, which is interpolated on a logarithmic axis.
+    score_of : callable or None
+        Maps an error to the score for tables and charts.
+    is_more_better : bool
+        Of the score.
+    """
+
+    name: str
+    title: str
+    unit: str
+    has_noise: bool = False
+    error_of: Callable[[float], float] = float
+    score_of: Callable[[float], float] = float
+    is_more_better: bool = False
+
+    def error(self, values: Sequence[float]) -> float:
+        """Error of windows together, at least :data:`LEAST_ERROR`."""
+        return max(self.error_of(sum(values) / len(values)), LEAST_ERROR)
+
+    def score(self, values: Sequence[float]) -> float:
+        """Score of windows together."""
+        return self.score_of(self.error(values))
+
+
+def _root(square: float) -> float:
+    return math.sqrt(max(square, 0.0))
+
+
+def _to_jod(error: float) -> float:
+    return BEST_JOD - error
+
+
+QUALITIES = {
+    of.name: of
+    for of in (
+        Quality(
+            "cvvdp", "ColorVideoVDP", "JOD", has_noise=True, error_of=lambda jod: BEST_JOD - jod,
+            score_of=_to_jod, is_more_better=True,
+        ),
+        Quality("aqm", "AQM", "JND", has_noise=True),
+        Quality("flip", "FLIP", "mean", has_noise=True),
+        Quality(
+            "psnr", "PSNR", "dB", error_of=_root, score_of=lambda rms: psnr_db(rms * rms), is_more_better=True
+        ),
+        Quality("relrmse", "relative RMSE", "", error_of=_root),
+        Quality("flicker", "flicker", "RMS", error_of=_root),
+    )
+}  # fmt: skip
 
 
 class Measure(Protocol):
-    """A :class:`enfilade.comparison.measures.Measure` that may use motion."""
+    """Measures one window; a new instance for each."""
 
-    def measure(self, pair: TrackedPair) -> float | None:
-        """Measure the next frame; None where the measure is undefined."""
+    def add(self, pair: WindowPair) -> None:
+        """Measure the next frame."""
         ...
 
-    def pool(self, values: Sequence[float | None]) -> float:
-        """Result for the sequence, from the values of its frames."""
+    def value(self) -> float:
+        """The mean over all frames, in the unit of :meth:`Quality.error`'s values."""
         ...
 
 
 class AqmMeasure:
-    """The modern mode of the metric; see ``docs/metric.md``.
+    """The modern mode of the metric; see ``docs/metric.md``. Its value is the sequence score, JND."""
 
-    Parameters
-    ----------
-    viewing
-        Viewing conditions.
-    pursuit
-        Eye movements.
-    """
-
-    SCALE = Scale("aqm", "AQM", "JND")
-    name = SCALE.name
-
-    def __init__(self, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> None:
+    def __init__(self, viewing: Viewing, *, pursuit: Pursuit) -> None:
         self._viewing = viewing
         self._metric = SequenceAqm(Aqm.modern(viewing, pursuit=pursuit))
+        self._scores: list[float] = []
 
-    def measure(self, pair: TrackedPair) -> float:
-        """Score of the frame, JND."""
+    def add(self, pair: WindowPair) -> None:
+        """Score the next frame."""
         flow = pair.flow
         found = self._metric.compare(
             pair.test_cd_m2,
             pair.reference_cd_m2,
-            velocity=self._viewing.velocity_deg_s(flow.motion),
+            velocity=np.ascontiguousarray(self._viewing.velocity_deg_s(flow.motion)),
             backward_flow_px=flow.backward if flow.has_backward else None,
-            is_cut=pair.visible_before is None,
+            is_cut=not flow.has_backward,
         )
-        return found.score
+        self._scores.append(found.score)
 
-    def pool(self, values: Sequence[float | None]) -> float:
+    def value(self) -> float:
         """(mean over frames of score^3.5)^(1/3.5), JND."""
-        return sequence_score(value for value in values if value is not None)
+        return sequence_score(self._scores)
 
 
-class Temporal:
-    """RMS change of the error since the previous frame, along the motion vectors.
+class FlipMeasure:
+    """LDR-FLIP, mean over pixels and frames; it does not see flicker."""
 
-    With e_t = test - reference, sRGB-encoded, and the backward motion vectors b_t of the reference, a frame's
-    value is the root of the mean of |e_t(x) - e_{t-1}(x + b_t(x))|^2 over channels and over the pixels whose
-    surface both frames show. An error that stays on its surface has 0; independent noise has sqrt(2) times
-    its deviation. This is the warping error of Lai et al. (2018, "Learning blind video temporal
-    consistency"), applied to the error instead of the image, so that changes of the reference (moving
-    highlights) are no error.
+    def __init__(self, viewing: Viewing) -> None:
+        self._flip = Flip(viewing)
+        self._values: list[float] = []
 
-    The square is the product of the changes against both halves of the reference, whose noise it does not
-    contain. The previous error is interpolated bilinearly, which smooths fine noise and slightly favours
-    noisy configurations.
+    def add(self, pair: WindowPair) -> None:
+        """Mean of the next frame's map."""
+        self._values.append(self._flip.measure(pair))
+
+    def value(self) -> float:
+        """Mean over frames."""
+        return sum(self._values) / len(self._values)
+
+
+class SquaredError:
+    """Mean squared error of encoded values, 1 = white, without the noise of the reference."""
+
+    def __init__(self) -> None:
+        self._values: list[float] = []
+
+    def add(self, pair: WindowPair) -> None:
+        """Mean of products over pixels and channels."""
+        first, second = (pair.test - half for half in pair.halves)
+        self._values.append(float(np.mean(np.multiply(first, second, dtype=np.float64))))
+
+    def value(self) -> float:
+        """Mean over frames; it may be negative within the noise."""
+        return sum(self._values) / len(self._values)
+
+
+class RelativeSquaredError:
+    """Mean of (F - A)(F - B) / (R^2 + 0.01), linear, R the mean of both halves (Rousselle et al. 2011)."""
+
+    def __init__(self) -> None:
+        self._values: list[float] = []
+
+    def add(self, pair: WindowPair) -> None:
+        """Mean over pixels and channels."""
+        first, second = (pair.linear.astype(np.float64) - half for half in pair.linear_halves)
+        mean = 0.5 * (pair.linear_halves[0].astype(np.float64) + pair.linear_halves[1])
+        self._values.append(float(np.mean(first * second / (np.square(mean) + RELATIVE_FLOOR))))
+
+    def value(self) -> float:
+        """Mean over frames; it may be negative within the noise."""
+        return sum(self._values) / len(self._values)
+
+
+class Flicker:
+    """Mean square of the change of the error since the last frame, of means over blocks of 8x8 pixels.
+
+    Encoded values; blocks stay at their place in the image. Fine noise averages out, as it does for the eye;
+    patches that come and go remain. Products of the changes against both halves: the noise of the reference
+    does not count.
     """
-
-    SCALE = Scale("temporal", "temporal", "RMS")
-    name = SCALE.name
 
     def __init__(self) -> None:
         self._previous: tuple[F32, F32] | None = None
+        self._values: list[float] = []
 
-    def measure(self, pair: TrackedPair) -> float | None:
-        """Change of the error; None in the first frame of a shot, or where no surface is in both frames.
-
-        Negative where noise of the references makes the product negative.
-        """
-        errors = pair.test - pair.halves[0], pair.test - pair.halves[1]
+    def add(self, pair: WindowPair) -> None:
+        """Mean over blocks and channels; none for the first frame of a shot."""
+        errors = _block_means(pair.test - pair.halves[0]), _block_means(pair.test - pair.halves[1])
         previous, self._previous = self._previous, errors
-        if previous is None or pair.visible_before is None or not pair.visible_before.any():
-            return None
-        first, second = (
-            (now - _bilinear(before, pair.flow.backward))[pair.visible_before]
-            for now, before in zip(errors, previous, strict=True)
-        )
-        square = float(np.mean(np.multiply(first, second, dtype=np.float64)))
-        return math.copysign(math.sqrt(abs(square)), square)
+        if previous is not None and pair.flow.has_backward:
+            first, second = (now - before for now, before in zip(errors, previous, strict=True))
+            self._values.append(float(np.mean(np.multiply(first, second, dtype=np.float64))))
 
-    def pool(self, values: Sequence[float | None]) -> float:
-        """RMS over frames; 0 where no frame has a previous one."""
-        known = [value * abs(value) for value in values if value is not None]
-        return math.sqrt(max(sum(known) / len(known), 0.0)) if known else 0.0
+    def value(self) -> float:
+        """Mean over frames, 0 if there is a single one; it may be negative within the noise."""
+        return sum(self._values) / max(len(self._values), 1)
 
 
-class HalvesPsnr:
-    """PSNR without the noise of the reference: its squared error is the product of those against both halves.
-
-    Infinite where that product is not positive.
-    """
-
-    SCALE = Psnr.SCALE
-    name = SCALE.name
-
-    def __init__(self) -> None:
-        self._squares: list[float] = []
-
-    def measure(self, pair: TrackedPair) -> float:
-        """PSNR of the next frame, dB."""
-        first, second = (pair.test - half for half in pair.halves)
-        self._squares.append(float(np.mean(np.multiply(first, second, dtype=np.float64))))
-        return psnr_db(max(self._squares[-1], 0.0))
-
-    def pool(self, values: Sequence[float | None]) -> float:
-        """PSNR of the whole sequence: of the mean squared error over all frames."""
-        del values
-        return psnr_db(max(sum(self._squares) / len(self._squares), 0.0))
-
-
-def visible_before(layers: Mapping[str, npt.NDArray[Any]], previous: Mapping[str, npt.NDArray[Any]]) -> Mask:
-    """Pixels whose surface the previous frame shows, too.
-
-    Parameters
-    ----------
-    layers, previous
-        AOVs ``shape_index``, ``P``, ``N``, ``Z`` and ``backward`` of a delivered frame, and of the previous
-        one of the same shot.
-
-    Returns
-    -------
-    (H, W) bool
-        True where the motion vector ends at a pixel of the same shape on the same plane, or at the
-        background, where nothing is hit.
-    """
-    backward = layers["backward"].astype(np.float32)
-    height, width = backward.shape[:2]
-    column = np.arange(width) + backward[..., 0]
-    row = np.arange(height)[:, None] + backward[..., 1]
-    is_inside = (column > -0.5) & (column < width - 0.5) & (row > -0.5) & (row < height - 0.5)
-    at = np.where(is_inside, np.rint(row), 0).astype(int), np.where(is_inside, np.rint(column), 0).astype(int)
-    step = previous[POSITION][at] - layers[POSITION]
-    plane_distance = np.abs((step * layers[NORMAL].astype(np.float32)).sum(axis=-1))
-    is_same_shape = previous[SHAPE][at] == layers[SHAPE]
-    is_visible: Mask = is_inside & is_same_shape & (plane_distance <= PLANE_TOLERANCE * layers[DEPTH])
-    return is_visible
-
-
-def _bilinear(image: F32, flow: F32) -> F32:
-    """Values of an image at the ends of the motion vectors: bilinear, clamped at the borders."""
-    height, width = image.shape[:2]
-    x = np.clip(np.arange(width) + flow[..., 0], 0.0, width - 1.0)
-    y = np.clip(np.arange(height)[:, None] + flow[..., 1], 0.0, height - 1.0)
-    left = np.minimum(x.astype(int), max(width - 2, 0))
-    top = np.minimum(y.astype(int), max(height - 2, 0))
-    u, v = (x - left)[..., None], (y - top)[..., None]
-    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    upper = image[top, left] * (1.0 - u) + image[top, right] * u
-    lower = image[below, left] * (1.0 - u) + image[below, right] * u
-    values: F32 = (upper * (1.0 - v) + lower * v).astype(np.float32)
-    return values
-
-
-SCALES = {
-    scale.name: scale
-    for scale in (
-        AqmMeasure.SCALE,
-        measures.SCALES["flip"],
-        HalvesPsnr.SCALE,
-        Temporal.SCALE,
-        measures.SCALES["cvvdp"],
-    )
-}
+def _block_means(image: F32) -> F32:
+    """Means over blocks, (H / 8, W / 8, 3)."""
+    rows, columns = (size // FLICKER_BLOCK_PX for size in image.shape[:2])
+    cut = image[: rows * FLICKER_BLOCK_PX, : columns * FLICKER_BLOCK_PX]
+    blocks = cut.reshape(rows, FLICKER_BLOCK_PX, columns, FLICKER_BLOCK_PX, -1)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
 def open_measure(name: str, viewing: Viewing, pursuit: Pursuit) -> Measure:
-    """A measure for one pair of sequences; see :func:`enfilade.comparison.measures.open_measure`."""
+    """A measure of one window, other than ColorVideoVDP; `viewing` is that of the window."""
     match name:
         case "aqm":
             return AqmMeasure(viewing, pursuit=pursuit)
-        case "temporal":
-            return Temporal()
+        case "flip":
+            return FlipMeasure(viewing)
         case "psnr":
-            return HalvesPsnr()
+            return SquaredError()
+        case "relrmse":
+            return RelativeSquaredError()
+        case "flicker":
+            return Flicker()
         case _:
-            return measures.open_measure(name, viewing)
-
-
-NOISE_FREE = frozenset({HalvesPsnr.name, Temporal.name})  # measures without the noise of the reference
+            raise KeyError(name)

@@ -1,14 +1,13 @@
-"""Measurement of a configuration's frames against those of its reference."""
+"""Measurement of a configuration's frames against the references, in the windows of a bench."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from enfilade.camera.path import CameraPath
 from enfilade.comparison.measures import display_pair
 from enfilade.comparison.measures import why_missing as why_no_measure
 from enfilade.errors import SettingsError
@@ -16,11 +15,15 @@ from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
 from enfilade.metric import Pursuit
 from enfilade.monitor import Monitor
-from enfilade.records import Flow
+from enfilade.records import F32
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
-from enfilade.settings import MetricSettings, ViewingSettings
-from studies.bench.measures import SCALES, Temporal, TrackedPair, open_measure, visible_before
+from enfilade.settings import MetricSettings, SampleFilter, ViewingSettings
+from enfilade.viewing import Viewing
+from studies.bench import colorvideovdp
+from studies.bench.measures import QUALITIES, WindowPair, open_measure
+from studies.bench.references import ReferenceFrame, References
+from studies.bench.windows import Window
 
 
 def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
@@ -32,32 +35,51 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
         A requested measure is missing, or all are.
     """
     path = job.path
-    has_changes = any(path.neighbours(frame)[0] for frame in range(len(path)))
-    reasons = {name: why_no_measure(name) for name in SCALES}
-    if not has_changes:
-        reasons[Temporal.name] = f"{Temporal.name} is left out: it needs consecutive frames"
+    reasons = {name: "" for name in QUALITIES}
+    reasons |= {"cvvdp": colorvideovdp.why_missing(), "flip": why_no_measure("flip")}
+    if not any(path.neighbours(frame)[0] for frame in range(len(path))):
+        reasons["flicker"] = "flicker is left out: it needs consecutive frames"
     for name in requested:
-        if why := reasons.get(name, f"there is no measure {name!r}; known are: {', '.join(SCALES)}"):
+        if why := reasons.get(name, f"there is no measure {name!r}; known are: {', '.join(QUALITIES)}"):
             raise SettingsError(why)
     names = list(dict.fromkeys(requested)) or [name for name, why in reasons.items() if not why]
-    if not names:
-        raise SettingsError(f"no measure is available: {'; '.join(reasons.values())}")
     return names, [] if requested else [why for why in reasons.values() if why]
 
 
+Source = Callable[[int], Sequence[F32]]  # from a frame to its windows, (S, S, 3) linear
+
+
+def windows_of_run(run: Path, path: CameraPath, windows: Sequence[Window]) -> Source:
+    """The windows of the frames of a run folder."""
+    held = RunFolder.read(run)
+
+    def read(frame: int) -> list[F32]:
+        image = read_exr(held.file_of(FRAMES, path.numbers[frame]))["RGB"]
+        return [np.ascontiguousarray(window.crop(image), np.float32) for window in windows]
+
+    return read
+
+
 def measure(
-    test: Path, halves: tuple[Path, Path], job: Job, names: Sequence[str], monitor: Monitor
-) -> dict[str, Any]:
-    """Measure the frames of a run folder against a reference, each frame read once.
+    source: Source | None,
+    pixel_filter: SampleFilter,
+    references: References,
+    windows: Sequence[Window],
+    job: Job,
+    names: Sequence[str],
+    monitor: Monitor,
+) -> dict[str, list[float]]:
+    """Measure frames in all windows, each frame read once.
 
     Parameters
     ----------
-    test
-        A run folder.
-    halves
-        Run folders of both halves of the reference, whose mean it is; their frames carry all AOVs.
+    source
+        The windows of each frame; None for the first half of the references, against the second alone.
+    pixel_filter
+        Of the references.
+    references, windows
     job
-        Camera path and viewing conditions of both.
+        Camera path and viewing conditions.
     names
         Names of measures.
     monitor
@@ -65,45 +87,48 @@ def measure(
     Returns
     -------
     dict
-        By measure: ``score`` and ``per_frame``; None for identical frames and first frames.
+        Values of the windows by measure.
     """
     pursuit = Pursuit(job.settings[MetricSettings].metering.value)
-    measures = {name: open_measure(name, job.viewing, pursuit) for name in names}
-    values: dict[str, list[float | None]] = {name: [] for name in names}
-    for done, pair in enumerate(pairs(test, halves, job), 1):
-        for name, one in measures.items():
-            values[name].append(one.measure(pair))
-        monitor.progress("measures", done, len(job.path))
-    return {
-        name: {
-            "score": _finite(measures[name].pool(values[name])),
-            "per_frame": [None if value is None else _finite(value) for value in values[name]],
-        }
-        for name in names
-    }
+    viewing = job.viewing.cropped(windows[0].side, windows[0].side)
+    exposure_ev = job.settings[ViewingSettings].exposure_ev
+    others = [name for name in names if name != "cvvdp"]
+    opened = [{name: open_measure(name, viewing, pursuit) for name in others} for _ in windows]
+    kept: list[list[WindowPair]] = [[] for _ in windows]
+    for frame in range(len(job.path)):
+        monitor.progress("measures", frame, len(job.path))
+        reference = references.read(frame)
+        tests = None if source is None else source(frame)
+        for index, pair in enumerate(_pairs(tests, reference, pixel_filter, viewing, exposure_ev)):
+            for one in opened[index].values():
+                one.add(pair)
+            if "cvvdp" in names:
+                kept[index].append(pair)
+    values = {name: [of[name].value() for of in opened] for name in others}
+    if "cvvdp" in names:
+        values["cvvdp"] = colorvideovdp.predict_jod(kept, viewing)
+    monitor.progress("measures", len(job.path), len(job.path))
+    return {name: values[name] for name in names}
 
 
-def pairs(test: Path, halves: tuple[Path, Path], job: Job) -> Iterator[TrackedPair]:
-    """Pairs of frames of a run and its reference, in order; see :func:`measure`."""
-    path, exposure_ev = job.path, job.settings[ViewingSettings].exposure_ev
-    runs = [RunFolder.read(folder) for folder in (test, *halves)]
-    previous: dict[str, Any] | None = None
-    for frame, number in enumerate(path.numbers):
-        tested, layers, others = (read_exr(run.file_of(FRAMES, number)) for run in runs)
-        before, after = path.neighbours(frame)
-        flow = Flow(layers["backward"], layers["forward"], before is not None, after is not None)
-        is_visible = visible_before(layers, previous) if previous is not None and before is not None else None
-        color, first, second = (
-            np.ascontiguousarray(of["RGB"], np.float32) for of in (tested, layers, others)
+def _pairs(
+    tests: Sequence[F32] | None,
+    reference: ReferenceFrame,
+    pixel_filter: SampleFilter,
+    viewing: Viewing,
+    exposure_ev: float,
+) -> Iterator[WindowPair]:
+    """The windows of a frame, each with its reference."""
+    for index, (first, second) in enumerate(zip(*reference.halves[pixel_filter], strict=True)):
+        halves = (first, second) if tests is not None else (second, second)
+        test = first if tests is None else tests[index]
+        wanted = np.float32(0.5) * (halves[0] + halves[1])
+        pair = display_pair(test, wanted, viewing, exposure_ev=exposure_ev)
+        shown = display_pair(*halves, viewing, exposure_ev=exposure_ev)
+        yield WindowPair(
+            **vars(pair),
+            linear=test,
+            linear_halves=halves,
+            halves=(shown.test, shown.reference),
+            flow=reference.flows[index],
         )
-        wanted = np.float32(0.5) * (first + second)
-        pair = display_pair(color, wanted, job.viewing, exposure_ev=exposure_ev)
-        shown = display_pair(first, second, job.viewing, exposure_ev=exposure_ev)
-        yield TrackedPair(
-            **vars(pair), flow=flow, visible_before=is_visible, halves=(shown.test, shown.reference)
-        )
-        previous = layers
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Crops of the configurations of a bench and their references."""
+"""The windows of a bench in one frame: references, configurations, and their differences."""
 
 from __future__ import annotations
 
@@ -14,83 +14,61 @@ from enfilade.methods.base import FRAMES
 from enfilade.records import F32
 from enfilade.reports.charts import INK, Figure, save
 from enfilade.runs.folder import RunFolder
+from enfilade.settings import SampleFilter
 from studies.bench.charts import STYLES
+from studies.bench.references import References
 from studies.bench.tables import score_text
-from studies.crops import crop_around
+from studies.bench.windows import windows_of
 
 DPI = 130
+PANEL_IN = 1.9
 AMPLIFICATION = 4.0  # of differences
-CROP_PX = 72  # side of a crop
-CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
-SHOWN_FRAMES = 3
 SHOWN_OF_FAMILY = 3  # configurations: cheapest, median, most expensive
 
 
-class Frames:
-    """Frames of a bench as displayed: exposed, clipped and encoded as sRGB."""
-
-    def __init__(self, found: Mapping[str, Any], folder: Path) -> None:
-        self._scale = np.float32(2.0 ** found["exposure_ev"])
-        self._folder = folder
-        self.configurations = {of["name"]: of for of in found["configurations"]}
-
-    def displayed(self, number: int, *folders: str) -> F32:
-        """The mean of a frame over some run folders of the bench, such as ``references/box-1``."""
-        runs = [RunFolder.read(self._folder / folder) for folder in folders]
-        frames = [read_exr(run.file_of(FRAMES, number))["RGB"].astype(np.float32) for run in runs]
-        linear = np.asarray(np.mean(frames, axis=0), np.float32)
-        return srgb_encode(np.clip(linear * self._scale, 0.0, 1.0)).astype(np.float32)
-
-    def of(self, name: str, number: int) -> F32:
-        """A frame of a configuration."""
-        return self.displayed(number, f"configurations/{name}")
-
-    def reference(self, name: str, number: int) -> F32:
-        """The same frame of the configuration's reference."""
-        kind = self.configurations[name]["pixel_filter"]
-        return self.displayed(number, f"references/{kind}-1", f"references/{kind}-2")
-
-    def selected(self) -> list[str]:
-        """Names of a few configurations of each family, in the order of the bench."""
-        chosen: dict[str, None] = {}
-        for family in STYLES:
-            names = [name for name, of in self.configurations.items() if of["family"] == family]
-            count = min(SHOWN_OF_FAMILY, len(names))
-            indices = [round(i * (len(names) - 1) / max(count - 1, 1)) for i in range(count)]
-            chosen |= dict.fromkeys(names[index] for index in indices)
-        return list(chosen)
+def selected(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """A few configurations of each family, in the order of the bench."""
+    chosen = []
+    for family in STYLES:
+        rows = [row for row in found["configurations"] if row["family"] == family]
+        rows.sort(key=lambda row: row["cost"]["cpu_s"])
+        count = min(SHOWN_OF_FAMILY, len(rows))
+        chosen += [rows[round(i * (len(rows) - 1) / max(count - 1, 1))] for i in range(count)]
+    return chosen
 
 
-def plot_crops(found: Mapping[str, Any], folder: Path, file: Path) -> Path:
-    """Draw crops of some configurations and of the reference, where they differ most.
+def plot_crops(found: Mapping[str, Any], references: References, folder: Path, file: Path) -> Path:
+    """Draw all windows of the middle frame: two rows each, the pixels and four times the difference around grey."""
+    rows, measure = selected(found), next(iter(found["measures"]))
+    windows = windows_of(found["windows"])
+    middle = len(found["frames"]) // 2
+    reference = references.read(middle)
+    scale = np.float32(2.0 ** found["exposure_ev"])
 
-    Two rows for each of up to three frames: the crop, and four times its difference to the
-    reference around grey.
-    """
-    frames = Frames(found, folder)
-    names, numbers, measure = frames.selected(), found["frames"], next(iter(found["measures"]))
-    chosen = sorted(
-        {numbers[round((i + 0.5) * len(numbers) / SHOWN_FRAMES - 0.5)] for i in range(SHOWN_FRAMES)}
-    )
-    size = (1.25 * (len(names) + 1), 2.6 * len(chosen) + 0.4)
+    def displayed(linear: F32) -> F32:
+        return srgb_encode(np.clip(linear * scale, 0.0, 1.0)).astype(np.float32)
+
+    images = []
+    for row in rows:
+        run = RunFolder.read(folder / "configurations" / row["name"])
+        images.append(displayed(read_exr(run.file_of(FRAMES, found["frames"][middle]))["RGB"].astype(np.float32)))
+    size = (PANEL_IN * (len(rows) + 1), 2 * PANEL_IN * len(windows) + 0.5)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-    axes = figure.subplots(2 * len(chosen), len(names) + 1, squeeze=False)
+    axes = figure.subplots(2 * len(windows), len(rows) + 1, squeeze=False)
     for ax in axes.ravel():
         ax.set_axis_off()
-    for row, number in enumerate(chosen):
-        images = {name: (frames.of(name, number), frames.reference(name, number)) for name in names}
-        errors = [np.square(test - reference).sum(axis=-1) for test, reference in images.values()]
-        crop = crop_around(sum(error / max(float(error.mean()), 1e-12) for error in errors), CROP_PX)
-        above, below = axes[2 * row], axes[2 * row + 1]
-        above[0].imshow(images[names[0]][1][crop], interpolation="nearest")
-        below[0].text(0.5, 0.9, f"↑ frame {number}", fontsize=8, color=INK, **CENTRED)
-        below[0].text(0.5, 0.5, f"{AMPLIFICATION:g} × difference →", fontsize=7, color=INK, **CENTRED)
-        for column, (test, reference) in enumerate(images.values(), start=1):
-            difference = 0.5 + np.float32(AMPLIFICATION) * (test[crop] - reference[crop])
-            above[column].imshow(test[crop], interpolation="nearest")
+    for index, window in enumerate(windows):
+        above, below = axes[2 * index], axes[2 * index + 1]
+        means = {kind: displayed(halves[:, index].mean(axis=0)) for kind, halves in reference.halves.items()}
+        above[0].imshow(means[SampleFilter.GAUSSIAN], interpolation="nearest")
+        text = f"↑ {window.kind}\n{AMPLIFICATION:g} × difference →"
+        below[0].text(0.5, 0.5, text, fontsize=8, color=INK, ha="center", va="center")
+        for column, (row, image) in enumerate(zip(rows, images, strict=True), start=1):
+            crop = window.crop(image)
+            difference = 0.5 + np.float32(AMPLIFICATION) * (crop - means[SampleFilter(row["pixel_filter"])])
+            above[column].imshow(crop, interpolation="nearest")
             below[column].imshow(np.clip(difference, 0.0, 1.0), interpolation="nearest")
-    axes[0, 0].set_title("reference", fontsize=7, color=INK)
-    for ax, name in zip(axes[0, 1:], names, strict=True):
-        score = score_text(frames.configurations[name]["scores"][measure])
-        ax.set_title(f"{name}\n{score}", fontsize=7, color=INK)
+    axes[0, 0].set_title(f"reference, frame {found['frames'][middle]}", fontsize=7, color=INK)
+    for ax, row in zip(axes[0, 1:], rows, strict=True):
+        ax.set_title(f"{row['name']}\n{score_text(measure, row['values'][measure])}", fontsize=7, color=INK)
     return save(figure, file)

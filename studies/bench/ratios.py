@@ -1,4 +1,4 @@
-"""CPU time at equal quality, by measure, against each baseline."""
+"""CPU time at equal quality: enfilade's configurations against the front of rivals, with intervals over windows."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from studies.bench.measures import SCALES
+from studies.bench.configurations import BASELINES
+from studies.bench.measures import QUALITIES
 
-DECOUPLED = "decoupled"  # the family that is compared with all others
-AQM_MARGIN_JND = 0.1  # by which decoupled may be worse than path tracing: not a visible difference
-LEVELS = 16  # of quality, evenly spaced on a logarithmic axis, over which a ratio is averaged
-MIN_ERROR = 1e-9  # for logarithms: below it sequences are identical
+DRAWS = 1000  # of windows, with replacement
+INTERVAL = (5.0, 95.0)  # percentiles of the draws
+SEED = 0
 
 
 @dataclass(frozen=True)
@@ -27,88 +27,60 @@ class Point:
 
 @dataclass(frozen=True)
 class Ratio:
-    """CPU time of a baseline over that of decoupled.
+    """CPU time of the strongest rival over that of a configuration, at equal quality.
 
     Attributes
     ----------
     times : float
-        Above 1 where decoupled is faster: geometric mean over the levels of quality that both reach.
-    least : float
-        The smallest ratio over those levels.
+        Above 1 where the configuration is faster.
     kind : {"equal", "at least", "at most"}
-        ``equal``: both reach these qualities. ``at least``: decoupled is better at every cost; the most
-        expensive configuration of the baseline is compared, which would need more time. ``at most``: the
-        baseline is better at every cost.
+        ``at least``: it is better than every rival; the best rival is compared, which would need more time.
+        ``at most``: it is worse than every rival; the cheapest is compared.
+    low, high : float
+        Interval of 90 % over draws of the windows, with replacement. It does not contain the spread of CPU times.
     """
 
     times: float
-    least: float
     kind: str
+    low: float
+    high: float
 
 
-def ratios(configurations: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[str, Any]:
-    """Compare decoupled with the baselines, by configurations as in ``bench.json``.
+def ratios(rows: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Ratios by configuration and measure; empty where there is no rival.
 
-    Returns
-    -------
-    dict
-        ``traced``: by baseline and measure, :class:`Ratio` at the baseline's quality (for AQM 0.1 JND above
-        its score). ``denoised``: ``by_measure``, over all qualities that both reach, with the
-        ``geometric_mean`` over the measures, its ``kind`` (None where the ratios are bounds in both
-        directions), and the ``least``. ``paper``: by configuration, the names of decoupled configurations
-        that are better by every measure at less cost. Empty where one side is missing.
+    Parameters
+    ----------
+    rows
+        Configurations as in ``bench.json``.
+    measures
+        Names.
     """
-    decoupled, traced, denoised, paper = (
-        [c for c in configurations if c["family"] == family]
-        for family in (DECOUPLED, "traced", "denoised", "paper")
-    )
-    if not decoupled:
-        return {"traced": {}, "denoised": {}, "paper": {}}
-    curves = {measure: [_point(c, measure) for c in decoupled] for measure in measures}
-    margins = {"aqm": AQM_MARGIN_JND}
-    return {
-        "traced": {
-            baseline["name"]: {
-                m: asdict(ratio_at(_point(baseline, m), curves[m], margin=margins.get(m, 0.0)))
-                for m in measures
-            }
-            for baseline in traced
-        },
-        "denoised": _denoised(denoised, curves),
-        "paper": {
-            baseline["name"]: [one["name"] for one in decoupled if _is_better(one, baseline, measures)]
-            for baseline in paper
-        },
-    }
-
-
-def _denoised(
-    baselines: Sequence[Mapping[str, Any]], curves: Mapping[str, Sequence[Point]]
-) -> dict[str, Any]:
-    if not baselines:
+    rivals = [row for row in rows if row["family"] in BASELINES]
+    ours = [row for row in rows if row["family"] not in BASELINES]
+    if not rivals:
         return {}
-    found = {
-        m: ratio_over([_point(baseline, m) for baseline in baselines], curve) for m, curve in curves.items()
-    }
-    times = [ratio.times for ratio in found.values()]
-    bounds = {ratio.kind for ratio in found.values()} - {"equal"}
-    return {
-        "by_measure": {measure: asdict(ratio) for measure, ratio in found.items()},
-        "geometric_mean": math.exp(sum(map(math.log, times)) / len(times)),
-        "kind": None if len(bounds) > 1 else next(iter(bounds), "equal"),
-        "least": min(times),
-    }
+    return {one["name"]: {m: asdict(ratio(one, rivals, m)) for m in measures} for one in ours}
 
 
-def _is_better(one: Mapping[str, Any], baseline: Mapping[str, Any], measures: Sequence[str]) -> bool:
-    pairs = [(_point(one, measure), _point(baseline, measure)) for measure in measures]
-    return all(point.cpu_s < other.cpu_s and point.error < other.error for point, other in pairs)
+def ratio(one: Mapping[str, Any], rivals: Sequence[Mapping[str, Any]], measure: str) -> Ratio:
+    """CPU time of the rivals' front over that of a configuration, at its quality by a measure."""
+    windows = len(one["values"][measure])
+    cost, kind = cost_at([_point(rival, measure) for rival in rivals], _point(one, measure).error)
+    random = np.random.default_rng(SEED)
+    drawn = []
+    for _ in range(DRAWS):
+        chosen = random.integers(windows, size=windows).tolist()
+        points = [_point(rival, measure, chosen) for rival in rivals]
+        drawn.append(cost_at(points, _point(one, measure, chosen).error)[0] / one["cost"]["cpu_s"])
+    low, high = np.percentile(drawn, INTERVAL).tolist()
+    return Ratio(cost / one["cost"]["cpu_s"], kind, low, high)
 
 
-def _point(configuration: Mapping[str, Any], measure: str) -> Point:
-    score = configuration["scores"][measure]
-    error = 0.0 if score is None else SCALES[measure].error_of(score)  # None: identical
-    return Point(configuration["cost"]["cpu_s"], error)
+def _point(row: Mapping[str, Any], measure: str, windows: Sequence[int] | None = None) -> Point:
+    values = row["values"][measure]
+    chosen = values if windows is None else [values[window] for window in windows]
+    return Point(row["cost"]["cpu_s"], QUALITIES[measure].error(chosen))
 
 
 def front(points: Sequence[Point]) -> list[Point]:
@@ -121,13 +93,14 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 
 def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
-    """CPU seconds at which a curve reaches an error, interpolated on logarithmic axes.
+    """CPU seconds at which a front reaches an error, interpolated on logarithmic axes.
 
     Parameters
     ----------
     points
         One or more.
     error
+        Above 0.
 
     Returns
     -------
@@ -141,38 +114,28 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
         return cheapest.cpu_s, "equal" if error == cheapest.error else "at most"
     if error < best.error:
         return best.cpu_s, "at least"
-    errors = [_log(p.error) for p in reversed(curve)]
+    errors = [math.log(p.error) for p in reversed(curve)]
     costs = [math.log(p.cpu_s) for p in reversed(curve)]
-    return float(math.exp(np.interp(_log(error), errors, costs))), "equal"
+    return float(math.exp(np.interp(math.log(error), errors, costs))), "equal"
 
 
-def ratio_at(baseline: Point, decoupled: Sequence[Point], *, margin: float = 0.0) -> Ratio:
-    """Ratio at the quality of one baseline; decoupled may be worse by a margin, in units of the error."""
-    cost, kind = cost_at(decoupled, baseline.error + margin)
-    times = baseline.cpu_s / cost
-    return Ratio(times, times, {"equal": "equal", "at most": "at least", "at least": "at most"}[kind])
+def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Geometric mean of ratios over scenes, with an interval over draws of the scenes.
 
+    Parameters
+    ----------
+    found
+        Ratios as plain values, of one configuration and measure in each scene.
 
-def ratio_over(baseline: Sequence[Point], decoupled: Sequence[Point]) -> Ratio:
-    """Ratio over all qualities that both curves reach.
-
-    Without a common quality, the nearest ends of the curves are compared: see :class:`Ratio`.
+    Returns
+    -------
+    dict
+        As :class:`Ratio`; its `kind` is None where it contains bounds in both directions.
     """
-    baseline_front, decoupled_front = front(baseline), front(decoupled)
-    worst, best = (
-        min(baseline_front[0].error, decoupled_front[0].error),
-        max(baseline_front[-1].error, decoupled_front[-1].error),
-    )
-    if best > worst:
-        if decoupled_front[0].error < baseline_front[-1].error:
-            times = baseline_front[-1].cpu_s / decoupled_front[0].cpu_s
-            return Ratio(times, times, "at least")
-        times = baseline_front[0].cpu_s / decoupled_front[-1].cpu_s
-        return Ratio(times, times, "at most")
-    levels = np.exp(np.linspace(_log(best), _log(worst), LEVELS)).clip(best, worst)
-    found = [cost_at(baseline_front, float(e))[0] / cost_at(decoupled_front, float(e))[0] for e in levels]
-    return Ratio(float(np.exp(np.mean(np.log(found)))), min(found), "equal")
-
-
-def _log(error: float) -> float:
-    return math.log(max(error, MIN_ERROR))
+    logs = np.log([one["times"] for one in found])
+    random = np.random.default_rng(SEED)
+    drawn = [logs[random.integers(len(logs), size=len(logs))].mean() for _ in range(DRAWS)]
+    low, high = np.exp(np.percentile(drawn, INTERVAL)).tolist()
+    bounds = {one["kind"] for one in found} - {"equal"}
+    kind = None if len(bounds) > 1 else next(iter(bounds), "equal")
+    return {"times": float(np.exp(logs.mean())), "kind": kind, "low": low, "high": high}

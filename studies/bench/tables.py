@@ -9,7 +9,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "bounds in both directions, "}
+from studies.bench.measures import LEAST_ERROR, QUALITIES
+
+SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "~ "}
 
 
 def bench_tables(found: Mapping[str, Any]) -> list[Table]:
@@ -19,63 +21,65 @@ def bench_tables(found: Mapping[str, Any]) -> list[Table]:
 
 def _configurations(found: Mapping[str, Any]) -> Table:
     size, measures = "x".join(map(str, found["size"])), found["measures"]
-    headings = ("CPU\ns", "wall\ns", *(f"{of['title']}\n{of['unit']}" for of in measures.values()))
-    table = _table(f"{found['scene']}, {len(found['frames'])} frames of {size}", "configuration", *headings)
+    frames = len(found["frames"])
+    headings = ("CPU s\na frame", "start\nCPU s", "wall s\na frame", "peak\nMiB")
+    table = _table(
+        f"{found['scene']}, {frames} frames of {size}", "configuration", *headings,
+        *(f"{of['title']}\n{of['unit']}" for of in measures.values()),
+    )  # fmt: skip
     family = None
     for row in found["configurations"]:
         if family not in (None, row["family"]):
             table.add_section()
-        family = row["family"]
-        cells = [_number_text(row["cost"][key]) for key in ("cpu_s", "wall_s")]
-        scores = {name: score_text(row["scores"][name]) for name in measures}
-        marked = (f"{text} *" if name in row["undecided"] else text for name, text in scores.items())
-        table.add_row(row["name"], *cells, *marked)
+        family, cost = row["family"], row["cost"]
+        cells = [cost["cpu_s"] / frames, cost["start_cpu_s"], cost["wall_s"] / frames, cost["peak_mib"]]
+        scores = (score_text(name, row["values"][name]) for name in measures)
+        marked = (f"{text} *" if name in row["undecided"] else text for name, text in zip(measures, scores, strict=True))
+        table.add_row(row["name"], *map(number_text, cells), *marked)
     table.add_section()
     for kind, floor in found["reference"]["noise_floor"].items():
-        scores = {name: score_text(score) for name, score in floor.items()}
-        table.add_row(f"noise floor, {kind}", "", "", *(scores.get(name, "") for name in measures))
+        cells = (score_text(name, floor[name]) if name in floor else "" for name in measures)
+        table.add_row(f"noise floor, {kind}", "", "", "", "", *cells)
     table.caption = (
-        f"references of {found['reference']['spp']} paths a pixel in two halves; floor: one half against the "
-        "other; *: nearer to it than a third, not decided"
+        f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths a pixel in two "
+        "halves; floor: one half against the other; *: nearer to it than a third, not decided"
     )
     return table
 
 
 def _ratios(found: Mapping[str, Any]) -> list[Table]:
-    ratios, measures = found["ratios"], found["measures"]
-    tables = []
-    if ratios["traced"] or ratios["denoised"]:
-        headings = ("than", *(of["title"] for of in measures.values()))
-        table = _table("decoupled: times less CPU at equal quality", *headings)
-        for baseline, by_measure in ratios["traced"].items():
-            table.add_row(baseline, *(ratio_text(by_measure[name]) for name in measures))
-        if denoised := ratios["denoised"]:
-            table.add_section()
-            table.add_row("denoised", *(ratio_text(denoised["by_measure"][name]) for name in measures))
-            mean = f"{SIGNS[denoised['kind']]}{denoised['geometric_mean']:.2f}"
-            table.caption = f"denoised: geometric mean over the measures {mean}"
-        tables.append(table)
-    if ratios["paper"]:
-        table = _table("decoupled: better by every measure at less cost", "than", "configurations")
-        for baseline, names in ratios["paper"].items():
-            table.add_row(baseline, ", ".join(names) or "none")
-        tables.append(table)
-    return tables
+    if not found["ratios"]:
+        return []
+    table = _table(
+        "CPU time of the strongest rival over ours, at equal quality", "configuration",
+        *(of["title"] for of in found["measures"].values()),
+    )  # fmt: skip
+    for name, by_measure in found["ratios"].items():
+        table.add_row(name, *(ratio_text(by_measure[measure]) for measure in found["measures"]))
+    table.caption = (
+        "in brackets 90 % intervals over draws of the windows; ≥: better than every rival; ≤: worse than every rival"
+    )
+    return [table]
 
 
 def ratio_text(ratio: Mapping[str, Any]) -> str:
-    """A ratio with its kind: ``≥ 3.12``."""
-    return SIGNS[ratio["kind"]] + _number_text(ratio["times"])
+    """A ratio with its kind and interval: ``≥ 3.12 [2.90, 3.40]``."""
+    low, high = number_text(ratio["low"]), number_text(ratio["high"])
+    return f"{SIGNS[ratio['kind']]}{number_text(ratio['times'])} [{low}, {high}]"
 
 
-def score_text(score: float | None) -> str:
-    """A score in about three digits."""
-    return "identical" if score is None else _number_text(score)
+def score_text(measure: str, values: list[float]) -> str:
+    """The score of windows together in about three digits."""
+    quality = QUALITIES[measure]
+    if quality.error(values) <= LEAST_ERROR:
+        return "none found"
+    return number_text(quality.score(values))
 
 
-def _number_text(value: float) -> str:
-    """A positive number in three digits, without an exponent."""
-    digits = 0 if value >= 100.0 else 1 if value >= 10.0 else 2 if value >= 1.0 else 3 if value >= 0.1 else 4
+def number_text(value: float) -> str:
+    """A number in three digits, without an exponent."""
+    size = abs(value)
+    digits = 0 if size >= 100.0 else 1 if size >= 10.0 else 2 if size >= 1.0 else 3 if size >= 0.1 else 4
     return f"{value:.{digits}f}"
 
 

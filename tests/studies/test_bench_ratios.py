@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from studies.bench.__main__ import missed
-from studies.bench.ratios import Point, cost_at, front, ratio_at, ratio_over, ratios
+from studies.bench.measures import QUALITIES
+from studies.bench.ratios import Point, cost_at, front, mean_ratio, ratios
 
 # Monte Carlo: four times the paths, half the error.
-BASELINE = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
+RIVALS = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
 
 
 def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
@@ -17,89 +17,65 @@ def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
 
 
 def test_between_points_both_axes_are_logarithmic():
-    cost, kind = cost_at(BASELINE, 0.1 * math.sqrt(2.0))
+    cost, kind = cost_at(RIVALS, 0.1 * math.sqrt(2.0))
     assert cost == pytest.approx(80.0)
     assert kind == "equal"
-    assert cost_at(BASELINE, 0.5) == (10.0, "at most")
-    assert cost_at(BASELINE, 0.05) == (160.0, "at least")
+    assert cost_at(RIVALS, 0.5) == (10.0, "at most")
+    assert cost_at(RIVALS, 0.05) == (160.0, "at least")
 
 
-@pytest.mark.parametrize(
-    ("decoupled", "times", "least", "kind"),
-    [
-        ([Point(p.cpu_s / 5.0, p.error) for p in BASELINE], 5.0, 5.0, "equal"),
-        ([Point(5.0, 0.4), Point(320.0, 0.1)], 1.0, 0.5, "equal"),  # curves that cross
-        ([Point(8.0, 0.05), Point(16.0, 0.02)], 20.0, 20.0, "at least"),  # no quality in common
-        ([Point(1.0, 0.9), Point(2.0, 0.8)], 5.0, 5.0, "at most"),
-        ([Point(1.0, 0.0)], 160.0, 160.0, "at least"),  # identical sequences
-    ],
-)
-def test_ratios_over_common_qualities(decoupled, times, least, kind):
-    ratio = ratio_over(BASELINE, decoupled)
-    assert ratio.times == pytest.approx(times)
-    assert ratio.least == pytest.approx(least)
-    assert ratio.kind == kind
+def row(name, family, cpu_s, flip):
+    return {"name": name, "family": family, "cost": {"cpu_s": cpu_s}, "values": {"flip": flip}}
 
 
-def test_against_one_rival_a_margin_counts():
-    decoupled = [Point(1.0, 0.4), Point(4.0, 0.2)]
-    assert ratio_at(BASELINE[2], decoupled).kind == "at most"
-    near = ratio_at(BASELINE[2], decoupled, margin=0.1)
-    assert (near.kind, near.times) == ("equal", pytest.approx(40.0))
-    assert ratio_at(BASELINE[2], decoupled, margin=0.5).kind == "at least"
-
-
-def row(name, family, cpu_s, jnd, psnr_db):
-    return {"name": name, "family": family, "cost": {"cpu_s": cpu_s}, "scores": {"aqm": jnd, "psnr": psnr_db}}
-
-
-def test_ratios_of_synthetic_configurations():
-    rows = [
-        row("traced-256", "traced", 100.0, 1.0, 40.0),
-        row("denoised-4", "denoised", 20.0, 1.0, 40.0),
-        row("paper-64", "paper", 30.0, 2.0, 30.0),
-        row("decoupled-a", "decoupled", 5.0, 1.05, 40.0),
-        row("decoupled-b", "decoupled", 10.0, 0.5, 50.0),
+def rivals():
+    return [
+        row("denoised-2", "denoised", 10.0, [0.4, 0.4]),
+        row("denoised-8", "denoised", 40.0, [0.2, 0.2]),
+        row("traced-64", "traced", 400.0, [0.3, 0.3]),
     ]
-    found = ratios(rows, ["aqm", "psnr"])
-    # Within 0.1 JND of its score the cheapest is good enough; PSNR has no margin.
-    assert found["traced"]["traced-256"]["aqm"] == {"times": 20.0, "least": 20.0, "kind": "at least"}
-    assert found["traced"]["traced-256"]["psnr"]["times"] == pytest.approx(20.0)
-    assert found["paper"] == {"paper-64": ["decoupled-a", "decoupled-b"]}
-    both = [found["denoised"]["by_measure"][name]["times"] for name in ("aqm", "psnr")]
-    assert both[1] == pytest.approx(4.0)
-    assert found["denoised"]["geometric_mean"] == pytest.approx(math.sqrt(both[0] * both[1]))
-    assert ratios(rows[:1], ["aqm"]) == {"traced": {}, "denoised": {}, "paper": {}}
 
 
 @pytest.mark.parametrize(
-    ("jnd", "psnr_db", "kind"),
+    ("cpu_s", "flip", "times", "kind"),
     [
-        (1.0, 40.0, "equal"),
-        (1.0, 50.0, "at least"),
-        (2.0, 40.0, "at most"),
-        (0.5, 50.0, "at least"),
-        (0.5, 30.0, None),
+        (5.0, 0.2, 8.0, "equal"),
+        (5.0, 0.1, 8.0, "at least"),
+        (5.0, 0.5, 2.0, "at most"),
+        (10.0, 0.2 * math.sqrt(2.0), 2.0, "equal"),
     ],
 )
-def test_a_mean_is_a_bound_where_a_ratio_is_one(jnd, psnr_db, kind):
-    rows = [row("denoised-4", "denoised", 20.0, 1.0, 40.0), row("a", "decoupled", 5.0, jnd, psnr_db)]
-    assert ratios(rows, ["aqm", "psnr"])["denoised"]["kind"] == kind
+def test_the_strongest_rival_counts_whatever_its_family(cpu_s, flip, times, kind):
+    found = ratios([*rivals(), row("decoupled-15", "decoupled", cpu_s, [flip, flip])], ["flip"])
+    assert list(found) == ["decoupled-15"]
+    assert found["decoupled-15"]["flip"]["times"] == pytest.approx(times)
+    assert found["decoupled-15"]["flip"]["kind"] == kind
 
 
-@pytest.mark.parametrize(
-    ("mean", "kind", "is_met"),
-    [
-        (3.5, "equal", True),
-        (3.5, "at least", True),
-        (3.5, "at most", False),
-        (3.5, None, False),
-        (2.5, "at least", False),
-    ],
-)
-def test_a_mean_that_is_only_bounded_from_above_meets_nothing(mean, kind, is_met):
-    many = {"times": 40.0, "least": 40.0, "kind": "equal"}
-    denoised = {"by_measure": {"aqm": many}, "geometric_mean": mean, "kind": kind, "least": 40.0}
-    found = missed("room", {"traced": {"traced-256": {"aqm": many}}, "denoised": denoised, "paper": {}})
-    assert len(found) == (0 if is_met else 1)
-    assert all("3 times less CPU time than denoised" in text for text in found)
+def test_windows_that_agree_have_no_interval_and_others_enclose_the_ratio():
+    same = ratios([*rivals(), row("a", "decoupled", 5.0, [0.3, 0.3])], ["flip"])["a"]["flip"]
+    assert same["low"] == pytest.approx(same["times"])
+    assert same["high"] == pytest.approx(same["times"])
+    mixed = ratios([*rivals(), row("a", "paper", 5.0, [0.22, 0.38])], ["flip"])["a"]["flip"]
+    assert mixed["low"] < mixed["times"] < mixed["high"]
+    assert mixed["times"] == pytest.approx(same["times"])
+    assert ratios(rivals(), ["flip"]) == {}
+    assert ratios([row("a", "decoupled", 5.0, [0.3])], ["flip"]) == {}
+
+
+def test_errors_of_scores():
+    """Averages are of JOD and of squared errors, not of decibels."""
+    assert QUALITIES["cvvdp"].error([9.0, 8.0]) == pytest.approx(1.5)
+    assert QUALITIES["cvvdp"].score([9.0, 8.0]) == pytest.approx(8.5)
+    assert QUALITIES["psnr"].score([1e-2, 3e-2]) == pytest.approx(-10.0 * math.log10(2e-2))
+    assert QUALITIES["psnr"].error([1e-6, -2e-6]) == pytest.approx(1e-6)  # within the noise: the least error
+
+
+def test_means_over_scenes():
+    one = {"times": 2.0, "kind": "equal", "low": 1.0, "high": 3.0}
+    found = mean_ratio([one, one | {"times": 0.5}])
+    assert found["times"] == pytest.approx(1.0)
+    assert found["kind"] == "equal"
+    assert (found["low"], found["high"]) == (pytest.approx(0.5), pytest.approx(2.0))
+    assert mean_ratio([one, one | {"kind": "at least"}])["kind"] == "at least"
+    assert mean_ratio([one | {"kind": "at most"}, one | {"kind": "at least"}])["kind"] is None

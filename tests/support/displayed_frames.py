@@ -8,7 +8,7 @@ from enfilade.comparison.measures import display_pair
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import Flow
 from enfilade.viewing import Viewing
-from studies.bench.measures import TrackedPair
+from studies.bench.measures import WindowPair
 
 HEIGHT, WIDTH = 48, 64
 VIEWING = Viewing(WIDTH, HEIGHT, diagonal_m=0.025)  # 28 pixels per degree
@@ -28,13 +28,17 @@ def noise(seed: int, size: float) -> np.ndarray:
 
 def pair(
     test: np.ndarray, reference: np.ndarray, *, shift: float = 0.0, is_first: bool = False
-) -> TrackedPair:
+) -> WindowPair:
     """Encoded images as a measure sees them; the surfaces move by `shift` pixels a frame."""
     backward = np.zeros((HEIGHT, WIDTH, 2), np.float32)
     backward[..., 0] = -shift
-    x = np.broadcast_to(np.arange(WIDTH) - shift, (HEIGHT, WIDTH))
-    seen = (x >= 0.0) & (x <= WIDTH - 1)
     flow = Flow(np.zeros_like(backward) if is_first else backward, -backward, not is_first, True)
-    shown = display_pair(srgb_decode(test), srgb_decode(reference), VIEWING)
-    halves = shown.reference, shown.reference
-    return TrackedPair(**vars(shown), flow=flow, visible_before=None if is_first else seen, halves=halves)
+    linear, wanted = (srgb_decode(image).astype(np.float32) for image in (test, reference))
+    shown = display_pair(linear, wanted, VIEWING)
+    return WindowPair(
+        **vars(shown),
+        linear=linear,
+        linear_halves=(wanted, wanted),
+        halves=(shown.reference, shown.reference),
+        flow=flow,
+    )

@@ -1,0 +1,69 @@
+"""ColorVideoVDP (Mantiuk et al. 2024) in a Python environment of its own, which `make judge` sets up."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from enfilade.comparison.measures import DisplayedPair
+from enfilade.errors import EnfiladeError
+from enfilade.viewing import Viewing
+
+HERE = Path(__file__).resolve().parent
+ENVIRONMENT = HERE.parents[2] / ".venv-judge"
+LEAST_BLACK_CD_M2 = 1e-3  # ColorVideoVDP takes a contrast, which must be finite
+
+
+def why_missing() -> str:
+    """Reason why ColorVideoVDP is not available, with the remedy; empty where it is."""
+    return "" if (ENVIRONMENT / ".ready").is_file() else "ColorVideoVDP is left out; set it up with: make judge"
+
+
+def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) -> list[float]:
+    """ColorVideoVDP of sequences of one size and length, on one thread.
+
+    Parameters
+    ----------
+    sequences
+        Frames of each sequence in order.
+    viewing
+        Viewing conditions.
+
+    Returns
+    -------
+    list of float
+        JOD of each sequence, 10 where no difference is seen.
+
+    Raises
+    ------
+    EnfiladeError
+        Its process failed; the message has its last words.
+    """
+    stacks = {
+        name: np.stack([[getattr(pair, name).astype(np.float16) for pair in pairs] for pairs in sequences])
+        for name in ("test", "reference")
+    }
+    with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
+        file = Path(scratch) / "pairs.npz"
+        np.savez(
+            file,
+            **stacks,
+            fps=viewing.fps,
+            ppd=viewing.pixels_per_degree,
+            peak_cd_m2=viewing.peak_cd_m2,
+            contrast=viewing.peak_cd_m2 / max(viewing.black_cd_m2, LEAST_BLACK_CD_M2),
+        )
+        command = [str(ENVIRONMENT / "bin" / "python"), "-I", "-W", "ignore", str(HERE / "predict.py"), str(file)]
+        limits = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **limits})
+    if done.returncode:
+        last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+        raise EnfiladeError(f"ColorVideoVDP failed: {last[0]}; set it up again with: make judge")
+    scores: list[float] = json.loads(done.stdout.splitlines()[-1])
+    return scores

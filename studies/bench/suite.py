@@ -1,0 +1,139 @@
+"""The bench on several scenes and sizes: scenes, frames and configurations of each."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from enfilade.camera import load_path
+from enfilade.errors import EnfiladeError, SceneError
+from studies.bench.camps import camp_of
+from studies.bench.ratios import mean_ratio
+from studies.scenes import SCENES
+
+PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
+FIRST_FRAME = 11  # where the path is long enough
+LARGE_PX = 500_000  # from this size on, few configurations
+SMALL = (
+    *(f"denoised-{spp}" for spp in (2, 4, 8, 16)), "denoised-4-fast", "denoised-8-fast",
+    "denoised-4-accumulated-after", "denoised-8-accumulated-after", "paper-16", "decoupled-*",
+)  # fmt: skip
+LARGE = ("denoised-4", "denoised-8", "denoised-4-accumulated-after", "decoupled-60", "decoupled-15")
+QUICK = ("denoised-2", "denoised-4", "denoised-8", "decoupled-60", "decoupled-15")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene with its path.
+
+    Attributes
+    ----------
+    name : str
+    scene, path : Path
+    """
+
+    name: str
+    scene: Path
+    path: Path
+
+
+def generated(names: Iterable[str], size: str, folder: Path) -> list[Case]:
+    """Write generated scenes (preset small) with paths for images of a size."""
+    cases = []
+    for name in names:
+        files = folder / f"{name}-{size}"
+        command = ["scene", name, "--preset", "small", "--size", size, "--out", str(files)]
+        subprocess.run([sys.executable, "-m", "studies", *command], check=True, stdout=subprocess.DEVNULL)
+        cases.append(Case(name, files / "scene.xml", files / "camera_path.json"))
+    return cases
+
+
+def found_in(folder: Path) -> list[Case]:
+    """Scenes of a folder: subfolders with `camera_path.json`, and `scene.xml` beside it or one level below.
+
+    Raises
+    ------
+    SceneError
+        There is none, or a subfolder has several.
+    """
+    cases = []
+    for path in sorted(folder.glob("*/camera_path.json")):
+        home = path.parent
+        scenes = [home / "scene.xml"] if (home / "scene.xml").is_file() else sorted(home.glob("*/scene.xml"))
+        if len(scenes) != 1:
+            raise SceneError(f"{home} has {len(scenes)} files scene.xml; it must have one")
+        cases.append(Case(home.name, scenes[0], path))
+    if not cases:
+        raise SceneError(f"{folder} has no subfolder with camera_path.json and scene.xml")
+    return cases
+
+
+def run_case(case: Case, size: str, frames: int, only: Iterable[str], out: Path, options: list[str]) -> dict[str, Any]:
+    """Run or continue the bench of a scene in a process of its own; return its results.
+
+    Raises
+    ------
+    EnfiladeError
+        It failed; its message is on the screen.
+    """
+    width, height = map(int, size.split("x"))
+    length = len(load_path(case.path, size=None, frames=None, fps=None))
+    last = min(FIRST_FRAME + frames - 1, length)
+    folder = out / f"{case.name}-{size}"
+    command = [
+        sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path), "--out", str(folder),
+        "--size", size, "--frames", f"{max(last - frames + 1, 1)}-{last}",
+        "--set", f"viewing.diagonal_m={math.hypot(width, height) * PIXEL_M}",
+        *(word for pattern in only for word in ("--only", pattern)), *options,
+    ]  # fmt: skip
+    if subprocess.run(command, check=False).returncode:
+        raise EnfiladeError(f"the bench of {case.name} at {size} failed; the same command continues")
+    found: dict[str, Any] = json.loads((folder / "bench.json").read_text())
+    return found | {"scene": case.name, "camp": camp_of(case.name)}
+
+
+def only_for(size: str, *, is_quick: bool) -> tuple[str, ...]:
+    """Configurations of a size."""
+    width, height = map(int, size.split("x"))
+    if is_quick:
+        return QUICK
+    return LARGE if width * height >= LARGE_PX else SMALL
+
+
+def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Geometric means of the ratios over the scenes of a size and camp, by configuration.
+
+    Returns
+    -------
+    list of dict
+        ``size``, ``camp``, ``configuration``, ``scenes`` and ``ratios`` by measure, as `ratios.mean_ratio`.
+    """
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for found in benches:
+        size = "x".join(map(str, found["size"]))
+        for name, by_measure in found["ratios"].items():
+            groups.setdefault((size, found["camp"], name), []).append({"scene": found["scene"], **by_measure})
+    return [
+        {
+            "size": size,
+            "camp": camp,
+            "configuration": name,
+            "scenes": [one["scene"] for one in members],
+            "ratios": {
+                measure: mean_ratio([one[measure] for one in members])
+                for measure in members[0]
+                if measure != "scene" and all(measure in one for one in members)
+            },
+        }
+        for (size, camp, name), members in sorted(groups.items())
+    ]
+
+
+GENERATED = SCENES
+QUICK_SCENES = ("room", "gallery")  # one of each camp

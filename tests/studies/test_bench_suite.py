@@ -1,0 +1,52 @@
+"""The bench on several scenes: their camps, those of a folder, and means over them."""
+
+import pytest
+
+from enfilade.errors import SceneError
+from studies.bench.camps import camp_of, camps
+from studies.bench.configurations import all_configurations, selected
+from studies.bench.suite import GENERATED, LARGE, QUICK, QUICK_SCENES, SMALL, found_in, only_for, summary
+from support.study_runs import room_job
+
+
+def test_every_generated_scene_is_in_one_camp():
+    assert set(camps()) == {"tuning", "held-out"}
+    assert not camps()["tuning"].keys() & camps()["held-out"].keys()
+    assert all(camp_of(name) != "not listed" for name in GENERATED)
+    assert {camp_of(name) for name in QUICK_SCENES} == {"tuning", "held-out"}
+    assert (camp_of("room"), camp_of("gallery"), camp_of("my house")) == ("tuning", "held-out", "not listed")
+
+
+def test_scenes_of_a_folder(tmp_path):
+    for scene in ("a/scene.xml", "b/mitsuba/scene.xml"):
+        (tmp_path / scene).parent.mkdir(parents=True)
+        (tmp_path / scene).touch()
+        (tmp_path / scene[0] / "camera_path.json").touch()
+    (tmp_path / "notes").mkdir()
+    found = found_in(tmp_path)
+    assert [(case.name, case.scene.parent.name) for case in found] == [("a", "a"), ("b", "mitsuba")]
+    (tmp_path / "a" / "scene.xml").unlink()
+    with pytest.raises(SceneError, match=r"a has 0 files scene.xml"):
+        found_in(tmp_path)
+    with pytest.raises(SceneError, match="no subfolder with camera_path.json"):
+        found_in(tmp_path / "notes")
+
+
+def test_configurations_of_the_suite_exist(tmp_path):
+    known = all_configurations(room_job(tmp_path, 2), traced=(4,), denoised=(1, 2, 4, 8, 16, 32))
+    for patterns in (SMALL, LARGE, QUICK):
+        assert len(selected(known, patterns)) >= len(patterns)
+    assert only_for("320x180", is_quick=False) == SMALL
+    assert only_for("1280x720", is_quick=False) == LARGE
+    assert only_for("1280x720", is_quick=True) == QUICK
+
+
+def test_the_summary_has_a_mean_for_each_size_camp_and_configuration():
+    def bench(scene, camp, times):
+        ratio = {"times": times, "kind": "equal", "low": times, "high": times}
+        return {"size": [320, 180], "scene": scene, "camp": camp, "ratios": {"decoupled-15": {"flip": ratio}}}
+
+    found = summary([bench("room", "tuning", 4.0), bench("a", "held-out", 2.0), bench("b", "held-out", 0.5)])
+    assert [(one["camp"], one["scenes"]) for one in found] == [("held-out", ["a", "b"]), ("tuning", ["room"])]
+    assert found[0]["ratios"]["flip"]["times"] == pytest.approx(1.0)
+    assert found[1]["ratios"]["flip"]["times"] == pytest.approx(4.0)
