@@ -2,8 +2,10 @@
 
 A reference is traced at :data:`SUBPIXELS` x :data:`SUBPIXELS` subpixels of each pixel. The mean over a pixel's
 subpixels is the box filter's value; a weighted sum over those within the Gaussian filter's radius is the Gaussian
-filter's. So the same paths serve both filters. The Gaussian's weights are constant over a subpixel, which changes
-the response to an edge by 0.7 % of its contrast at most.
+filter's. So the same paths serve both filters. A Gaussian pixel shares subpixels with its neighbours, and would
+have the noise of 3.1 times as many paths: it gets fewer of them, so that both filters have the same noise. The
+Gaussian's weights are constant over a subpixel, which changes the response to an edge by 0.7 % of its contrast at
+most.
 
 ::
 
@@ -17,7 +19,8 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +43,7 @@ from studies.bench.windows import Window
 
 SUBPIXELS = 4  # along each axis
 BATCH = 256  # paths a pixel of a half that are traced together, with random numbers of their own
+SHARED_SPP = 5  # paths a subpixel in a batch that the Gaussian filter uses: its noise is then that of 251 paths
 SEED = 0x9E3779B9  # of the first batch; the next ones follow
 REACH = int(GAUSSIAN_RADIUS_PX * SUBPIXELS) - SUBPIXELS // 2  # subpixels of the filter beyond the pixel
 FILTERS = (SampleFilter.BOX, SampleFilter.GAUSSIAN)
@@ -52,8 +56,7 @@ class ReferenceFrame:
     Attributes
     ----------
     spp : int
-        Paths a pixel of both halves together, by the box filter. The Gaussian filter uses those of its
-        neighbours, too: its noise is that of 3.1 times as many.
+        Paths a pixel of both halves together.
     halves : mapping of SampleFilter to (2, K, S, S, 3) float32
         Linear radiance of each half in K windows of S x S pixels.
     flows : list of Flow
@@ -158,16 +161,20 @@ class References:
                 for w in self._windows
             ]
         )
-        traced = walk.renderer.trace(
-            fine,
-            pixels.ravel().astype(np.uint32),
-            RandomKey((self._seed + batch) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE),
-            spp=BATCH // SUBPIXELS**2,
-            pixel_filter=PixelFilter.BOX,
+        counts = SHARED_SPP, BATCH // SUBPIXELS**2 - SHARED_SPP
+        shared, rest = (
+            walk.renderer.trace(
+                fine,
+                pixels.ravel().astype(np.uint32),
+                RandomKey((self._seed + 2 * batch + part) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE),
+                spp=spp,
+                pixel_filter=PixelFilter.BOX,
+            ).color.reshape(len(self._windows), side, side, 3)
+            for part, spp in enumerate(counts)
         )
-        samples = traced.color.reshape(len(self._windows), side, side, 3)
+        whole = (counts[0] * shared + counts[1] * rest) / np.float32(sum(counts))
         found = {}
-        for kind in FILTERS:
+        for kind, samples in ((SampleFilter.BOX, whole), (SampleFilter.GAUSSIAN, shared)):
             weights = _weights(kind, self._windows[0].side)
             image = np.einsum("ia,kabc,jb->kijc", weights, samples, weights, optimize=True)
             found[kind] = image.astype(np.float32)
@@ -214,8 +221,10 @@ def _digest(key: Any) -> str:
     return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _opened(file: Path) -> Any:
+@contextmanager
+def _opened(file: Path) -> Iterator[Any]:
     try:
-        return np.load(file)
+        with file.open("rb") as stream, np.load(stream) as arrays:
+            yield arrays
     except (OSError, ValueError, BadZipFile) as error:
         raise InputError(f"the reference {file} is missing or damaged ({error}): delete it, and run again") from error
