@@ -182,7 +182,7 @@ def compare(
         motion.kind,
         scores=comparer.scores(),
         noise_floor=comparer.noise_floor(),
-        noise_estimate=None if second_reference is not None else comparer.noise.estimate(),
+        noise_estimate=None if motion.kind == "none" else comparer.noise.estimate(),
     )
 
 

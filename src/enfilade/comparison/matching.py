@@ -147,7 +147,8 @@ def common_exposure_ev(one: Side, other: Side) -> float | None:
     if a.exposure_ev is not None and b.exposure_ev is not None and a.exposure_ev != b.exposure_ev:
         raise ImageError(
             f"the {one.role}'s run is shown at {a.exposure_ev:+g} stops ({a.name(0)}) and the "
-            f"{other.role}'s at {b.exposure_ev:+g} ({b.name(0)}); say with --exposure-ev at which both are shown"
+            f"{other.role}'s at {b.exposure_ev:+g} ({b.name(0)}); say with --exposure-ev at which both are "
+            "shown"
         )
     return b.exposure_ev if a.exposure_ev is None else a.exposure_ev
 

@@ -1,13 +1,14 @@
 """Estimate of the Monte Carlo noise of a reference from its images (after Immerkaer 1996).
 
 The difference of two Laplacians removes smooth shading. Its median absolute value in a block of 8x8 pixels
-gives the standard deviation of white noise. Texture gives one, too, and is told from noise twice:
+gives the standard deviation of white noise. Texture has one, too. Two properties distinguish noise:
 
-* in an image of half the size white noise has half the deviation, while texture has about the same, since its
+* in an image of half the size white noise has half the deviation. Texture has about the same, since its
   energy falls with frequency;
-* along the motion of the image texture is correlated from frame to frame, and noise is not.
+* noise of consecutive frames is independent. Texture is correlated along the motion of the image.
 
-Noise that a denoiser or a video encoder has smoothed is not found.
+Not found is noise that a denoiser or a video encoder has smoothed, noise that is the same in all frames, and
+noise of a single image.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ LEAST_BLOCKS = 16  # that are not constant: fewer can't be told from texture
 LEAST_SIGMA = 1e-3  # encoded: a block below is constant, or holds the rounding to 8 bits
 LEAST_SHARE = 0.55  # of blocks that look noisy; texture: at most 0.50, path tracing: at least 0.58
 MOST_CORRELATION = 0.15  # from frame to frame; texture: most above 0.25, path tracing: at most 0.08
-MOST_FRAMES = 4  # that are looked at, evenly spread
+MOST_FRAMES = 4  # evenly spread
 
 
 class NoiseEstimator:
-    """Looks at a few frames of a reference.
+    """Estimates the noise of a reference from up to four of its frames.
 
     Parameters
     ----------
@@ -59,7 +60,9 @@ class NoiseEstimator:
         self._found: list[tuple[float, float]] = []
 
     def add(self, pair: Pair, motion: Moved, velocity: F32 | None) -> None:
-        """Look at the next frame.
+        """Take the next frame.
+
+        A frame without a previous one in its shot, or equal to it (a repeated pose), is skipped.
 
         Parameters
         ----------
@@ -72,13 +75,16 @@ class NoiseEstimator:
         if not {pair.index, pair.index + 1} & self._chosen:
             return
         image = srgb_encode(pair.reference_relative).astype(np.float32)
-        if pair.index in self._chosen:
-            sigma = noise_sigma(image, None if motion.is_cut else self._last, motion.backward)
+        last, self._last = self._last, image
+        is_first = last is None or motion.is_cut or np.array_equal(image, last)
+        if pair.index in self._chosen and not is_first:
+            sigma = noise_sigma(image, last, motion.backward)
             self._found.append((sigma, self._score(pair, image, sigma, velocity) if sigma else 0.0))
-        self._last = image
 
-    def estimate(self) -> NoiseEstimate:
-        """The noise of the frames so far."""
+    def estimate(self) -> NoiseEstimate | None:
+        """The noise of the frames so far; None where none had a previous one."""
+        if not self._found:
+            return None
         sigmas, scores = zip(*self._found, strict=True)
         return NoiseEstimate(float(np.sqrt(np.mean(np.square(sigmas)))), sequence_score(scores), len(scores))
 
@@ -97,17 +103,17 @@ class NoiseEstimator:
         return np.float32(sigma) * self._random.standard_normal(image.shape, np.float32)
 
 
-def noise_sigma(image: F32, last: F32 | None, backward_px: F32 | None) -> float:
+def noise_sigma(image: F32, last: F32, backward_px: F32 | None) -> float:
     """Standard deviation of the noise of an image; 0 where nothing looks like noise.
 
     Parameters
     ----------
     image : (H, W) float32
         sRGB-encoded, 0..1.
-    last : (H, W) float32 or None
-        The last frame; None: there is none, and texture is told from noise by its spectrum alone.
+    last : (H, W) float32
+        The previous frame.
     backward_px : (H, W, 2) float32 or None
-        From each pixel to its place in the last frame; None: nothing moves.
+        From each pixel to its place in the previous frame; None: nothing moves.
 
     Returns
     -------
@@ -128,14 +134,12 @@ def noise_sigma(image: F32, last: F32 | None, backward_px: F32 | None) -> float:
     count = np.count_nonzero(is_varied)
     if count < LEAST_BLOCKS or np.count_nonzero(is_noisy) < LEAST_SHARE * count:
         return 0.0
-    if last is not None:
-        before = convolve(last, MASK)
-        if backward_px is not None:
-            before = moved(before, np.rint(backward_px))[0]
-        # Median, since a few blocks of strong texture would decide a mean.
-        correlation = _correlation(fine, _blocks(before, BLOCK_PX)[:rows, :columns])
-        if np.median(correlation[is_noisy]) > MOST_CORRELATION:
-            return 0.0
+    before = convolve(last, MASK)
+    if backward_px is not None:  # whole pixels: interpolation would smooth noise
+        before = moved(before, np.rint(backward_px))[0]
+    correlation = _correlation(fine, _blocks(before, BLOCK_PX)[:rows, :columns])
+    if np.median(correlation[is_noisy]) > MOST_CORRELATION:
+        return 0.0
     return math.sqrt(np.median(variance[is_varied]))
 
 
