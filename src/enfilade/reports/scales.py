@@ -75,5 +75,5 @@ DIFFERENCE = Scale(  # percent of white; Matplotlib's inferno
 )
 VISIBLE = Scale(  # JND; path tracing with a few paths a pixel exceeds 32
     1.0,
-    {0: "1a33b3", 1: "9429c7", 3: "db4075", 8: "f57833", 16: "fcba29", 32: "fff36b", 64: "ffffff"},
+    {0: "1a33b3", 1: "9429c7", 3: "db4075", 8: "f57833", 16: "fcba29", 32: "fff000", 64: "ffffff"},
 )
