@@ -101,8 +101,7 @@ def test_a_noisy_reference_is_reported_with_a_remedy(sequence):
 
 
 def test_noise_that_hardly_matters_is_not_mentioned(sequence):
-    reference = sequence("noisy", frames_with(0.001, 2))
-    far = sequence("far", [image * np.float32(0.3) for image in frames_with(0.0, 1)])
+    reference, far = sequence("noisy", frames_with(0.005, 2)), sequence("far", frames_with(0.1, 1))
     found = compared(far, reference, flow="estimate")
     assert 0.0 < found.noise_estimate.score < found.score / 3.0
     assert found.noise_note == ""

@@ -21,9 +21,9 @@ __all__ = ["contents"]
 
 SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "square": "□", "circle": "●"}  # of series
 VERDICTS = {  # of the noise floor
-    "above": "stands out from it",
+    "above": "above it",
     "undecided": "undecided",
-    "below": "explained by noise",
+    "below": "explained by this noise",
 }
 REASONS = (
     "Slow pixels move slowly, so that errors would be noticed; specular pixels show a glossy, mirroring or "
@@ -140,24 +140,19 @@ def _difference(
     """Rows of the comparison with the reference: name, value, comment."""
     if found is None:
         return []
+    without = ", without the noise of the references" if found["noise_floor"] else ""
     rows = [
         ("frames compared", str(found["frames"]), "noise of the reference counts as a difference"),
         ("visible difference", f"{found['score_jnd']:.2f} JND", found["meaning"]),
         ("pixels above 1 JND", f"{percent(found['percent_visible']['mean'])} %", "mean over the frames"),
-        ("PSNR, dB", psnr_text(found), "sRGB-encoded values"),
+        ("PSNR", psnr_text(found), f"sRGB-encoded values{without}"),
         ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
     ]
     if floor := found["noise_floor"]:
         rows[0] = ("frames compared", str(found["frames"]), "with the mean of two references")
         visible = f"{percent(floor['percent_visible'])} % of pixels above 1 JND"
-        rows.insert(
-            2,
-            (
-                "noise floor",
-                f"{floor['score_jnd']:.2f} JND",
-                f"{visible}; score: {VERDICTS[floor['verdict']]}",
-            ),
-        )
+        verdict = f"{visible}; the score is {VERDICTS[floor['verdict']]}"
+        rows.insert(2, ("noise floor", f"{floor['score_jnd']:.2f} JND", verdict))
     if reference is not None and summary["video"] and reference["video"]:
         own, other = (of["time_s"]["cpu_s"] / of["frames"] for of in (summary, reference))
         rows += [
