@@ -7,7 +7,7 @@ from enfilade.cli.render import PATHS_PER_CPU_S
 
 @pytest.mark.parametrize(
     ("method", "options", "is_announced"),
-    [("reference", (), True), ("reference", ("--quiet",), False), ("decoupled", (), False)],
+    [("reference", (), True), ("reference", ("--quiet",), False), ("paper", (), False)],
 )
 def test_the_paths_of_a_reference_are_announced(
     run, jobs, scene, camera_path, tmp_path, method, options, is_announced

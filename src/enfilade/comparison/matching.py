@@ -18,9 +18,11 @@ __all__ = [
     "is_exr",
     "note_on_numbers",
     "note_on_paths",
+    "note_on_seeds",
 ]
 
 DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
+SEED = ("settings", "trace", "seed")  # in the identity of a run
 FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same
 
 
@@ -96,13 +98,32 @@ def note_on_paths(one: Side, other: Side) -> str:
     )
 
 
+def note_on_seeds(one: Side, other: Side) -> str:
+    """Remark on run folders of one method and seed, whose noise is not independent; else empty."""
+    methods, seeds = (
+        [_identity_of(side.source, *keys) for side in (one, other)] for keys in (("method", "name"), SEED)
+    )
+    if None in seeds or methods[0] != methods[1] or seeds[0] != seeds[1] or one.source == other.source:
+        return ""
+    return (
+        f"noise: {one.source} and {other.source} are of one method and --seed {seeds[0]}: their noise is "
+        "correlated, and they look more alike than they are; render one with another --seed"
+    )
+
+
 def _path_of(source: Path | str) -> dict[str, Any]:
     """The camera path as a run folder's ``run.json`` has it; nothing where there is none."""
+    found = _identity_of(source, "path")
+    return found if isinstance(found, dict) else {}
+
+
+def _identity_of(source: Path | str, *keys: str) -> Any:
+    """A part of the identity in a run folder's ``run.json``; None where there is none."""
     file = Path(source) / "run.json"
     found: Any = read_json(file) if file.is_file() else None
-    for key in ("identity", "path"):
+    for key in ("identity", *keys):
         found = found.get(key) if isinstance(found, dict) else None
-    return found if isinstance(found, dict) else {}
+    return found
 
 
 def note_on_numbers(one: Side, other: Side) -> str:

@@ -50,8 +50,9 @@ class NoiseFloor:
         Returns
         -------
         str
-            ``undecided`` where the distance from the floor is less than a third of the floor. ``below``: the
-            noise of the mean of both references alone explains such a score.
+            ``undecided`` where the distance from the floor is less than a third of the floor. A test without
+            any error is ``below``, at about half of the floor: the noise of the mean of both references has
+            half the deviation of their difference.
         """
         if abs(score - self.score) < MARGIN * self.score:
             return "undecided"
@@ -68,8 +69,8 @@ class NoiseFloor:
                 )
             case "below":
                 return (
-                    f"{floor}; the score of {score:.2f} JND is below that: noise of the references alone "
-                    "explains it"
+                    f"{floor}; the score of {score:.2f} JND is below that, where noise hides small errors: "
+                    "a test without any error scores about half of it"
                 )
             case _:
                 return f"{floor}; the score of {score:.2f} JND stands out from it"

@@ -19,6 +19,7 @@ from enfilade.comparison.matching import (
     is_exr,
     note_on_numbers,
     note_on_paths,
+    note_on_seeds,
 )
 from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import ImageError
@@ -135,7 +136,7 @@ class Pairs:
         known = [s.starts for s in self._sequences if s.starts is not None]
         self.starts = frozenset[int]().union(*known) if known else None
         pairing = (note_on_numbers(*couple) or note_on_paths(*couple) for couple in couples)
-        said = (*pairing, *(s.note for s in self._sequences))
+        said = (*pairing, *(note_on_seeds(*couple) for couple in couples), *(s.note for s in self._sequences))
         self.notes = tuple(dict.fromkeys(filter(None, said)))
         self._exposures_ev = [self.exposure_ev if is_exr(s) else 0.0 for s in self._sequences]
 

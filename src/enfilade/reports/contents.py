@@ -23,7 +23,7 @@ SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "squ
 VERDICTS = {  # of the noise floor
     "above": "above it",
     "undecided": "undecided",
-    "below": "explained by this noise",
+    "below": "below it; without any error it would be about half of it",
 }
 REASONS = (
     "Slow pixels move slowly, so that errors would be noticed; specular pixels show a glossy, mirroring or "
