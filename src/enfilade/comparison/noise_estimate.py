@@ -76,10 +76,10 @@ class NoiseEstimator:
             return
         image = srgb_encode(pair.reference_relative).astype(np.float32)
         last, self._last = self._last, image
-        is_first = last is None or motion.is_cut or np.array_equal(image, last)
-        if pair.index in self._chosen and not is_first:
-            sigma = noise_sigma(image, last, motion.backward)
-            self._found.append((sigma, self._score(pair, image, sigma, velocity) if sigma else 0.0))
+        if last is None or motion.is_cut or pair.index not in self._chosen or np.array_equal(image, last):
+            return
+        sigma = noise_sigma(image, last, motion.backward)
+        self._found.append((sigma, self._score(pair, image, sigma, velocity) if sigma else 0.0))
 
     def estimate(self) -> NoiseEstimate | None:
         """The noise of the frames so far; None where none had a previous one."""
