@@ -142,7 +142,7 @@ def test_examples_run(tmp_path: Path) -> None:
         [sys.executable, "examples.py"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert len(list((tmp_path / "runs").glob("*/video.mp4"))) == 4
+    assert len(list((tmp_path / "runs").glob("*/video.mp4"))) == 5
     assert "mean-error" in done.stdout
 
 

@@ -112,7 +112,12 @@ def plan(
 
 
 def compare(
-    test: File, reference: File, *, monitor: Monitor | None = None, **options: Any
+    test: File,
+    reference: File,
+    *,
+    second_reference: File | None = None,
+    monitor: Monitor | None = None,
+    **options: Any,
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
 
@@ -120,6 +125,9 @@ def compare(
     ----------
     test, reference
         Run folders, videos, folders of images, or patterns such as ``frames/%04d.exr``.
+    second_reference
+        The reference rendered with another seed: the test is compared with the mean of both, and the result
+        has their noise (``noise_floor``).
     monitor
     options
         Fields of :class:`enfilade.comparison.CompareOptions`.
@@ -136,10 +144,17 @@ def compare(
     from enfilade.comparison import CompareOptions
     from enfilade.comparison import compare as compare_sequences
 
-    return compare_sequences(test, reference, CompareOptions(**options), monitor or Silence())
+    chosen = CompareOptions(**options)
+    return compare_sequences(test, reference, chosen, monitor or Silence(), second_reference=second_reference)
 
 
-def report(run: File, *, reference: File | None = None, out: File | None = None) -> Path:
+def report(
+    run: File,
+    *,
+    reference: File | None = None,
+    second_reference: File | None = None,
+    out: File | None = None,
+) -> Path:
     """Write a finished or running run as one HTML page.
 
     Parameters
@@ -148,6 +163,8 @@ def report(run: File, *, reference: File | None = None, out: File | None = None)
         The run folder.
     reference
         Another run, or a sequence, of the same frames: adds the visible difference.
+    second_reference
+        As of :func:`compare`.
     out
         The page; by default ``report.html`` in the run folder.
 
@@ -158,12 +175,12 @@ def report(run: File, *, reference: File | None = None, out: File | None = None)
 
     Raises
     ------
-    RunFolderError, ImageError
+    RunFolderError, ImageError, SettingsError
     """
     activate("cpu")
     from enfilade.reports.page import write_report
 
-    return write_report(Path(run), reference=reference, out=out)
+    return write_report(Path(run), reference=reference, second_reference=second_reference, out=out)
 
 
 def _job(

@@ -18,11 +18,12 @@ from enfilade.viewing import DISPLAYS
 KEYS = {  # docs/metric.md
     "score_jnd", "meaning", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
     "worst_frame", "frames", "size", "fps", "pixels_per_degree", "distance_m", "peak_cd_m2", "black_cd_m2",
-    "persistence", "mode", "flow", "bands_cpd", "scores", "per_frame",
+    "persistence", "mode", "flow", "bands_cpd", "scores", "per_frame", "is_identical", "noise_floor",
+    "noise_estimate", "noise_note",
 }  # fmt: skip
 FRAME_KEYS = {
     "name", "number", "score_jnd", "steady_jnd", "transient_jnd", "percent_visible", "largest_jnd", "psnr_db",
-    "steady_bands_jnd", "transient_bands_jnd", "velocity_deg_s",
+    "steady_bands_jnd", "transient_bands_jnd", "velocity_deg_s", "is_identical",
 }  # fmt: skip
 FRAMES = 6
 

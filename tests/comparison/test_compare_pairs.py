@@ -1,5 +1,6 @@
 """What has to be alike, what is refused and by which name, and how little memory it takes."""
 
+import json
 import tracemalloc
 from fractions import Fraction
 
@@ -196,3 +197,21 @@ def _peak_bytes(sequences, flow):
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("method", "seed", "is_said"), [("reference", 0, True), ("reference", 1, False), ("decoupled", 0, False)]
+)
+def test_noise_of_one_seed_is_told(tmp_path, method, seed, is_said):
+    folders = []
+    for name, of_method, of_seed in (("t", "reference", 0), ("r", method, seed)):
+        folder = write_run(tmp_path / name, [textured()], [1])
+        run = json.loads((folder / "run.json").read_text())
+        run["identity"] |= {"method": {"name": of_method}, "settings": {"trace": {"seed": of_seed}}}
+        (folder / "run.json").write_text(json.dumps(run))
+        folders.append(folder)
+    notes = Notes()
+    compared(*folders, notes)
+    assert any("are of one method and --seed 0" in text for text in notes.said) == is_said
+    compared(folders[0], folders[0], itself := Notes())
+    assert not any("--seed" in text for text in itself.said)

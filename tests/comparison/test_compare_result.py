@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from enfilade.comparison import psnr_db
@@ -11,12 +12,30 @@ from support.sequences import compared, textured
 
 
 def test_meaning_grows_with_the_score():
-    words = [words_of(score) for score in (0.0, 1e-9, 0.25, 0.5, 1.0, 2.0, 3.0, 3.1, 100.0)]
-    assert words[0] == "identical"
-    assert words[1] == words[2] == "next to none overall"
-    assert words[5] == words[6]
-    assert words[7] == words[8] == "strong overall"
-    assert len(dict.fromkeys(words)) == 6
+    steps = (0.0, 0.1, 0.5, 1.0, 2.0, 3.1, 8.1, 16.1, 32.1)
+    words = [words_of(score) for score in steps]
+    assert len(dict.fromkeys(words)) == len(steps)
+    assert words_of(0.0049) == words[0]  # printed as 0.00
+    assert words_of(3.0) == words[4] == "obvious overall"
+    assert words_of(1000.0) == words[-1] == "extreme overall"
+
+
+def test_only_equal_pixels_are_identical(sequence):
+    good = textured()
+    same, brighter, hue = good.copy(), good.copy(), good.copy()
+    good[:8, :8], same[:8, :8], brighter[:8, :8] = 2.0, 2.0, 3.0  # white on the display, and beyond
+    hue[..., 2] += np.float32(1e-4)
+    reference = sequence("good", [good])
+    found = {
+        name: compared(sequence(name, [image]), reference).to_dict()
+        for name, image in (("same", same), ("brighter", brighter), ("hue", hue))
+    }
+    assert (found["same"]["meaning"], found["same"]["is_identical"]) == ("identical", True)
+    assert found["brighter"]["score_jnd"] == 0.0
+    assert found["brighter"]["psnr_db"] is None
+    for name in ("brighter", "hue"):
+        assert "identical" not in found[name]["meaning"].removeprefix("not identical")
+        assert not found[name]["is_identical"]
 
 
 def test_a_plain_spot_in_one_of_many_frames_is_named(sequence):

@@ -103,6 +103,21 @@ def test_the_score_is_that_of_compare(runs, page_file):
     assert f"{found['psnr_db']:.2f} dB" in text
 
 
+def test_a_second_reference_adds_the_noise_floor(runs, copied, tmp_path):
+    second = synthetic_run(tmp_path / "second", noise=0.02)
+    sources = {"reference": runs / "reference", "second_reference": second}
+    _, text, data = written(copied, tmp_path, **sources)
+    found = enfilade.compare(copied, runs / "reference", second_reference=second).to_dict()
+    floor = found["noise_floor"]
+    drawn = series_of(text, data)["quality"]["noise floor: reference against reference"]
+    assert drawn == pytest.approx(floor["per_frame_jnd"], abs=1e-3)
+    assert f"{floor['score_jnd']:.2f} JND" in text
+    assert found["noise_note"].removeprefix("reference noise: ") in text
+    assert str(second) in text
+    with pytest.raises(SettingsError, match="--second-reference is given alone"):
+        written(copied, tmp_path, second_reference=second)
+
+
 def test_the_pictures_are_those_of_the_files(runs, page_file):
     data = data_of(page_file.read_text())
     layers, other = (read_exr(runs / name / "frames" / "0004.exr") for name in ("run", "reference"))

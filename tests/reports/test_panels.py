@@ -71,7 +71,8 @@ def test_time_by_pass_without_analysis_and_video():
 
 
 def test_quality_and_plan():
-    panel = quality_panel({"per_frame": [{"number": 7, "score_jnd": 0.4}, {"number": 9, "score_jnd": 0.2}]})
+    rows = [{"number": 7, "score_jnd": 0.4}, {"number": 9, "score_jnd": 0.2}]
+    panel = quality_panel({"per_frame": rows, "noise_floor": None})
     assert values(panel) == {"score": {7: 0.4, 9: 0.2}}
     assert panel.level[0] == 1.0 < panel.top
     velocity, pixels = plan_panels(synthetic_plan())

@@ -15,6 +15,12 @@ def test_a_scale_rises_from_0_to_1_and_stays(scale):
     np.testing.assert_allclose(scale.place(scale.values(9)), np.linspace(0.0, 1.0, 9), atol=1e-6)
 
 
+def test_strong_differences_have_other_colours_than_moderate_ones():
+    painted = VISIBLE.paint(np.float32([[4.0, 16.0, 32.0, 64.0]]))[0].astype(int)
+    steps = np.abs(np.diff(painted, axis=0)).sum(axis=1)
+    assert (steps > 60).all()  # of 765: told apart at a glance
+
+
 @pytest.mark.parametrize("scale", [VELOCITY, DIFFERENCE])
 def test_colours_are_those_at_the_ticks_and_grow_lighter(scale):
     painted = scale.paint(np.array([*scale.colors], np.float32)[None])[0].astype(int)

@@ -51,13 +51,17 @@ def test_many_keyframes_are_cut_short_and_none_are_left_out():
 
 def test_comparison():
     row = {"name": "shots/shot[final].0001.exr", "score_jnd": 1.0, "steady_jnd": 1.0, "transient_jnd": 0.0}
-    row |= {"psnr_db": None, "percent_visible": 2.0, "velocity_deg_s": 0.5}
+    row |= {"psnr_db": None, "is_identical": True, "percent_visible": 2.0, "velocity_deg_s": 0.5}
     found = {**row, "per_frame": [row] * 9, "percent_visible": {"mean": 2.0}, "size": [64, 48], "fps": 24.0}
     found |= {"pixels_per_degree": 28.0, "mode": "modern", "meaning": "noticed"}
     text = as_text(comparison_table(found))
     assert text.count("shot[final].0001.exr") == 8  # a name is no markup
     assert "the 8 frames with the largest score" in text
     assert "identical" in text
+    equal_as_shown = [{**row, "is_identical": False}]
+    text = as_text(comparison_table({**found, "is_identical": False, "per_frame": equal_as_shown}))
+    assert "identical" not in text
+    assert text.count("infinite") == 2
     assert result_line(found) == "1.00 JND (noticed); 2.0 % of the pixels above 1 JND"
 
 

@@ -23,7 +23,8 @@ def made_up(frames=5, *, flicker=0.1):
     ]
     figures = {"score_jnd": 0.8, "meaning": "noticed", "size": [64, 48], "fps": 25.0, "mode": "modern"}
     bands = [[14.0, 20.0], [7.0, 14.0], [0.0, 7.0]]
-    return {**figures, "pixels_per_degree": 28.0, "bands_cpd": bands, "per_frame": rows}
+    figures |= {"pixels_per_degree": 28.0, "noise_floor": None}
+    return {**figures, "bands_cpd": bands, "per_frame": rows}
 
 
 def lines(ax):
@@ -40,6 +41,12 @@ def test_score_and_its_parts():
     assert "0.80 JND (noticed)" in figure.get_suptitle()
     assert [ax.get_ylabel() for ax in figure.axes[:3]] == ["JND", "% of pixels", "cycles per degree"]
     assert "steady part" not in lines(time_figure(made_up(flicker=0.0)).axes[0])  # that is the score
+
+
+def test_the_noise_floor_is_on_the_axis():
+    figure = time_figure({**made_up(), "noise_floor": {"per_frame_jnd": [2.0, 3.0, 4.0, 5.0, 6.0]}})
+    assert lines(figure.axes[0])["noise floor"] == [[FIRST + i, 2.0 + i] for i in range(5)]
+    assert figure.axes[0].get_ylim()[1] > 6.0
 
 
 def test_visible_pixels_and_bands():

@@ -85,5 +85,7 @@ def terms(
     return CompareOptions(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
 
 
-def compared(test: Any, reference: Any, monitor: Any = None, **options: Any) -> SequenceDifference:
-    return compare(test, reference, terms(**options), monitor or Notes())
+def compared(
+    test: Any, reference: Any, monitor: Any = None, *, second_reference: Any = None, **options: Any
+) -> SequenceDifference:
+    return compare(test, reference, terms(**options), monitor or Notes(), second_reference=second_reference)

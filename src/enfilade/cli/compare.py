@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -42,6 +43,12 @@ def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str |
 @click.command("compare", short_help="The visible difference between two sequences.")
 @click.argument("test")
 @click.argument("reference")
+@click.option(
+    "--second-reference",
+    metavar="OTHER",
+    help="REFERENCE rendered with another --seed: TEST is compared with the mean of both, and their "
+    "difference from each other is the noise floor.",
+)
 @click.option(
     "--display",
     "display",
@@ -103,6 +110,7 @@ def command(
     *,
     test: str,
     reference: str,
+    second_reference: str | None,
     heatmap: Path | None,
     graph: Path | None,
     as_json: bool,
@@ -114,20 +122,22 @@ def command(
     Each is a run folder, a folder of images (OpenEXR, PNG, JPEG, TIFF, TGA, WebP, BMP), a pattern such as
     frames/%04d.exr, or a video.
 
-    The score is in just noticeable differences (JND), pooled over all pixels and frames: 0 is identical; 1
+    The score is in just noticeable differences (JND), pooled over all pixels and frames: 1
     is a difference that three of four observers find when they look for it, everywhere and all the time. A
     small or brief difference has a lower score than its own JND; where it is visible, the largest value is
-    printed, too.
+    printed, too. Noise of the reference counts as a difference, and is mentioned where it is a notable part.
     """
     check_png("--graph", graph)
     show = None if heatmap is None else _painted(heatmap)
-    _check_apart(test, reference, heatmap, graph)
+    sources = [source for source in (test, reference, second_reference) if source is not None]
+    _check_apart(sources, heatmap, graph)
     options = _options(ctx, **choices)
     from enfilade.cli.progress import watch
     from enfilade.comparison import compare
 
     with watch(quiet=quiet) as monitor:
-        found = compare(test, reference, options, monitor, show=show).to_dict()
+        difference = compare(test, reference, options, monitor, second_reference=second_reference, show=show)
+    found = difference.to_dict()
     if as_json:
         click.echo(json.dumps(found, indent=2))
     else:
@@ -205,14 +215,14 @@ def _is_folder(target: Path) -> bool:
     return target.is_dir() or not target.suffix
 
 
-def _check_apart(test: str, reference: str, heatmap: Path | None, graph: Path | None) -> None:
+def _check_apart(sources: Sequence[str], heatmap: Path | None, graph: Path | None) -> None:
     """Refuse to write over the compared files."""
     if heatmap is None and graph is None:
         return
     from enfilade.images import files_of
 
-    of_test, of_reference = files_of(test), files_of(reference)
-    read = {_place_on_disk(file) for file in (*of_test, *of_reference)} - {None}
+    of_test, of_reference, *others = map(files_of, sources)
+    read = {_place_on_disk(file) for file in chain(of_test, of_reference, *others)} - {None}
     pictures = [heatmap] if heatmap is not None else []
     if heatmap is not None and _is_folder(heatmap):
         # The frames of a video are counted, and as many as the reference's.
@@ -254,4 +264,6 @@ def _print(found: dict[str, Any]) -> None:
     from enfilade.reports.tables import comparison_table, result_line
 
     click.echo(result_line(found))
+    if found["noise_note"]:
+        click.echo(found["noise_note"])
     Console().print(comparison_table(found))

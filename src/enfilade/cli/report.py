@@ -24,6 +24,11 @@ from enfilade.cli.options import quiet_option
     help="A run or a sequence of the same frames: adds the visible difference.",
 )
 @click.option(
+    "--second-reference",
+    type=click.Path(path_type=Path),
+    help="The reference rendered with another --seed: shows how much of the difference is their noise.",
+)
+@click.option(
     "--max-mb",
     type=float,
     default=30.0,
@@ -32,7 +37,15 @@ from enfilade.cli.options import quiet_option
 )
 @quiet_option
 @debug_option
-def command(*, run: Path, file: Path | None, reference: Path | None, max_mb: float, quiet: bool) -> None:
+def command(
+    *,
+    run: Path,
+    file: Path | None,
+    reference: Path | None,
+    second_reference: Path | None,
+    max_mb: float,
+    quiet: bool,
+) -> None:
     """Write the finished or running run in the folder RUN as one HTML page.
 
     The page needs neither other files nor a network. A running run is shown as far as it is finished.
@@ -43,5 +56,12 @@ def command(*, run: Path, file: Path | None, reference: Path | None, max_mb: flo
 
     activate("cpu")
     with watch(quiet=quiet) as monitor:
-        page = write_report(run, reference=reference, out=file, max_mb=max_mb, monitor=monitor)
+        page = write_report(
+            run,
+            reference=reference,
+            second_reference=second_reference,
+            out=file,
+            max_mb=max_mb,
+            monitor=monitor,
+        )
     click.echo(f"report  {page}")

@@ -12,6 +12,8 @@ import numpy as np
 
 from enfilade.comparison.measures import Measure, open_measure
 from enfilade.comparison.motion import FlowChoice, Moved, open_motion
+from enfilade.comparison.noise import NoiseFloor
+from enfilade.comparison.noise_estimate import NoiseEstimator
 from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.result import FrameDifference, SequenceDifference
 from enfilade.errors import ImageError, InputError
@@ -112,11 +114,13 @@ def compare(
     options: CompareOptions,
     monitor: Monitor,
     *,
+    second_reference: Path | str | None = None,
     show: Show | None = None,
 ) -> SequenceDifference:
     """Measure the visible difference between two image sequences, videos or run folders.
 
-    Frames are read and compared one after another: memory does not grow with their number.
+    Frames are read and compared one after another: memory does not grow with their number. A second reference
+    doubles the time.
 
     Parameters
     ----------
@@ -124,23 +128,28 @@ def compare(
         Sources of :func:`enfilade.images.open_sequence`.
     options
     monitor
+    second_reference
+        Another rendering of the reference with other random numbers: the test is compared with the mean of
+        both, and their difference from each other is the noise floor. Without it the noise of the reference
+        is estimated.
     show
         Receives the compared frames and the viewing conditions, and must iterate over all of them.
 
     Raises
     ------
     ImageError
-        A sequence can't be read, the two differ in length, size or frame rate, they are runs of different
-        frames, or pixels are NaN or infinite. The message names the frame.
+        A sequence can't be read, they differ in length, size or frame rate, they are runs of different
+        frames, pixels are NaN or infinite, or the two references are equal. The message names the frame.
     SettingsError
         There is no such measure, or it is not installed.
     """
+    references = [reference] if second_reference is None else [reference, second_reference]
     pairs = open_pairs(
-        test, reference, fps=options.fps, exposure_ev=options.exposure_ev, layers=options.layers
+        test, references, fps=options.fps, exposure_ev=options.exposure_ev, layers=options.layers
     )
     conditions = options.conditions(pairs.size, pairs.fps)
     motion = open_motion(pairs.test, pairs.reference, options.flow, pairs.starts)
-    notes = [motion.text, pairs.note, *dict.fromkeys((pairs.test.note, pairs.reference.note))]
+    notes = [motion.text, *pairs.notes]
     if pairs.exposure_ev:
         notes.append(f"exposure: OpenEXR frames are shown at {pairs.exposure_ev:+g} stops")
     if options.display is None:
@@ -149,9 +158,9 @@ def compare(
             f"{conditions.distance_m:g} m: {conditions.pixels_per_degree:.0f} pixels per degree; --display "
             "chooses another"
         )
-    for note in filter(None, notes):
+    for note in notes:
         monitor.message(note)
-    comparer = _Comparer(conditions, options)
+    comparer = _Comparer(conditions, options, len(pairs))
     found: list[FrameDifference] = []
 
     def compared() -> Iterator[ComparedFrame]:
@@ -165,43 +174,70 @@ def compare(
         deque(compared(), maxlen=0)
     else:
         show(compared(), conditions)
-    bands = comparer.bands_cpd
-    return SequenceDifference(tuple(found), conditions, bands, options.mode, motion.kind, comparer.scores())
+    return SequenceDifference(
+        tuple(found),
+        conditions,
+        comparer.bands_cpd,
+        options.mode,
+        motion.kind,
+        scores=comparer.scores(),
+        noise_floor=comparer.noise_floor(),
+        noise_estimate=None if motion.kind == "none" else comparer.noise.estimate(),
+    )
 
 
 class _Comparer:
-    def __init__(self, viewing: Viewing, options: CompareOptions) -> None:
+    def __init__(self, viewing: Viewing, options: CompareOptions, count: int) -> None:
         self._viewing = viewing
         pursuit = Pursuit(options.metric.metering.value)
         if options.mode == "paper":
             aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=options.metric.mask_slope)
         else:
             aqm = Aqm.modern(viewing, pursuit=pursuit)
-        self._aqm = SequenceAqm(aqm)
+        self._aqm, self._aqm_of_floor = SequenceAqm(aqm), SequenceAqm(aqm)
+        self._floor: list[tuple[float, float, float]] = []  # score, percent visible, squared error
+        self.noise = NoiseEstimator(aqm, viewing, count)
         self.bands_cpd = aqm.bands_cpd
         opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in options.measures]
         self._measures: list[tuple[Measure, list[float | None]]] = [(measure, []) for measure in opened]
 
     def compare(self, pair: Pair, moved: Moved) -> ComparedFrame:
         velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
-        try:
-            found = self._aqm.compare(
-                pair.test,
-                pair.reference,
-                velocity=velocity,
-                backward_flow_px=moved.backward,
-                is_cut=moved.is_cut,
-            )
-        except InputError as error:
-            raise ImageError(f"{pair.name} can't be compared: {error}") from error
+        found = _compared(self._aqm, pair, moved, velocity)
+        if pair.halves is None:
+            self.noise.add(pair, moved, velocity)
+        else:
+            of_halves = _compared(self._aqm_of_floor, pair.halves, moved, velocity)
+            self._floor.append((of_halves.score, of_halves.percent_visible, pair.halves.squared_error))
         for measure, values in self._measures:
             values.append(measure.measure(pair.displayed))
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
         difference = _difference(pair, found, speed)
         return ComparedFrame(pair.index, difference, found.jnd, pair.reference_relative)
 
+    def noise_floor(self) -> NoiseFloor | None:
+        if not self._floor:
+            return None
+        scores, visible, squared = zip(*self._floor, strict=True)
+        return NoiseFloor(
+            scores, percent_visible=float(np.mean(visible)), squared_error=float(np.mean(squared))
+        )
+
     def scores(self) -> dict[str, float]:
         return {measure.name: measure.pool(values) for measure, values in self._measures}
+
+
+def _compared(aqm: SequenceAqm, pair: Pair, moved: Moved, velocity: F32 | None) -> Comparison:
+    try:
+        return aqm.compare(
+            pair.test,
+            pair.reference,
+            velocity=velocity,
+            backward_flow_px=moved.backward,
+            is_cut=moved.is_cut,
+        )
+    except InputError as error:
+        raise ImageError(f"{pair.name} can't be compared: {error}") from error
 
 
 def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDifference:
@@ -215,4 +251,5 @@ def _difference(pair: Pair, found: Comparison, speed_deg_s: float) -> FrameDiffe
         pair.squared_error,
         speed_deg_s,
         largest_jnd=float(found.jnd.max()),
+        is_identical=pair.is_identical,
     )

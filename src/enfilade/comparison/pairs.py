@@ -1,27 +1,35 @@
-"""Two sequences side by side: checks that they match, and their pairs of frames as displayed."""
+"""Sequences side by side: a test and one or two references, and their frames as displayed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence as Several
+from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from enfilade.comparison.matching import (
+    DEFAULT_FPS,
+    Side,
+    check_alike,
+    common_exposure_ev,
+    common_fps,
+    is_exr,
+    note_on_numbers,
+    note_on_paths,
+    note_on_seeds,
+)
 from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import ImageError
-from enfilade.files import read_json
-from enfilade.images import Sequence, open_sequence
+from enfilade.images import open_sequence
 from enfilade.kernels.tone import display_luminance, srgb_encode
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
 __all__ = ["Pair", "Pairs", "open_pairs"]
-
-DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
-FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +50,11 @@ class Pair:
         Of the reference, 1 = white.
     exposed_test, exposed_reference : (H, W, 3) float32
         Linear Rec.709 after exposure and clipping, 0..1.
+    is_identical : bool
+        Whether no channel of any pixel differs, before clipping.
+    halves : Pair or None
+        Of two references, the first as the test and the second as the reference; `reference` is their mean.
+        None where there is one.
     """
 
     index: int
@@ -52,14 +65,24 @@ class Pair:
     reference_relative: F32
     exposed_test: F32
     exposed_reference: F32
+    is_identical: bool
+    halves: Pair | None = None
 
     @property
     def squared_error(self) -> float:
-        """Mean over pixels and channels, sRGB-encoded; 0 exactly where the frames are equal."""
+        """Mean over pixels and channels, sRGB-encoded; 0 exactly where the frames are equal.
+
+        With two references A and B, the mean of (test - A)(test - B): their independent noise averages out
+        of it. It is negative where that noise hides the error.
+        """
         if np.array_equal(self.exposed_test, self.exposed_reference):
             return 0.0
-        difference = srgb_encode(self.exposed_test) - srgb_encode(self.exposed_reference)
-        return float(np.vdot(difference, difference)) / difference.size
+        against = [self.exposed_reference]
+        if self.halves is not None:
+            against = [self.halves.exposed_test, self.halves.exposed_reference]
+        test = srgb_encode(self.exposed_test)
+        errors = [test - srgb_encode(reference) for reference in against]
+        return float(np.vdot(errors[0], errors[-1])) / errors[0].size
 
     @property
     def displayed(self) -> DisplayedPair:
@@ -71,11 +94,12 @@ class Pair:
 
 
 class Pairs:
-    """Two sequences of one length and size, read frame by frame, each once.
+    """A test and its references, of one length and size, read frame by frame, each once.
 
     Parameters
     ----------
-    test, reference : Sequence
+    sides : sequence of Side
+        The test, the reference, and a second reference where there is one.
     fps
         Frames per second that are shown; None takes the reference's, the test's, or 30.
     exposure_ev
@@ -88,8 +112,8 @@ class Pairs:
     starts : frozenset of int or None
         Indices of frames that begin a shot, or follow a gap in a run; None where neither is a run that
         says so.
-    note : str
-        Remark on the pairing of the frames, or on their content; empty where there is none.
+    notes : tuple of str
+        Remarks on the sequences, on their pairing, and on layers that were chosen.
 
     Raises
     ------
@@ -97,17 +121,24 @@ class Pairs:
         They differ in length, size or frame rate, or are runs of other frames or of different exposure.
     """
 
-    def __init__(
-        self, test: Sequence, reference: Sequence, *, fps: float | None, exposure_ev: float | None
-    ) -> None:
-        _check_alike(test, reference)
-        self.test, self.reference = test, reference
-        self.fps = _common_fps(test, reference) if fps is None else fps
-        self.exposure_ev = _common_exposure_ev(test, reference) if exposure_ev is None else exposure_ev
-        known = [s.starts for s in (test, reference) if s.starts is not None]
+    def __init__(self, sides: Several[Side], *, fps: float | None, exposure_ev: float | None) -> None:
+        couples = list(combinations(sides, 2))
+        for couple in couples:
+            check_alike(*couple)
+        self._sequences = [side.sequence for side in sides]
+        self.test, self.reference = self._sequences[:2]
+        if fps is None:
+            fps = _first(common_fps(*couple) for couple in couples) or DEFAULT_FPS
+        self.fps = fps
+        if exposure_ev is None:
+            exposure_ev = _first(common_exposure_ev(*couple) for couple in couples) or 0.0
+        self.exposure_ev = exposure_ev
+        known = [s.starts for s in self._sequences if s.starts is not None]
         self.starts = frozenset[int]().union(*known) if known else None
-        self.note = _note_on_numbers(test, reference)
-        self._exposures_ev = [self.exposure_ev if _is_exr(s) else 0.0 for s in (test, reference)]
+        pairing = (note_on_numbers(*couple) or note_on_paths(*couple) for couple in couples)
+        said = (*pairing, *(note_on_seeds(*couple) for couple in couples), *(s.note for s in self._sequences))
+        self.notes = tuple(dict.fromkeys(filter(None, said)))
+        self._exposures_ev = [self.exposure_ev if is_exr(s) else 0.0 for s in self._sequences]
 
     def __len__(self) -> int:
         return len(self.test)
@@ -125,63 +156,74 @@ class Pairs:
         Raises
         ------
         ImageError
-            A frame can't be read, or holds a NaN or an infinity.
+            A frame can't be read, or holds a NaN or an infinity; or two references are equal.
         """
         is_said = False
-        for index, images in enumerate(zip(self.test, self.reference, strict=True)):
-            least = [
-                _checked(image, s.name(index))
-                for image, s in zip(images, (self.test, self.reference), strict=True)
-            ]
-            if min(least) < 0.0 and not is_said:
-                first = (self.test, self.reference)[least.index(min(least))].name(index)
-                monitor.message(f"{first} holds negative values, which are shown as black")
-                is_said = True
+        for index, images in enumerate(zip(*self._sequences, strict=True)):
+            for image, sequence in zip(images, self._sequences, strict=True):
+                if _checked(image, sequence.name(index)) < 0.0 and not is_said:
+                    monitor.message(f"{sequence.name(index)} holds negative values, which are shown as black")
+                    is_said = True
             yield self._pair(index, images, viewing)
 
-    def _pair(self, index: int, images: tuple[F32, F32], viewing: Viewing) -> Pair:
-        # Equal images stay exactly equal: both take the same steps.
-        exposed_test, exposed_reference = (
-            np.clip(image * np.float32(2.0**ev), 0.0, 1.0)
-            for image, ev in zip(images, self._exposures_ev, strict=True)
-        )
+    def _pair(self, index: int, images: Several[F32], viewing: Viewing) -> Pair:
+        # Equal images stay exactly equal: all take the same steps.
+        exposed = [image * np.float32(2.0**ev) for image, ev in zip(images, self._exposures_ev, strict=True)]
+        test, *references = exposed
+        if len(references) == 1:
+            return self._of_two(index, test, references[0], viewing)
+        first, second = references
+        halves = self._of_two(index, first, second, viewing)
+        if halves.is_identical and np.ptp(first) > 0.0:
+            raise ImageError(
+                f"the two references are equal in frame {halves.number} ({self.reference.name(index)}), so "
+                "they are not independent; render the second one with another --seed"
+            )
+        pair = self._of_two(index, test, np.float32(0.5) * (first + second), viewing)
+        is_identical = all(np.array_equal(test, reference) for reference in references)
+        return replace(pair, halves=halves, is_identical=is_identical)
+
+    def _of_two(self, index: int, test: F32, reference: F32, viewing: Viewing) -> Pair:
+        exposed = [np.clip(image, 0.0, 1.0) for image in (test, reference)]
         relative = [
-            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0)
-            for image in (exposed_test, exposed_reference)
+            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0) for image in exposed
         ]
         span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
-        test, reference = (image * span + black for image in relative)
+        shown = [image * span + black for image in relative]
         numbers = self.test.numbers
         return Pair(
             index=index,
             name=self.test.name(index),
             number=index + 1 if numbers is None else numbers[index],
-            test=test,
-            reference=reference,
+            test=shown[0],
+            reference=shown[1],
             reference_relative=relative[1],
-            exposed_test=exposed_test,
-            exposed_reference=exposed_reference,
+            exposed_test=exposed[0],
+            exposed_reference=exposed[1],
+            is_identical=np.array_equal(test, reference),
         )
 
 
 def open_pairs(
     test: Path | str,
-    reference: Path | str,
+    references: Several[Path | str],
     *,
     fps: float | None,
     exposure_ev: float | None,
     layers: tuple[str | None, str | None] = (None, None),
 ) -> Pairs:
-    """Open two sequences to be compared.
+    """Open sequences to be compared.
 
     Parameters
     ----------
-    test, reference
+    test
         Whatever :func:`enfilade.images.open_sequence` reads.
+    references
+        One, or two of independent noise.
     fps, exposure_ev
         See :class:`Pairs`.
     layers
-        Layer of the picture in the OpenEXR frames of the test and of the reference.
+        Layer of the picture in the OpenEXR frames of the test and of the references.
 
     Raises
     ------
@@ -189,16 +231,24 @@ def open_pairs(
         One can't be read, a layer is asked for and none has layers, they differ in length, size or frame
         rate, or are runs of other frames or of different exposure.
     """
-    sides = zip((test, reference), layers, strict=True)
-    sequences = [open_sequence(source, layer=layer) for source, layer in sides]
-    if any(layers) and not any(_is_exr(sequence) for sequence in sequences):
+    roles = ("test", "reference", "second reference")
+    sources = (test, *references)
+    of_sides = (layers[0], *(layers[1] for _ in references))
+    sides = [
+        Side(role, source, open_sequence(source, layer=layer))
+        for role, source, layer in zip(roles, sources, of_sides, strict=False)
+    ]
+    if any(layers) and not any(is_exr(side.sequence) for side in sides):
         raise ImageError(
-            f"neither {sequences[0].name(0)} nor {sequences[1].name(0)} has layers; leave out --layer, which "
-            "chooses one of OpenEXR frames"
+            f"neither {sides[0].sequence.name(0)} nor {sides[1].sequence.name(0)} has layers; leave out "
+            "--layer, which chooses one of OpenEXR frames"
         )
-    pairs = Pairs(*sequences, fps=fps, exposure_ev=exposure_ev)
-    pairs.note = pairs.note or _note_on_paths(test, reference)
-    return pairs
+    return Pairs(sides, fps=fps, exposure_ev=exposure_ev)
+
+
+def _first(values: Iterator[float | None]) -> float | None:
+    """The first value that is there; all are computed, since they may raise."""
+    return next((value for value in list(values) if value is not None), None)
 
 
 def _checked(image: F32, name: str) -> float:
@@ -211,91 +261,3 @@ def _checked(image: F32, name: str) -> float:
         f"{name} has {np.count_nonzero(bad)} pixels that are NaN or infinite, the first in row {row}, "
         f"column {column} (from 0); render it again or repair them"
     )
-
-
-def _check_alike(test: Sequence, reference: Sequence) -> None:
-    if test.starts is not None and reference.starts is not None:
-        _check_same_frames(test, reference)
-    if len(test) != len(reference):
-        raise ImageError(
-            f"the test has {len(test)} frames (first {test.name(0)}) and the reference {len(reference)} "
-            f"(first {reference.name(0)}); give equal ones"
-        )
-    sizes = [f"{s.width}x{s.height}" for s in (test, reference)]
-    if sizes[0] != sizes[1]:
-        raise ImageError(
-            f"the test's images are {sizes[0]} ({test.name(0)}) and the reference's {sizes[1]} "
-            f"({reference.name(0)}); give equal ones"
-        )
-
-
-def _check_same_frames(test: Sequence, reference: Sequence) -> None:
-    of_test, of_reference = test.numbers or (), reference.numbers or ()
-    differing = set(of_test) ^ set(of_reference)
-    if not differing:
-        return
-    number = min(differing)
-    roles = (("test", test, of_test), ("reference", reference, of_reference))
-    (role, has, numbers), (other, lacks, _) = roles if number in of_test else roles[::-1]
-    raise ImageError(
-        f"the {role}'s run has the frame {number} ({has.name(numbers.index(number))}), and the {other}'s "
-        f"(first {lacks.name(0)}) does not: give runs of the same --frames, finish the one that lacks it, or "
-        "give patterns of frames that both have"
-    )
-
-
-def _note_on_paths(test: Path | str, reference: Path | str) -> str:
-    of_test, of_reference = _path_of(test), _path_of(reference)
-    # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
-    # them: another host may round the same poses otherwise.
-    is_known = "poses" in of_test and "poses" in of_reference
-    is_alike = of_test.get("poses") == of_reference.get("poses")
-    if is_alike or not is_known or of_test.get("frames") != of_reference.get("frames"):
-        return ""
-    return (
-        f"camera: {test} and {reference} are of different camera paths (other poses in run.json): "
-        "frames of one number may show different views"
-    )
-
-
-def _path_of(source: Path | str) -> dict[str, Any]:
-    """The camera path as a run folder's ``run.json`` has it; nothing where there is none."""
-    file = Path(source) / "run.json"
-    found: Any = read_json(file) if file.is_file() else None
-    for key in ("identity", "path"):
-        found = found.get(key) if isinstance(found, dict) else None
-    return found if isinstance(found, dict) else {}
-
-
-def _note_on_numbers(test: Sequence, reference: Sequence) -> str:
-    if test.numbers is None or reference.numbers is None or test.numbers == reference.numbers:
-        return ""
-    pairs = enumerate(zip(test.numbers, reference.numbers, strict=True))
-    index = next(i for i, (of_test, of_reference) in pairs if of_test != of_reference)
-    return (
-        f"frames: their numbers differ, so they are paired in order: {test.name(index)} with "
-        f"{reference.name(index)}, and so on"
-    )
-
-
-def _common_fps(test: Sequence, reference: Sequence) -> float:
-    if test.fps and reference.fps and abs(test.fps / reference.fps - 1.0) > FPS_TOLERANCE:
-        raise ImageError(
-            f"the test plays at {test.fps:g} frames per second ({test.name(0)}) and the reference at "
-            f"{reference.fps:g} ({reference.name(0)}); say with --fps at which both are shown"
-        )
-    return reference.fps or test.fps or DEFAULT_FPS
-
-
-def _common_exposure_ev(test: Sequence, reference: Sequence) -> float:
-    known = [s.exposure_ev for s in (test, reference) if s.exposure_ev is not None]
-    if known and known[0] != known[-1]:
-        raise ImageError(
-            f"the test's run is shown at {known[0]:+g} stops ({test.name(0)}) and the reference's at "
-            f"{known[-1]:+g} ({reference.name(0)}); say with --exposure-ev at which both are shown"
-        )
-    return known[0] if known else 0.0
-
-
-def _is_exr(sequence: Sequence) -> bool:
-    return sequence.name(0).lower().endswith(".exr")

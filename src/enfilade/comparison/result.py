@@ -8,18 +8,24 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from enfilade.comparison.measures.psnr import psnr_db
+from enfilade.comparison.noise import NoiseEstimate, NoiseFloor
 from enfilade.metric import Part, sequence_score
 from enfilade.viewing import Viewing
 
 __all__ = ["FrameDifference", "SequenceDifference", "short_name"]
 
-WORDS = (  # for scores up to so many JND, of all pixels and frames taken together
-    (0.0, "identical"),
+IDENTICAL = "identical"
+INVISIBLE = "not identical, but without a visible difference in luminance"
+INVISIBLE_JND = 0.005  # below, a score of two decimals is 0.00
+WORDS = (  # for scores up to so many JND, of all pixels and frames together; docs/metric.md has examples
     (0.25, "next to none overall"),
     (0.75, "faint overall"),
     (1.5, "noticeable overall"),
     (3.0, "obvious overall"),
-    (math.inf, "strong overall"),
+    (8.0, "strong overall"),
+    (16.0, "very strong overall"),
+    (32.0, "severe overall"),
+    (math.inf, "extreme overall"),
 )
 
 
@@ -41,11 +47,14 @@ class FrameDifference:
         Errors that stay on their surface, and errors that change from frame to frame. Both are part of the
         score; the paper's mode has no transient errors.
     squared_error : float
-        Mean over pixels and channels, sRGB-encoded and clipped to 0..1.
+        Mean over pixels and channels, sRGB-encoded and clipped to 0..1. With two references it excludes
+        their noise (:attr:`enfilade.comparison.pairs.Pair.squared_error`) and may be negative.
     velocity_deg_s : float
         Mean image velocity.
     largest_jnd : float
         Largest value of the map, JND.
+    is_identical : bool
+        Whether no pixel differs in any channel, also above white.
     """
 
     name: str
@@ -57,9 +66,10 @@ class FrameDifference:
     squared_error: float
     velocity_deg_s: float
     largest_jnd: float
+    is_identical: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """The difference as plain values, fit for JSON; the PSNR of identical images is None."""
+        """The difference as plain values, fit for JSON; an infinite PSNR is None."""
         return {
             "name": self.name,
             "number": self.number,
@@ -68,9 +78,10 @@ class FrameDifference:
             "transient_jnd": self.transient.score,
             "percent_visible": self.percent_visible,
             "largest_jnd": self.largest_jnd,
+            "is_identical": self.is_identical,
             "steady_bands_jnd": list(self.steady.band_jnd),
             "transient_bands_jnd": list(self.transient.band_jnd),
-            "psnr_db": _finite(psnr_db(self.squared_error)),
+            "psnr_db": _finite(psnr_db(max(self.squared_error, 0.0))),
             "velocity_deg_s": self.velocity_deg_s,
         }
 
@@ -92,6 +103,10 @@ class SequenceDifference:
         Origin of the motion vectors: ``layers``, ``estimate`` or ``none``.
     scores : mapping of str to float
         Results of further measures, by name.
+    noise_floor : NoiseFloor or None
+        Of two references.
+    noise_estimate : NoiseEstimate or None
+        Of a single reference.
     """
 
     frames: tuple[FrameDifference, ...]
@@ -100,6 +115,8 @@ class SequenceDifference:
     mode: str
     flow: str
     scores: Mapping[str, float] = field(default_factory=dict)
+    noise_floor: NoiseFloor | None = None
+    noise_estimate: NoiseEstimate | None = None
 
     @property
     def score(self) -> float:
@@ -107,17 +124,36 @@ class SequenceDifference:
         return sequence_score([f.score for f in self.frames])
 
     @property
+    def is_identical(self) -> bool:
+        """Whether no pixel of any frame differs."""
+        return all(f.is_identical for f in self.frames)
+
+    @property
     def meaning(self) -> str:
-        """The score in words, and the frame with the largest difference, if any pixel is visible."""
-        words, worst = words_of(self.score), max(self.frames, key=lambda f: f.largest_jnd)
+        """The score in words, whether it is undecided, and the frame with the largest visible difference."""
+        words = IDENTICAL if self.is_identical else words_of(self.score)
+        if self.noise_floor is not None and self.noise_floor.verdict(self.score) == "undecided":
+            words += ", undecided"
+        worst = max(self.frames, key=lambda f: f.largest_jnd)
         if not any(f.percent_visible for f in self.frames):
             return words
         return f"{words}; up to {worst.largest_jnd:.1f} JND in {short_name(worst.name)}"
 
     @property
+    def noise_note(self) -> str:
+        """What the noise of the reference means for the score; empty where it is hardly part of it."""
+        if self.is_identical:
+            return ""
+        noise = self.noise_floor or self.noise_estimate
+        return "" if noise is None else noise.sentence(self.score)
+
+    @property
     def psnr_db(self) -> float:
-        """PSNR of the whole sequence, of the mean squared error over all frames; infinite if identical."""
-        return psnr_db(sum(f.squared_error for f in self.frames) / len(self.frames))
+        """PSNR of the whole sequence, of the mean squared error over all frames, without noise of references.
+
+        Infinite where no displayed pixel differs, or the noise of two references hides the error.
+        """
+        return psnr_db(max(sum(f.squared_error for f in self.frames) / len(self.frames), 0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain values, fit for JSON."""
@@ -125,6 +161,10 @@ class SequenceDifference:
         return {
             "score_jnd": self.score,
             "meaning": self.meaning,
+            "is_identical": self.is_identical,
+            "noise_floor": self.noise_floor and self.noise_floor.to_dict(self.score),
+            "noise_estimate": self.noise_estimate and self.noise_estimate.to_dict(self.score),
+            "noise_note": self.noise_note,
             "steady_jnd": sequence_score([f.steady.score for f in self.frames]),
             "transient_jnd": sequence_score([f.transient.score for f in self.frames]),
             "percent_visible": _mean_and_most([f.percent_visible for f in self.frames]),
@@ -148,7 +188,7 @@ class SequenceDifference:
 
 
 def words_of(score: float) -> str:
-    """A score in words.
+    """The score of sequences that differ in any pixel, in words.
 
     It is that of all pixels and frames together: a small or brief defect has a low score, however plain it
     is.
@@ -158,7 +198,7 @@ def words_of(score: float) -> str:
     score
         JND, 0 or more.
     """
-    return next(text for most, text in WORDS if score <= most)
+    return INVISIBLE if score < INVISIBLE_JND else next(text for most, text in WORDS if score <= most)
 
 
 def short_name(name: str) -> str:

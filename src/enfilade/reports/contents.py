@@ -14,12 +14,17 @@ from enfilade.reports.film import Film
 from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
-from enfilade.reports.tables import TRACED_COLUMNS, percent, seconds, spoken
+from enfilade.reports.tables import TRACED_COLUMNS, percent, psnr_text, seconds, spoken
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
 
 SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "square": "□", "circle": "●"}  # of series
+VERDICTS = {  # of the noise floor
+    "above": "above it",
+    "undecided": "undecided",
+    "below": "below it; without any error it would be about half of it",
+}
 REASONS = (
     "Slow pixels move slowly, so that errors would be noticed; specular pixels show a glossy, mirroring or "
     "transparent surface; disoccluded pixels are visible in no keyframe; keyframe pixels belong to a "
@@ -55,6 +60,7 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         "symbols": SYMBOLS,
         "effort": _effort(summary),
         "difference": _difference(film.difference, summary, reference),
+        "noise_note": "" if film.difference is None else _sentence(film.difference["noise_note"]),
         "stages": _stages(run),
         "settings": _settings(run),
         "identity": _identity(run),
@@ -134,14 +140,19 @@ def _difference(
     """Rows of the comparison with the reference: name, value, comment."""
     if found is None:
         return []
-    psnr = "identical" if found["psnr_db"] is None else f"{found['psnr_db']:.2f} dB"
+    without = ", without the noise of the references" if found["noise_floor"] else ""
     rows = [
         ("frames compared", str(found["frames"]), "noise of the reference counts as a difference"),
         ("visible difference", f"{found['score_jnd']:.2f} JND", found["meaning"]),
         ("pixels above 1 JND", f"{percent(found['percent_visible']['mean'])} %", "mean over the frames"),
-        ("PSNR", psnr, "sRGB-encoded values"),
+        ("PSNR", psnr_text(found), f"sRGB-encoded values{without}"),
         ("absolute difference", f"{found['scores']['absolute']:.2f} %", "of white, sRGB-encoded values"),
     ]
+    if floor := found["noise_floor"]:
+        rows[0] = ("frames compared", str(found["frames"]), "with the mean of two references")
+        visible = f"{percent(floor['percent_visible'])} % of pixels above 1 JND"
+        verdict = f"{visible}; the score is {VERDICTS[floor['verdict']]}"
+        rows.insert(2, ("noise floor", f"{floor['score_jnd']:.2f} JND", verdict))
     if reference is not None and summary["video"] and reference["video"]:
         own, other = (of["time_s"]["cpu_s"] / of["frames"] for of in (summary, reference))
         rows += [
@@ -149,6 +160,10 @@ def _difference(
             ("", seconds(other), "the reference; comparable on the same machine"),
         ]
     return rows
+
+
+def _sentence(note: str) -> str:
+    return note[:1].upper() + note[1:]
 
 
 def _settings(run: ReportedRun) -> list[dict[str, Any]]:

@@ -37,8 +37,9 @@ class Film:
     run
     view
         View transform of the video.
-    reference
-        Whatever :func:`enfilade.images.open_sequence` reads, with the finished frames of the run; or None.
+    references
+        None, one or two: whatever :func:`enfilade.images.open_sequence` reads, with the finished frames of
+        the run.
     max_bytes
         Of all pictures, as text, about.
     monitor
@@ -61,7 +62,7 @@ class Film:
     """
 
     def __init__(
-        self, run: ReportedRun, view: View, reference: Path | None, max_bytes: float, monitor: Monitor
+        self, run: ReportedRun, view: View, references: Sequence[Path], max_bytes: float, monitor: Monitor
     ) -> None:
         self._run, self._view = run, view
         full = (run.viewing.width_px, run.viewing.height_px)
@@ -72,10 +73,10 @@ class Film:
         if not run.there:
             self.notes.append("no frame is finished yet")
             return
-        step = self._fit(CAUTION * max_bytes, is_compared=reference is not None)
+        step = self._fit(CAUTION * max_bytes, is_compared=bool(references))
         kept = sorted({*run.there[::step], run.there[-1]})
-        if reference is not None:
-            self.difference = self._compare(reference, set(kept), monitor)
+        if references:
+            self.difference = self._compare(references, set(kept), monitor)
         else:
             for count, index in enumerate(kept, 1):
                 self._add(index)
@@ -106,8 +107,8 @@ class Film:
         self.size = _scaled(self.size, factor)
         return max(1, math.ceil(total * factor**2 / most))
 
-    def _compare(self, reference: Path, kept: set[int], monitor: Monitor) -> dict[str, Any]:
-        """Compare all finished frames with the reference, and add those that are kept."""
+    def _compare(self, references: Sequence[Path], kept: set[int], monitor: Monitor) -> dict[str, Any]:
+        """Compare all finished frames with the references, and add those that are kept."""
         run, indices = self._run, {number: index for index, number in enumerate(self._run.numbers)}
         absolute = AbsoluteDifference()
 
@@ -120,7 +121,9 @@ class Film:
 
         of = run.viewing_settings
         options = CompareOptions(viewing=of, exposure_ev=of.exposure_ev, measures=[absolute])
-        return compare(run.folder, reference, options, Silence(), show=show).to_dict()
+        first, second, *_ = *references, None
+        found = compare(run.folder, first, options, Silence(), second_reference=second, show=show)
+        return found.to_dict()
 
     def _add(self, index: int, differences: Mapping[str, U8] | None = None) -> None:
         layers = {**self._encoded(self._painted(index)), **self._encoded(differences or {})}

@@ -122,7 +122,7 @@ class HeatmapPainter:
         ax.imshow(overlay(ramp, np.full_like(ramp, 0.5)), aspect="auto", extent=(0.0, 1.0, 0.0, 1.0))
         ax.set_yticks([])
         *labels, last = (f"{jnd:g}" for jnd in VISIBLE.colors)
-        ax.set_xticks(VISIBLE.place(list(VISIBLE.colors)).tolist(), [*labels, f"{last} and more"])
+        ax.set_xticks(VISIBLE.place(list(VISIBLE.colors)).tolist(), [*labels, f"≥ {last}"])
         ax.get_xticklabels()[-1].set_horizontalalignment("right")
         ax.tick_params(colors=INK, labelsize=0.9 * self._text_px, length=3, pad=1)
         ax.spines[:].set_visible(False)

@@ -99,9 +99,10 @@ def _bytes(encoded: F32) -> U8:
 
 def _legend(scale: Scale, paint: Callable[[F32], U8]) -> dict[str, Any]:
     ticks, colors = list(scale.colors), paint(scale.values(LEGEND_STEPS)[None])[0]
+    *labels, last = (f"{tick:g}" for tick in ticks)
     return {
         "gradient": ["#" + bytes(color.tolist()).hex() for color in colors],
-        "ticks": list(zip(scale.place(ticks).tolist(), (f"{tick:g}" for tick in ticks), strict=True)),
+        "ticks": list(zip(scale.place(ticks).tolist(), [*labels, f"≥ {last}"], strict=True)),
     }
 
 

@@ -31,6 +31,7 @@ def write_report(
     run: Path,
     *,
     reference: Path | str | None = None,
+    second_reference: Path | str | None = None,
     out: Path | str | None = None,
     max_mb: float = 30.0,
     monitor: Monitor | None = None,
@@ -46,6 +47,8 @@ def write_report(
     reference
         Another run, or a sequence, of the same frames: adds the visible difference, that of
         :func:`enfilade.compare` with the viewing conditions of the run.
+    second_reference
+        As of :func:`enfilade.compare`; it needs a reference.
     out
         The page; by default ``report.html`` in the run folder. An older one is replaced.
     max_mb
@@ -65,15 +68,20 @@ def write_report(
     ImageError
         The run and the reference can't be compared.
     SettingsError
-        `max_mb` is out of range, or the OpenColorIO view of the video is not available.
+        `max_mb` is out of range, a second reference is given alone, or the OpenColorIO view of the video is
+        not available.
     """
     if not max_mb >= LEAST_MB:
         raise SettingsError(f"a page of {max_mb:g} MB is too small; give {LEAST_MB:g} or more")
+    if second_reference is not None and reference is None:
+        raise SettingsError("--second-reference is given alone; give the first one as --reference")
     monitor = Silence() if monitor is None else monitor
     source = None if reference is None else Path(reference)
+    second = None if second_reference is None else Path(second_reference)
+    references = tuple(of for of in (source, second) if of is not None)
     shown = ReportedRun(run)
     view = open_view(shown.video, shown.viewing_settings.exposure_ev)
-    film = Film(shown, view, source, max_mb * MB, monitor)
+    film = Film(shown, view, references, max_mb * MB, monitor)
     notes = [*shown.notes, *film.notes]
     if dropped := shown.summary["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
@@ -85,7 +93,7 @@ def write_report(
         for name in ("report.css", "report.js")
     }
     text = _environment().get_template("report.html.j2").render(
-        variables, notes=notes, parts=parts, reference="" if source is None else str(source.resolve())
+        variables, notes=notes, parts=parts, references=[str(of.resolve()) for of in references]
     )  # fmt: skip
     file = run / PAGE if out is None else Path(out)
     with whole_file(file) as beside:

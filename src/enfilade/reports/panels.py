@@ -55,12 +55,18 @@ def quality_panel(difference: Mapping[str, Any]) -> Panel:
     """Visible difference of each frame from a reference; of ``SequenceDifference.to_dict()``."""
     scores = {row["number"]: row["score_jnd"] for row in difference["per_frame"]}
     least, most = min(scores.values()), max(scores.values())
+    text = f"Visible difference from the reference: {least:.2f} to {most:.2f} just noticeable differences."
+    series = [Series("score", GREEN, scores)]
+    if floor := difference["noise_floor"]:
+        floors = dict(zip(scores, floor["per_frame_jnd"], strict=True))
+        series.append(Series("noise floor: reference against reference", VERMILION, floors, "dashed"))
+        most = max(most, *floors.values())
     return Panel(
         "quality",
         "Visible difference from the reference",
         "JND",
-        f"Visible difference from the reference: {least:.2f} to {most:.2f} just noticeable differences.",
-        (Series("score", GREEN, scores),),
+        text,
+        tuple(series),
         top=1.1 * max(most, 1.0),
         level=(1.0, "1 JND: noticed in 3 of 4 cases"),
     )

@@ -73,7 +73,7 @@ VELOCITY = Scale(  # degrees per second; Matplotlib's viridis
 DIFFERENCE = Scale(  # percent of white; Matplotlib's inferno
     1.0, {0: "000004", 1: "380962", 2: "62146e", 5: "a92e5e", 10: "e05536", 20: "fb9906", 50: "fcffa4"}
 )
-VISIBLE = Scale(  # JND
+VISIBLE = Scale(  # JND; path tracing with a few paths a pixel exceeds 32
     1.0,
-    {0: "1a33b3", 0.5: "2952eb", 1: "9429c7", 2: "db4075", 4: "f57833", 8: "fcba29", 16: "fffa80"},
+    {0: "1a33b3", 1: "9429c7", 3: "db4075", 8: "f57833", 16: "fcba29", 32: "fff000", 64: "ffffff"},
 )

@@ -14,6 +14,7 @@ __all__ = [
     "comparison_table",
     "percent",
     "plan_tables",
+    "psnr_text",
     "result_line",
     "run_tables",
     "seconds",
@@ -73,6 +74,13 @@ def comparison_table(found: Mapping[str, Any]) -> Table:
     whole = {**found, "velocity_deg_s": velocity}
     table.add_row("sequence", *_difference(whole, found["percent_visible"]["mean"]))
     return table
+
+
+def psnr_text(found: Mapping[str, Any]) -> str:
+    """The PSNR of a compared frame or sequence, as plain values."""
+    if found["psnr_db"] is None:
+        return "identical" if found["is_identical"] else "infinite"
+    return f"{found['psnr_db']:.2f} dB"
 
 
 def spoken(name: str) -> str:
@@ -168,8 +176,7 @@ def _add_parts(table: Table, parts: Iterable[tuple[str, str]]) -> None:
 
 def _difference(row: Mapping[str, Any], visible: float) -> list[str]:
     scores = [f"{row[key]:.3f}" for key in ("score_jnd", "steady_jnd", "transient_jnd")]
-    psnr = "identical" if row["psnr_db"] is None else f"{row['psnr_db']:.2f}"
-    return [*scores, percent(visible), psnr, f"{row['velocity_deg_s']:.2f}"]
+    return [*scores, percent(visible), psnr_text(row).removesuffix(" dB"), f"{row['velocity_deg_s']:.2f}"]
 
 
 def _table(title: str, columns: Iterable[str]) -> Table:

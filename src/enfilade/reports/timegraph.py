@@ -40,7 +40,7 @@ def time_figure(found: Mapping[str, Any]) -> charts.Figure:
         f"{found['score_jnd']:.2f} JND ({found['meaning']})\n{len(rows)} frames, {width}x{height}, "
         f"{found['fps']:g} fps, {found['pixels_per_degree']:.1f} pixels per degree, mode {found['mode']}"
     )
-    panels = (_score_panel(rows, found["score_jnd"]), _percent_panel(rows))
+    panels = (_score_panel(rows, found), _percent_panel(rows))
     figure, axes = charts.new_figure(
         title, [*(panel.title for panel in panels), "bands of spatial frequencies"]
     )
@@ -54,10 +54,14 @@ def time_figure(found: Mapping[str, Any]) -> charts.Figure:
     return figure
 
 
-def _score_panel(rows: Sequence[Mapping[str, Any]], score: float) -> charts.Panel:
+def _score_panel(rows: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -> charts.Panel:
     parts = PARTS if any(row["transient_jnd"] for row in rows) else PARTS[:1]
     series = tuple(charts.Series(name, color, _values(rows, key), mark) for key, name, color, mark in parts)
-    top = 1.08 * max(LEAST_TOP_JND, *series[0].values.values())
+    score, floor = found["score_jnd"], found["noise_floor"]
+    if floor:
+        floors = dict(zip(series[0].values, floor["per_frame_jnd"], strict=True))
+        series += (charts.Series("noise floor", charts.ORANGE, floors, "square"),)
+    top = 1.08 * max(LEAST_TOP_JND, *(value for of in series for value in of.values.values()))
     return charts.Panel(
         "score", "score of each frame", "JND", "", series, top, (score, f"sequence {score:.2f}")
     )
