@@ -40,7 +40,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two scenes, one size, few configurations")
     parser.add_argument("--scene", nargs="+", choices=GENERATED, help="generated scenes; all by default")
-    parser.add_argument("--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones")
+    parser.add_argument(
+        "--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones"
+    )
     parser.add_argument("--sizes", nargs="+", default=None, help="320x180 1280x720 by default")
     parser.add_argument("--frames", type=int, default=None, help=f"{FRAMES} by default")
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
@@ -55,7 +57,11 @@ def main() -> int:
     failed = []
     for size in sizes:
         try:
-            cases = found_in(arguments.scenes) if arguments.scenes else generated(names, size, arguments.out / "scenes")
+            cases = (
+                found_in(arguments.scenes)
+                if arguments.scenes
+                else generated(names, size, arguments.out / "scenes")
+            )
         except EnfiladeError as error:
             parser.error(str(error))
         only = only_for(size, is_quick=arguments.quick)
@@ -78,7 +84,9 @@ def keep(benches: list[dict[str, Any]], folder: Path) -> None:
     file.write_text(json.dumps({"summary": means, "benches": benches}, indent=1) + "\n")
     page = plot_page(benches, file.with_suffix(".png"))
     measures = [name for name in QUALITIES if all(name in one["ratios"] for one in means)]
-    table = Table(title="CPU time of the strongest rival over ours, at equal quality: geometric means over scenes")
+    table = Table(
+        title="CPU time of the strongest rival over ours, at equal quality: geometric means over scenes"
+    )
     for heading in ("size", "camp", "scenes", "configuration", *(QUALITIES[name].title for name in measures)):
         table.add_column(heading)
     for one in means:

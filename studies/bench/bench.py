@@ -172,7 +172,9 @@ def _prepare(job: Job, place: Place, spp: int, *, quiet: bool) -> list[Window]:
     identity["scene"].pop("variant")
     held = read_json(file) if file.is_file() else None
     if held is not None and held["identity"] != identity:
-        raise InputError(f"{place.folder} holds the bench of another scene or path; name another folder by --out")
+        raise InputError(
+            f"{place.folder} holds the bench of another scene or path; name another folder by --out"
+        )
     if held is None:
         walk = Walkthrough(job.path, job.settings, job.open_renderer())
         windows = draw_windows(walk)
@@ -262,7 +264,9 @@ class _Bench:
     def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
         """CPU and wall seconds of a run, by stage and in total, over all sessions; the start included."""
         uncharged = _uncharged(one)
-        stages = add_costs(line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged)
+        stages = add_costs(
+            line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged
+        )
         charged = {name: spent for name, spent in stages.items() if name not in uncharged}
         total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
         start = read_json(self._folder / "costs" / f"{one.name}.json")
@@ -306,7 +310,9 @@ def _alone(device: Choice, function: Callable[..., Any], *arguments: Any, **opti
     The device is chosen before the arguments are unpickled: Dr.Jit's array types bind to it at import.
     """
     context = get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(os.getpid(), device)) as pool:
+    with ProcessPoolExecutor(
+        1, mp_context=context, initializer=_begin, initargs=(os.getpid(), device)
+    ) as pool:
         try:
             return pool.submit(function, *arguments, **options).result()
         except BrokenProcessPool as error:

@@ -57,8 +57,12 @@ def plot_page(benches: Sequence[Mapping[str, Any]], file: Path) -> Path:
     for row, found in zip(axes, benches, strict=True):
         for ax, name in zip(row, names, strict=True):
             _panel(ax, found, name)
-            ax.set_title(f"{QUALITIES[name].title}, {QUALITIES[name].unit}", loc="left", fontsize=9, color=INK)
-        row[0].set_title(f"{_title(found)}\n{QUALITIES[names[0]].title}, JOD", loc="left", fontsize=9, color=INK)
+            ax.set_title(
+                f"{QUALITIES[name].title}, {QUALITIES[name].unit}", loc="left", fontsize=9, color=INK
+            )
+        row[0].set_title(
+            f"{_title(found)}\n{QUALITIES[names[0]].title}, JOD", loc="left", fontsize=9, color=INK
+        )
     _legend(figure, axes[0, 0])
     return save(figure, file)
 
@@ -91,9 +95,10 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
         if not members:
             continue
         line = "-" if family == "decoupled" else "none"
-        points = sorted(point.cpu_s for point, _ in members), [
-            sign * p.error for p, _ in sorted(members, key=lambda m: m[0].cpu_s)
-        ]
+        points = (
+            sorted(point.cpu_s for point, _ in members),
+            [sign * p.error for p, _ in sorted(members, key=lambda m: m[0].cpu_s)],
+        )
         ax.plot(*points, **style, linestyle=line, markersize=6, markeredgecolor="white", zorder=4)
         for point, row in members:
             label = row["name"].removeprefix("denoised-").removeprefix("decoupled-").removeprefix("traced-")
@@ -103,7 +108,9 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
             )  # fmt: skip
     for floor in found["reference"]["noise_floor"].values():
         if name in floor:
-            ax.axhline(quality.score(floor[name]), color=FLOOR, linewidth=1.0, linestyle=(0, (1, 3)), zorder=1)
+            ax.axhline(
+                quality.score(floor[name]), color=FLOOR, linewidth=1.0, linestyle=(0, (1, 3)), zorder=1
+            )
     _axes(ax, is_more_better=quality.is_more_better)
 
 

@@ -51,7 +51,9 @@ def plot_crops(found: Mapping[str, Any], references: References, folder: Path, f
     images = []
     for row in rows:
         run = RunFolder.read(folder / "configurations" / row["name"])
-        images.append(displayed(read_exr(run.file_of(FRAMES, found["frames"][middle]))["RGB"].astype(np.float32)))
+        images.append(
+            displayed(read_exr(run.file_of(FRAMES, found["frames"][middle]))["RGB"].astype(np.float32))
+        )
     size = (PANEL_IN * (len(rows) + 1), 2 * PANEL_IN * len(windows) + 0.5)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     axes = figure.subplots(2 * len(windows), len(rows) + 1, squeeze=False)

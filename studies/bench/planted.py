@@ -37,13 +37,17 @@ def brightened(image: F32, shape_index: npt.NDArray[np.uint32], chosen: int) -> 
 
 def blurred(image: F32, geometry: Geometry, crop: Any) -> F32:
     """An image whose irradiance is blurred within each diffuse shape."""
-    albedo, index, is_diffuse = (crop(a) for a in (geometry.albedo, geometry.shape_index, geometry.has_diffuse))
+    albedo, index, is_diffuse = (
+        crop(a) for a in (geometry.albedo, geometry.shape_index, geometry.has_diffuse)
+    )
     found = image.copy()
     irradiance = image / np.maximum(albedo, 1e-3)
     for shape in np.unique(index[is_diffuse]):
         mask = is_diffuse & (index == shape)
         weight = gaussian_filter(mask.astype(np.float64), SIGMA_PX)
-        mean = np.stack([gaussian_filter(np.where(mask, c, 0.0), SIGMA_PX) for c in np.moveaxis(irradiance, 2, 0)], 2)
+        mean = np.stack(
+            [gaussian_filter(np.where(mask, c, 0.0), SIGMA_PX) for c in np.moveaxis(irradiance, 2, 0)], 2
+        )
         found[mask] = (mean / np.maximum(weight, 1e-9)[..., None] * albedo)[mask]
     return found
 

@@ -43,7 +43,9 @@ from studies.bench.windows import Window
 
 SUBPIXELS = 4  # along each axis
 BATCH = 256  # paths a pixel of a half that are traced together, with random numbers of their own
-SHARED_SPP = 5  # paths a subpixel in a batch that the Gaussian filter uses: its noise is then that of 251 paths
+SHARED_SPP = (
+    5  # paths a subpixel in a batch that the Gaussian filter uses: its noise is then that of 251 paths
+)
 SEED = 0x9E3779B9  # of the first batch; the next ones follow
 REACH = int(GAUSSIAN_RADIUS_PX * SUBPIXELS) - SUBPIXELS // 2  # subpixels of the filter beyond the pixel
 FILTERS = (SampleFilter.BOX, SampleFilter.GAUSSIAN)
@@ -86,7 +88,12 @@ class References:
     def __init__(self, store: Path, job: Job, windows: Sequence[Window], *, seed: int = SEED) -> None:
         scene = {key: value for key, value in job.scene.identity().items() if key != "variant"}
         depth = job.settings[TraceSettings].max_depth
-        self._identity: dict[str, Any] = {"scene": scene, "max_depth": depth, "subpixels": SUBPIXELS, "batch": BATCH}
+        self._identity: dict[str, Any] = {
+            "scene": scene,
+            "max_depth": depth,
+            "subpixels": SUBPIXELS,
+            "batch": BATCH,
+        }
         self._identity |= {} if seed == SEED else {"seed": seed}
         self._job, self._windows, self._seed = job, windows, seed
         self.folder = store / f"{job.scene.file.resolve().parent.name}-{_digest(self._identity)}"
@@ -146,7 +153,10 @@ class References:
     def _file(self, frame: int) -> Path:
         path = self._job.path
         cameras = [path.cameras[frame], *path.neighbours(frame)]
-        key = {"cameras": [_facts(camera) for camera in cameras], "windows": [asdict(w) for w in self._windows]}
+        key = {
+            "cameras": [_facts(camera) for camera in cameras],
+            "windows": [asdict(w) for w in self._windows],
+        }
         return self.folder / f"{_digest(key)}.npz"
 
     def _traced(self, walk: Walkthrough, frame: int, batch: int) -> dict[SampleFilter, F32]:
@@ -157,7 +167,10 @@ class References:
         within = np.arange(side)
         pixels = np.concatenate(
             [
-                (within[:, None] + w.top * SUBPIXELS - REACH) * fine.width + within + w.left * SUBPIXELS - REACH
+                (within[:, None] + w.top * SUBPIXELS - REACH) * fine.width
+                + within
+                + w.left * SUBPIXELS
+                - REACH
                 for w in self._windows
             ]
         )
@@ -166,7 +179,9 @@ class References:
             walk.renderer.trace(
                 fine,
                 pixels.ravel().astype(np.uint32),
-                RandomKey((self._seed + 2 * batch + part) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE),
+                RandomKey(
+                    (self._seed + 2 * batch + part) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE
+                ),
                 spp=spp,
                 pixel_filter=PixelFilter.BOX,
             ).color.reshape(len(self._windows), side, side, 3)
@@ -227,4 +242,6 @@ def _opened(file: Path) -> Iterator[Any]:
         with file.open("rb") as stream, np.load(stream) as arrays:
             yield arrays
     except (OSError, ValueError, BadZipFile) as error:
-        raise InputError(f"the reference {file} is missing or damaged ({error}): delete it, and run again") from error
+        raise InputError(
+            f"the reference {file} is missing or damaged ({error}): delete it, and run again"
+        ) from error

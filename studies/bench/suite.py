@@ -74,7 +74,9 @@ def found_in(folder: Path) -> list[Case]:
     return cases
 
 
-def run_case(case: Case, size: str, frames: int, only: Iterable[str], out: Path, options: list[str]) -> dict[str, Any]:
+def run_case(
+    case: Case, size: str, frames: int, only: Iterable[str], out: Path, options: list[str]
+) -> dict[str, Any]:
     """Run or continue the bench of a scene in a process of its own; return its results.
 
     Raises

@@ -34,7 +34,10 @@ def _configurations(found: Mapping[str, Any]) -> Table:
         family, cost = row["family"], row["cost"]
         cells = [cost["cpu_s"] / frames, cost["start_cpu_s"], cost["wall_s"] / frames, cost["peak_mib"]]
         scores = (score_text(name, row["values"][name]) for name in measures)
-        marked = (f"{text} *" if name in row["undecided"] else text for name, text in zip(measures, scores, strict=True))
+        marked = (
+            f"{text} *" if name in row["undecided"] else text
+            for name, text in zip(measures, scores, strict=True)
+        )
         table.add_row(row["name"], *map(number_text, cells), *marked)
     table.add_section()
     for kind, floor in found["reference"]["noise_floor"].items():
@@ -56,9 +59,7 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
     )  # fmt: skip
     for name, by_measure in found["ratios"].items():
         table.add_row(name, *(ratio_text(by_measure[measure]) for measure in found["measures"]))
-    table.caption = (
-        "in brackets 90 % intervals over draws of the windows; ≥: better than every rival; ≤: worse than every rival"
-    )
+    table.caption = "in brackets 90 % intervals over draws of the windows; ≥: better than every rival; ≤: worse than every rival"
     return [table]
 
 

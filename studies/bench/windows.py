@@ -128,7 +128,9 @@ def _shadows(walk: Walkthrough, frame: int, geometry: Geometry) -> Map:
     traced = walk.trace(
         frame, np.ones(shape, np.bool_), Purpose.PILOT, spp=PREVIEW_SPP, pixel_filter=PixelFilter.CENTRE
     )
-    color, albedo = (i.reshape(*shape, 3) @ np.array(REC709_LUMINANCE) for i in (traced.color, geometry.albedo))
+    color, albedo = (
+        i.reshape(*shape, 3) @ np.array(REC709_LUMINANCE) for i in (traced.color, geometry.albedo)
+    )
     is_lit = geometry.has_diffuse & ~geometry.is_specular
     gain = np.where(is_lit, 1.0 / np.maximum(albedo, 1e-3), 0.0)
     mean, count = _blocks(gain * color), _blocks(is_lit.astype(np.float64))

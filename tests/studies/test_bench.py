@@ -132,7 +132,9 @@ def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
     job = room_job(tmp_path, 2, method="reference")
     monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
     with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
-        bench(job, all_configurations(job, traced=(), denoised=(1,)), Place(tmp_path, tmp_path), reference_spp=4)
+        bench(
+            job, all_configurations(job, traced=(), denoised=(1,)), Place(tmp_path, tmp_path), reference_spp=4
+        )
     monkeypatch.setattr("studies.bench.measuring.why_no_measure", lambda name: f"no {name}")
     monkeypatch.setattr("studies.bench.colorvideovdp.why_missing", lambda: "no cvvdp")
     assert available((), job) == (["aqm", "psnr", "relrmse", "flicker"], ["no cvvdp", "no flip"])

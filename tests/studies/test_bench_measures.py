@@ -75,7 +75,10 @@ def test_a_missing_colorvideovdp_is_named_and_a_failing_one_is_an_error(tmp_path
 def test_squared_errors_of_a_known_error():
     constant = [pair(picture() + 0.1, picture(), is_first=frame == 0) for frame in range(2)]
     assert QUALITIES["psnr"].score([value(SquaredError(), constant)]) == pytest.approx(20.0, abs=1e-3)
-    grey = [replace(constant[0], linear=np.float32(1.1) * half, linear_halves=(half, half)) for half in constant[0].halves]
+    grey = [
+        replace(constant[0], linear=np.float32(1.1) * half, linear_halves=(half, half))
+        for half in constant[0].halves
+    ]
     expected = np.mean((0.1 * grey[0].linear_halves[0]) ** 2 / (grey[0].linear_halves[0] ** 2 + 0.01))
     assert value(RelativeSquaredError(), grey) == pytest.approx(float(expected), rel=1e-3)
 
@@ -109,7 +112,9 @@ def test_noise_of_the_reference_does_not_count(kind):
             replace(
                 seen,
                 halves=tuple(half + more for half, more in zip(seen.halves, added, strict=True)),
-                linear_halves=tuple(half + more for half, more in zip(seen.linear_halves, added, strict=True)),
+                linear_halves=tuple(
+                    half + more for half, more in zip(seen.linear_halves, added, strict=True)
+                ),
             )
         )
     # 110,592 products of deviation 0.05^2 (blocks: 1,584), and the changed denominator of the relative error

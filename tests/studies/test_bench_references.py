@@ -89,12 +89,16 @@ def test_references_grow_are_shared_and_are_the_same_however_they_grew(job, held
     assert held.missing(2 * BATCH + 1) == [0, 1, 2]
     grown = References(tmp_path, job, WINDOWS)
     grown.grow(10, Silence())
-    np.testing.assert_array_equal(grown.read(2).halves[SampleFilter.BOX], held.read(2).halves[SampleFilter.BOX])
+    np.testing.assert_array_equal(
+        grown.read(2).halves[SampleFilter.BOX], held.read(2).halves[SampleFilter.BOX]
+    )
     grown.grow(3 * BATCH, Silence())
     direct = References(tmp_path / "direct", job, WINDOWS)
     direct.grow(4 * BATCH, Silence())
     assert (grown.spp(2), direct.spp(2)) == (4 * BATCH, 4 * BATCH)
-    np.testing.assert_array_equal(grown.read(2).halves[SampleFilter.BOX], direct.read(2).halves[SampleFilter.BOX])
+    np.testing.assert_array_equal(
+        grown.read(2).halves[SampleFilter.BOX], direct.read(2).halves[SampleFilter.BOX]
+    )
     # Another method shares them; other windows or other seeds do not.
     assert References(tmp_path, replace(job, method="paper"), WINDOWS).missing(1) == []
     assert References(tmp_path, job, WINDOWS[:1]).missing(1) == [0, 1, 2]

@@ -22,7 +22,9 @@ LEAST_BLACK_CD_M2 = 1e-3  # ColorVideoVDP takes a contrast, which must be finite
 
 def why_missing() -> str:
     """Reason why ColorVideoVDP is not available, with the remedy; empty where it is."""
-    return "" if (ENVIRONMENT / ".ready").is_file() else "ColorVideoVDP is left out; set it up with: make judge"
+    return (
+        "" if (ENVIRONMENT / ".ready").is_file() else "ColorVideoVDP is left out; set it up with: make judge"
+    )
 
 
 def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) -> list[float]:
@@ -59,9 +61,18 @@ def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) 
             peak_cd_m2=viewing.peak_cd_m2,
             contrast=viewing.peak_cd_m2 / max(viewing.black_cd_m2, LEAST_BLACK_CD_M2),
         )
-        command = [str(ENVIRONMENT / "bin" / "python"), "-I", "-W", "ignore", str(HERE / "predict.py"), str(file)]
+        command = [
+            str(ENVIRONMENT / "bin" / "python"),
+            "-I",
+            "-W",
+            "ignore",
+            str(HERE / "predict.py"),
+            str(file),
+        ]
         limits = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **limits})
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, env={**os.environ, **limits}
+        )
     if done.returncode:
         last = done.stderr.strip().splitlines()[-1:] or ["no message"]
         raise EnfiladeError(f"ColorVideoVDP failed: {last[0]}; set it up again with: make judge")

@@ -1,8 +1,8 @@
 """ColorVideoVDP of pairs of sequences, for the environment of `setup.sh`; imports nothing of enfilade.
 
-    predict.py PAIRS.npz     arrays `test` and `reference` (K, F, H, W, 3), sRGB-encoded 0..1; `fps`, `ppd`,
-                             `peak_cd_m2`, `contrast`. Prints a JSON list of K scores, JOD.
-    predict.py --version     prints the versions
+predict.py PAIRS.npz     arrays `test` and `reference` (K, F, H, W, 3), sRGB-encoded 0..1; `fps`, `ppd`,
+                         `peak_cd_m2`, `contrast`. Prints a JSON list of K scores, JOD.
+predict.py --version     prints the versions
 """
 
 import json
@@ -26,7 +26,11 @@ def main() -> None:
     )
     place = pycvvdp.vvdp_display_geometry([width, height], ppd=float(arrays["ppd"]))
     metric = pycvvdp.cvvdp(
-        display_photometry=screen, display_geometry=place, heatmap=None, device=torch.device("cpu"), quiet=True
+        display_photometry=screen,
+        display_geometry=place,
+        heatmap=None,
+        device=torch.device("cpu"),
+        quiet=True,
     )
     scores = []
     with torch.no_grad():
