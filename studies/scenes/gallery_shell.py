@@ -32,8 +32,8 @@ from studies.scenes.writer import SceneWriter
 BLINDS = (
     (0.050, 0.060, 14.0, SILL + 0.02),
     (0.050, 0.060, 4.0, 1.9),
-    (0.090, 0.105, 16.0, SILL + 0.03),
-    (0.090, 0.105, 20.0, SILL + 0.03),
+    (0.080, 0.105, 16.0, SILL + 0.03),
+    (0.080, 0.105, 20.0, SILL + 0.03),
 )
 PARQUET_TILE = 1.6  # metres that one copy of the texture covers
 
