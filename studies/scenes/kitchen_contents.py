@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from studies.scenes import crockery, furniture, objects
 from studies.scenes.kitchen_plan import DEPTH, LENGTH, STOVE, TABLE, TABLE_SIZE, TOP, WIDTH
@@ -161,8 +161,6 @@ def add_plant(writer: SceneWriter, preset: Preset) -> None:
     writer.mesh("plant-leaves", green, "leaf", crease_deg=60)
 
 
-def _scatter(
-    writer: SceneWriter, name: str, mesh: Mesh, material: str, spots: Iterable[Vector] | Sequence[Vector]
-) -> None:
+def _scatter(writer: SceneWriter, name: str, mesh: Mesh, material: str, spots: Iterable[Vector]) -> None:
     """Add copies of a mesh at points, as one shape."""
     writer.mesh(name, join(mesh.at(*spot) for spot in spots), material)
