@@ -13,7 +13,7 @@ from pathlib import Path
 from enfilade.cli.progress import watch
 from enfilade.device import activate
 from enfilade.errors import EnfiladeError, InputError
-from studies.scenes import SCENES
+from studies.cases import SCENES
 
 DOCUMENT = Path(__file__).resolve().parent / "README.md"
 

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.monitor import Monitor
-from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
+from studies.cases import SCENES, placement, reflections, separation, statistics, supports, threshold, times
 from studies.cases.case import Case, Result, open_folder, read_result
 from studies.cases.extent import Extent
-from studies.scenes import SCENES
 
 Results = Mapping[str, Mapping[str, Result]]  # by item and scene
 

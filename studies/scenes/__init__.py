@@ -1,4 +1,4 @@
-"""The two generated case-study scenes, ROOM and ATRIUM (§6).
+"""The generated scenes: ROOM and ATRIUM of the case studies (§6), GALLERY and KITCHEN of the bench alone.
 
 Heavy libraries are imported when a scene is written.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from enfilade.errors import SceneError, SettingsError
 
-SCENES = ("room", "atrium")
+SCENES = ("room", "atrium", "gallery", "kitchen")
 PRESETS = ("full", "small")
 
 
@@ -39,7 +39,9 @@ def write_scene(
     ----------
     name
         `room`: diffuse, a walk of varying speed with rests, 448 frames. `atrium`: mirrors, glass,
-        metal and a polished floor, a steady walk, 200 frames.
+        metal and a polished floor, a steady walk, 200 frames. `gallery`: a low sun through blinds, showcases
+        and a mirror, 300 frames. `kitchen`: coated, rough and metallic materials under small lamps,
+        300 frames.
     folder
         Created if absent; files of the same names are replaced.
     preset

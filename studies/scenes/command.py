@@ -1,4 +1,4 @@
-"""``python -m studies scene``: write one of the two generated scenes with its camera path."""
+"""``python -m studies scene``: write a generated scene with its camera path."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from enfilade.cli.options import Size, json_option
 from studies.scenes import PRESETS, SCENES
 
 
-@click.command("scene", short_help="Write one of the two generated scenes.")
+@click.command("scene", short_help="Write a generated scene.")
 @click.argument("name", type=click.Choice(SCENES))
 @click.option(
     "--out",
@@ -37,7 +37,11 @@ from studies.scenes import PRESETS, SCENES
 @json_option
 @debug_option
 def command(*, name: str, folder: Path, preset: str, size: tuple[int, int] | None, as_json: bool) -> None:
-    """Write a generated scene and its camera path: room (diffuse) or atrium (mirrors, glass, gloss)."""
+    """Write a generated scene and its camera path.
+
+    room: diffuse. atrium: mirrors, glass, gloss. gallery: low sun through blinds, showcases, a mirror.
+    kitchen: coated, rough and metallic materials under small lamps.
+    """
     from studies.scenes import write_scene
 
     files = write_scene(name, folder, preset=preset, size=size)

@@ -39,16 +39,20 @@ class Material:
     ----------
     finish
         `matte`, `polished` (smooth coat over a pigment), `satin` (rough coat), `metal`,
-        `mirror` or `pane` (thin glass).
+        `mirror`, `pane` (thin glass), `glass` (solid) or `pbr` (Mitsuba's `principled`).
     colour
-        `#rrggbb` or a texture's file name; the reflectance of metals and mirrors.
+        `#rrggbb` or a texture's file name; the reflectance of metals and mirrors, the transmittance of glass.
     roughness
-        Microfacet width of satin and metal.
+        Microfacet width of satin and metal; `roughness` of `pbr`.
+    metallic, clearcoat
+        Of `pbr`, 0 to 1.
     """
 
     finish: str
     colour: Colour = "#ffffff"
     roughness: float = 0.1
+    metallic: float = 0.0
+    clearcoat: float = 0.0
 
     def element(self) -> ET.Element:
         """Return the BSDF, two-sided unless it is transmissive."""
@@ -70,6 +74,12 @@ class Material:
                 ET.SubElement(inner, "string", name="material", value="none")
             case "pane":
                 return self._bsdf("thindielectric", "specular_transmittance")
+            case "glass":
+                return self._bsdf("dielectric", "specular_transmittance")
+            case "pbr":
+                inner = self._bsdf("principled", "base_color")
+                for name in ("roughness", "metallic", "clearcoat"):
+                    ET.SubElement(inner, "float", name=name, value=repr(getattr(self, name)))
             case _:
                 raise ValueError(f"finish {self.finish!r} is not one of those of Material")
         outer = ET.Element("bsdf", type="twosided")

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from studies.scenes.materials import linear
+from studies.scenes.solids import Vector
 from studies.scenes.textures import Floats, Image8, blend, cloud, display, encoded, grid, noise
 
 
@@ -85,3 +86,24 @@ def overcast(size: int, strength: float) -> npt.NDArray[np.float32]:
     shape: Floats = np.clip(1.7 * cloud(u, v, 3, 21, 5) - 0.35, 0, 1)
     image = blend(linear("#a9c9ee"), linear("#fbf8f2"), shape)
     return np.asarray(strength * image, dtype=np.float32)
+
+
+def horizon(size: int, strength: float, sun: Vector) -> npt.NDArray[np.float32]:
+    """Return the radiance of a sky in latitude and longitude, (size, size, 3), zenith first.
+
+    Columns run from north by east, south and west. The sky is brighter around the sun, whose light travels
+    along `sun`, and the sun itself is left out. Trees stand on the horizon. The north is dark: a scene
+    without windows to the north then wastes no samples on it.
+    """
+    u, v = grid(size)
+    azimuth, polar = 2 * np.pi * u, np.pi * v
+    towards = -np.array(sun) / np.linalg.norm(sun)
+    x, y, z = np.sin(polar) * np.sin(azimuth), np.sin(polar) * np.cos(azimuth), np.cos(polar)
+    glow = np.clip(x * towards[0] + y * towards[1] + z * towards[2], 0, 1) ** 6
+    image = blend(linear("#b9d3f0"), linear("#fff2df"), 1 - np.clip(z / 0.5, 0, 1))
+    image = image * (0.6 + 0.7 * glow)[..., None]
+    crest = 0.02 + 0.07 * cloud(u, np.full_like(v, 0.3), 12, 5)
+    leaves = blend(linear("#34472a"), linear("#7a8b55"), cloud(u, v, 32, 9))
+    image = blend(image, 0.5 * leaves, np.clip((crest - z) / 0.01, 0, 1))
+    image = blend(image, 0.25 * linear("#a09a80"), np.clip(-z / 0.02, 0, 1))
+    return np.asarray(strength * image * (y < 0.5)[..., None], dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Shared pieces of both scenes: flat sheets, poses and pictures."""
+"""Pieces that scenes share: flat sheets, poses and pictures."""
 
 from __future__ import annotations
 

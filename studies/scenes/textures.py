@@ -122,6 +122,25 @@ def wood(size: int, dark: Colour, light: Colour, seed: int, planks: int = 1) -> 
     return encoded(image * (1 - 0.5 * (edge & (planks > 1)))[..., None])
 
 
+def parquet(size: int, dark: Colour, light: Colour, cells: int, seed: int) -> Image8:
+    """Return basket-weave parquet: squares of four staves, whose grain turns from square to square.
+
+    `cells` is the number of squares along a side; an even number repeats without a seam.
+    """
+    u, v = grid(size)
+    i, j = (u * cells).astype(int), (v * cells).astype(int)
+    s, t = u * cells - i, v * cells - j
+    is_turned = (i + j) % 2 == 1
+    across, along = np.where(is_turned, t, s), np.where(is_turned, s, t)
+    stave = (across * 4).astype(int)
+    shade = np.random.default_rng(seed).random((cells, cells, 4))[j, i, stave]
+    fibre = noise((across + shade) % 1.0, (along + shade) % 1.0, (48, 3), seed + 1)
+    rings = noise((across + 3 * shade) % 1.0, (along + shade) % 1.0, (14, 1), seed + 2)
+    image = blend(dark, light, 0.15 + 0.45 * shade + 0.25 * rings + 0.2 * fibre)
+    joint = np.minimum.reduce([across * 4 - stave, 1 - (across * 4 - stave), 4 * along, 4 * (1 - along)])
+    return encoded(image * (1 - 0.55 * (joint < 0.05))[..., None])
+
+
 def gingham(size: int, colour: Colour, ground: Colour, checks: int) -> Image8:
     """Return chequered cloth: bands of warp and weft that cross."""
     u, v = grid(size)

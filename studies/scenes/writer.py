@@ -11,7 +11,7 @@ from PIL import Image
 
 from studies.scenes.materials import Colour, Material, linear, rgb
 from studies.scenes.shading import shaded_vertices
-from studies.scenes.solids import Floats, Mesh
+from studies.scenes.solids import Floats, Mesh, Vector
 
 SCENE_VERSION = "3.0.0"
 FACE = np.dtype([("count", "u1"), ("corners", "<i4", (3,))])
@@ -105,12 +105,6 @@ class SceneWriter:
         else:
             emitter.append(rgb("radiance", linear(radiance) * strength))
 
-    def sky(self, colour: Colour, strength: float) -> None:
-        """Add a constant environment."""
-        emitter = ET.Element("emitter", type="constant", id="sky")
-        emitter.append(rgb("radiance", linear(colour) * strength))
-        self._emitters.append(emitter)
-
     def sun(
         self, direction: tuple[float, float, float], colour: Colour, strength: float, *, weight: float = 1.0
     ) -> None:
@@ -120,6 +114,27 @@ class SceneWriter:
         ET.SubElement(emitter, "vector", name="direction", x=repr(x), y=repr(y), z=repr(z))
         ET.SubElement(emitter, "float", name="sampling_weight", value=repr(weight))
         emitter.append(rgb("irradiance", linear(colour) * strength))
+        self._emitters.append(emitter)
+
+    def environment(self, radiance: str, *, weight: float = 1.0) -> None:
+        """Add a sky in latitude and longitude, a file of `radiance`; its columns run from north by east."""
+        emitter = ET.Element("emitter", type="envmap", id="environment")
+        ET.SubElement(emitter, "string", name="filename", value=radiance)
+        ET.SubElement(emitter, "float", name="sampling_weight", value=repr(weight))
+        # Mitsuba's map has y up and -z at its first column.
+        emitter.append(transform(np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])))
+        self._emitters.append(emitter)
+
+    def spot(
+        self, origin: Vector, target: Vector, colour: Colour, intensity: float, *, cutoff_deg: float
+    ) -> None:
+        """Add a spot light that shines from a point at another, `intensity` watts a steradian on its axis."""
+        emitter = ET.Element("emitter", type="spot", id="spot")
+        place = ET.SubElement(emitter, "transform", name="to_world")
+        points = {"origin": origin, "target": target, "up": (0.0, 1.0, 0.0)}
+        ET.SubElement(place, "lookat", {k: " ".join(map(repr, point)) for k, point in points.items()})
+        ET.SubElement(emitter, "float", name="cutoff_angle", value=repr(cutoff_deg))
+        emitter.append(rgb("intensity", linear(colour) * intensity))
         self._emitters.append(emitter)
 
     def write(self, *, camera_to_world: Floats, fov_deg: float, size: tuple[int, int]) -> Path:

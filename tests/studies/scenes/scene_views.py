@@ -20,6 +20,8 @@ GRID = (64, 48)
 class View:
     """Surfaces along a coarse grid of rays in one frame of a walk."""
 
+    eye: np.ndarray  # (3,), metres
+    rays: np.ndarray  # (n, 3), directions
     distance: np.ndarray  # (n,), metres, infinite where nothing is hit
     is_view_dependent: np.ndarray  # (n,)
     speed_deg_s: np.ndarray  # (n,), on the screen, towards the next frame
@@ -49,7 +51,7 @@ def view(scene: Any, here: np.ndarray, there: np.ndarray, fov_deg: float, fps: i
     row = height / 2 - focal * moved[:, 1] / -moved[:, 2]
     flow = np.hypot(column - x.ravel(), row - y.ravel()) * 640 / width
     flags = np.array(hit.bsdf().flags(), dtype=np.int64)
-    return View(distance, (flags & lobes) != 0, flow * fps / PIXELS_PER_DEGREE)
+    return View(here[:3, 3], rays, distance, (flags & lobes) != 0, flow * fps / PIXELS_PER_DEGREE)
 
 
 def folder_bytes(folder: Path) -> dict[str, bytes]:

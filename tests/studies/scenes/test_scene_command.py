@@ -16,6 +16,6 @@ def test_scene_prints_its_files_and_the_next_commands(run, tmp_path):
     assert all(Path(file).exists() for file in files.values())
 
 
-@pytest.mark.parametrize("arguments", [("scene", "kitchen", "--out", "x"), ("scene", "room")])
+@pytest.mark.parametrize("arguments", [("scene", "cellar", "--out", "x"), ("scene", "room")])
 def test_scene_refuses(run, arguments):
     assert run(*arguments).exit_code == 2

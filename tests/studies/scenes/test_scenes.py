@@ -17,7 +17,10 @@ from scene_views import View, folder_bytes, read_path
 from enfilade.camera import load_path
 from enfilade.errors import InputError, SettingsError
 from studies.scenes import PRESETS, SCENES, SceneFiles, write_scene
+from studies.scenes import gallery_plan as gallery
 from studies.scenes.atrium import walk as atrium_walk
+from studies.scenes.gallery import walk as gallery_walk
+from studies.scenes.kitchen import walk as kitchen_walk
 from studies.scenes.presets import PRESETS as SIZES
 from studies.scenes.room import walk as room_walk
 
@@ -88,10 +91,11 @@ def test_path_is_rigid_and_complete(name: str, small: dict[str, SceneFiles]) -> 
     assert (turns[:, 2, 1] > 0.9).all()  # the camera stays upright
 
 
-@pytest.mark.parametrize(("design", "counts"), [(room_walk, (448, 60)), (atrium_walk, (200, 60))])
-def test_walks_have_the_papers_length_and_no_jerks(
-    design: Callable[..., Any], counts: tuple[int, ...]
-) -> None:
+@pytest.mark.parametrize(
+    ("design", "counts"),
+    [(room_walk, (448, 60)), (atrium_walk, (200, 60)), (gallery_walk, (300, 60)), (kitchen_walk, (300, 60))],
+)
+def test_walks_have_their_length_and_no_jerks(design: Callable[..., Any], counts: tuple[int, ...]) -> None:
     assert tuple(design(SIZES[preset])[1] for preset in PRESETS) == counts
     walk, frames = design(SIZES["full"])
     poses = walk.poses(frames)
@@ -124,7 +128,69 @@ def test_camera_keeps_clear_and_indoors(name: str, look: Look) -> None:
     for frame in range(0, 59, 6):
         distance = look(name, frame).distance
         assert distance.min() > 0.3
-        assert np.isfinite(distance).all()  # no ray leaves through a gap
+        if name != "gallery":
+            assert np.isfinite(distance).all()  # no ray leaves through a gap
+
+
+def test_rays_leave_the_gallery_by_its_windows(look: Look) -> None:
+    windows = [(x, gallery.WINDOW_WIDTH, gallery.SILL, gallery.HEAD) for x in gallery.WINDOWS_X]
+    east = [(gallery.EAST_WINDOW, gallery.EAST_WIDTH, gallery.EAST_SILL, gallery.EAST_HEAD)]
+    counts = []
+    for frame in range(0, 59, 6):
+        view = look("gallery", frame)
+        out = view.rays[np.isinf(view.distance)]
+        counts.append(len(out))
+        by_south = _crossing(view.eye, out, axis=1, plane=0.0)
+        by_east = _crossing(view.eye, out, axis=0, plane=gallery.LENGTH)
+        assert (_within(by_south[:, [0, 2]], windows) | _within(by_east[:, [1, 2]], east)).all()
+    assert max(counts) > 30  # the sky is in view
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [((2.6, 1.9, 0.001), (2.6, 3.1, 0.001)), ((4.4, 6.999, 0.4), (4.4, 6.999, 1.6))],
+    ids=["floor near the blind", "wall far from the blind"],
+)
+def test_blinds_throw_stripes_near_and_far(
+    start: tuple[float, ...], end: tuple[float, ...], loaded: dict[str, Any]
+) -> None:
+    points = np.linspace(start, end, 2000)
+    towards = mi.Vector3f((-np.array(gallery.SUN) / np.linalg.norm(gallery.SUN)).tolist())
+    is_shaded = np.array(
+        loaded["gallery"].ray_test(mi.Ray3f(mi.Point3f(points.T.astype(np.float32)), towards))
+    )
+    assert 0.25 < is_shaded.mean() < 0.75
+    assert np.count_nonzero(np.diff(is_shaded.astype(int))) > 6  # at least three stripes
+
+
+def test_kitchen_has_small_lamps_and_layered_materials(small: dict[str, SceneFiles]) -> None:
+    root = ET.parse(small["kitchen"].scene).getroot()
+    assert {e.get("type") for e in root.iter("emitter")} == {"area", "spot"}
+    layered = {"principled", "roughplastic", "plastic", "roughconductor", "conductor", "dielectric"}
+    assert layered <= {e.get("type") for e in root.iter("bsdf")}
+
+
+@pytest.mark.parametrize("design", [gallery_walk, kitchen_walk])
+@pytest.mark.parametrize("preset", PRESETS)
+def test_new_walks_rest_and_keep_a_walking_pace(design: Callable[..., Any], preset: str) -> None:
+    walk, frames = design(SIZES[preset])
+    step_m = np.linalg.norm(np.diff(walk.poses(frames)[:, :3, 3], axis=0), axis=1)
+    assert 30 * step_m.max() < 2.0  # m/s
+    assert 30 * step_m.min() < 0.1
+
+
+def _crossing(eye: np.ndarray, rays: np.ndarray, *, axis: int, plane: float) -> np.ndarray:
+    """Where rays meet the plane of an inner face of a wall, (n, 3); NaN behind the eye."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (plane - eye[axis]) / rays[:, axis]
+    return eye + rays * np.where(along > 0.0, along, np.nan)[:, None]
+
+
+def _within(points: np.ndarray, windows: list[tuple[float, float, float, float]]) -> np.ndarray:
+    """Whether points (along, z) are within one of the openings (centre, width, sill, head)."""
+    along, z = points.T
+    inside = [(abs(along - c) <= w / 2) & (z >= low) & (z <= high) for c, w, low, high in windows]
+    return np.any(inside, axis=0)
 
 
 def test_unknown_names_and_sizes_are_refused(tmp_path: Path) -> None:
