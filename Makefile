@@ -1,6 +1,6 @@
 # make demo    set up, render a small walkthrough into runs/demo, and write its report
 # make test    set up, run the tests in two processes (JOBS=4: four); installs Chromium by apt if it is missing
-# make validate-metric   set up, validate the metric on published experiments with observers (five minutes)
+# make validate-metric   set up, validate the metric on published experiments with observers (seven minutes)
 # make bench   set up, compare enfilade's methods with baselines on ROOM and ATRIUM; prints a forecast of the time
 # make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
 # make check   set up, check formatting, lint, types and import rules

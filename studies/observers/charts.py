@@ -22,10 +22,15 @@ MODE_STYLES = (  # first the published metric, then the modern one
 SERIES_COLORS = (INK, GREEN, BLUE, VERMILION, "#AA4499")
 FREQUENCY, RATE, AREA = "frequency_cpd", "temporal_hz", "area_deg2"
 AXES = {FREQUENCY: "spatial frequency, cpd", RATE: "temporal frequency, Hz", AREA: "area, deg²"}
+TICKS = {
+    FREQUENCY: (0.5, 1, 2, 4, 8),
+    RATE: (0.5, 1, 2, 4, 8, 16, 32),
+    AREA: (0.01, 0.1, 1, 10, 100, 1000),
+}
 SERIES = {FREQUENCY: "cpd", RATE: "Hz"}
 STUDIES = {  # title, abscissa, what divides the points into series
-    "robson1966_cpd": ("Robson 1966, flicker, 20 cd/m²", FREQUENCY, RATE),
-    "robson1966_hz": ("Robson 1966, flicker, 20 cd/m²", RATE, FREQUENCY),
+    "robson1966_cpd": ("Robson 1966, flicker at four rates, 20 cd/m²", FREQUENCY, RATE),
+    "robson1966_hz": ("Robson 1966, flicker by rate, 20 cd/m²", RATE, FREQUENCY),
     "laird2006": ("Laird et al. 2006, drift, 60 cd/m²", FREQUENCY, RATE),
     "rovamo1993": ("Rovamo et al. 1993, static, 50 cd/m²", AREA, FREQUENCY),
 }
@@ -127,8 +132,8 @@ def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
         _draw_series(ax, found, abscissa, series)
         ax.set_title(title, fontsize=10, color=INK)
         ax.set(xscale="log", yscale="log", xlabel=AXES[abscissa], ylim=(1.5, 900.0))
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("")
+        ax.set_xticks(TICKS[abscissa], [f"{tick:g}" for tick in TICKS[abscissa]])
+        ax.minorticks_off()
         ax.legend(fontsize=8, frameon=False, loc="lower left" if abscissa != AREA else "lower right", ncols=2)
     for ax in axes[::2]:
         ax.set_ylabel("contrast sensitivity")

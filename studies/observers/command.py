@@ -36,7 +36,7 @@ def command(ctx: click.Context, /, *, folder: Path | None, as_json: bool, quiet:
 
     Both modes of the metric are applied to the stimuli of published experiments. The exit status is 1 if
     the modern mode misses a target that it is not recorded to miss, or misses one by more than is recorded.
-    The fitted constants are cross-validated. This takes about six minutes of CPU time.
+    The fitted constants are cross-validated. This takes about seven minutes of CPU time.
     """
     from enfilade.cli.progress import watch
     from studies.observers.validate import validate

@@ -65,7 +65,7 @@ def measure(mode: Mode, monitor: Monitor, *, has_targets: bool) -> ModeResults:
 
     Notes
     -----
-    About a minute and a quarter of CPU time.
+    Two to three minutes of CPU time.
     """
     return ModeResults(
         mode=mode.name,
