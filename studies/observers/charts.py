@@ -132,7 +132,9 @@ def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
         _draw_series(ax, found, abscissa, series)
         ax.set_title(title, fontsize=10, color=INK)
         ax.set(xscale="log", yscale="log", xlabel=AXES[abscissa], ylim=(1.5, 900.0))
-        ax.set_xticks(TICKS[abscissa], [f"{tick:g}" for tick in TICKS[abscissa]])
+        x = _array(found[0][abscissa])
+        ticks = [tick for tick in TICKS[abscissa] if 0.9 * x.min() <= tick <= 1.1 * x.max()]
+        ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         ax.minorticks_off()
         ax.legend(fontsize=8, frameon=False, loc="lower left" if abscissa != AREA else "lower right", ncols=2)
     for ax in axes[::2]:
