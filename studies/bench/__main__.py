@@ -1,10 +1,10 @@
 """Run the bench on the generated scenes, or on a folder of scenes: `make bench`.
 
-    python -m studies.bench [--quick] [--scene NAME ...] [--scenes FOLDER] [--sizes 320x180 1280x720] [--frames 40]
+    python -m studies.bench [--quick] [--scene NAME ...] [--scenes FOLDER] [--sizes 320x180 1280x720]
 
-Runs or continues the bench of each scene and size, prints the geometric means of the ratios by camp, and writes all
-results with date, machine and code as one JSON file, and one page of figures. Further options go to
-`python -m studies bench`, such as --reference-spp and --references.
+Runs or continues the bench of each scene and size, prints the geometric means of the ratios by camp, and
+writes all results with date, machine and code as one JSON file, and one page of figures. Further options go
+to `python -m studies bench`, such as --reference-spp and --references.
 """
 
 import argparse

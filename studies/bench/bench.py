@@ -222,7 +222,7 @@ class _Bench:
         }
 
     def floor(self, pixel_filter: SampleFilter) -> dict[str, list[float]]:
-        """Values of one half of the references against the other, by the measures that contain their noise."""
+        """Values of one half of the references against the other, by measures that contain their noise."""
         found = self._values(f"noise floor, {pixel_filter.value}", None, pixel_filter)
         return {name: values for name, values in found.items() if QUALITIES[name].has_noise}
 
@@ -242,7 +242,7 @@ class _Bench:
         wanted = [m for m in self._names if run is not None or QUALITIES[m].has_noise]
         if missing := [m for m in wanted if m not in found["values"]]:
             with watch(quiet=self._quiet) as monitor:
-                source = run and windows_of_run(run, self._job.path, self._windows)
+                source = windows_of_run(run, self._job.path, self._windows) if run else None
                 found["values"] |= measure(
                     source, pixel_filter, self._references, self._windows, self._job, missing,
                     Prefixed(monitor, name),
@@ -280,7 +280,8 @@ def undecided(values: Mapping[str, Sequence[float]], floors: Mapping[str, Sequen
     Parameters
     ----------
     values, floors
-        Values of the windows by measure, of a configuration and of one half of the reference against the other.
+        Values of the windows by measure: of a configuration, and of one half of the references against the
+        other.
     """
     return [
         name

@@ -69,7 +69,8 @@ def plot_page(benches: Sequence[Mapping[str, Any]], file: Path) -> Path:
 
 def _title(found: Mapping[str, Any]) -> str:
     size = "x".join(map(str, found["size"]))
-    return f"{found['scene']}, {len(found['frames'])} frames of {size}, reference {found['reference']['spp']} paths"
+    paths = found["reference"]["spp"]
+    return f"{found['scene']}, {len(found['frames'])} frames of {size}, reference {paths} paths"
 
 
 def _legend(figure: Any, ax: Any) -> None:

@@ -67,7 +67,8 @@ class Guides:
         if is_followed and not isinstance(self._renderer, LobeRenderer):
             name = self._renderer.describe().renderer
             raise SettingsError(
-                f"denoiser.guides=followed needs a renderer that separates lobes; {name} does not: take first-hit"
+                f"denoiser.guides=followed needs a renderer that separates lobes, which {name} does not; "
+                "take first-hit"
             )
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
         step = max(chunk // SIDE**2, 1)

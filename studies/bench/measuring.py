@@ -35,7 +35,7 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
         A requested measure is missing, or all are.
     """
     path = job.path
-    reasons = {name: "" for name in QUALITIES}
+    reasons = dict.fromkeys(QUALITIES, "")
     reasons |= {"cvvdp": colorvideovdp.why_missing(), "flip": why_no_measure("flip")}
     if not any(path.neighbours(frame)[0] for frame in range(len(path))):
         reasons["flicker"] = "flicker is left out: it needs consecutive frames"

@@ -38,7 +38,7 @@ def selected(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def plot_crops(found: Mapping[str, Any], references: References, folder: Path, file: Path) -> Path:
-    """Draw all windows of the middle frame: two rows each, the pixels and four times the difference around grey."""
+    """Draw all windows of the middle frame: the pixels, and four times the difference around grey."""
     rows, measure = selected(found), next(iter(found["measures"]))
     windows = windows_of(found["windows"])
     middle = len(found["frames"]) // 2

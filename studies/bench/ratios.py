@@ -1,4 +1,4 @@
-"""CPU time at equal quality: enfilade's configurations against the front of rivals, with intervals over windows."""
+"""CPU time at equal quality: enfilade's configurations against the front of rivals, with intervals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class Ratio:
         ``at least``: it is better than every rival; the best rival is compared, which would need more time.
         ``at most``: it is worse than every rival; the cheapest is compared.
     low, high : float
-        Interval of 90 % over draws of the windows, with replacement. It does not contain the spread of CPU times.
+        Interval of 90 % over draws of the windows, with replacement. It does not contain the spread of CPU
+        times.
     """
 
     times: float

@@ -89,7 +89,8 @@ def run_case(
     last = min(FIRST_FRAME + frames - 1, length)
     folder = out / f"{case.name}-{size}"
     command = [
-        sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path), "--out", str(folder),
+        sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path),
+        "--out", str(folder),
         "--size", size, "--frames", f"{max(last - frames + 1, 1)}-{last}",
         "--set", f"viewing.diagonal_m={math.hypot(width, height) * PIXEL_M}",
         *(word for pattern in only for word in ("--only", pattern)), *options,

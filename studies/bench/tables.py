@@ -41,11 +41,11 @@ def _configurations(found: Mapping[str, Any]) -> Table:
         table.add_row(row["name"], *map(number_text, cells), *marked)
     table.add_section()
     for kind, floor in found["reference"]["noise_floor"].items():
-        cells = (score_text(name, floor[name]) if name in floor else "" for name in measures)
-        table.add_row(f"noise floor, {kind}", "", "", "", "", *cells)
+        texts = (score_text(name, floor[name]) if name in floor else "" for name in measures)
+        table.add_row(f"noise floor, {kind}", "", "", "", "", *texts)
     table.caption = (
-        f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths a pixel in two "
-        "halves; floor: one half against the other; *: nearer to it than a third, not decided"
+        f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths a pixel in "
+        "two halves; floor: one half against the other; *: error less than a third above it, not decided"
     )
     return table
 
@@ -59,7 +59,10 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
     )  # fmt: skip
     for name, by_measure in found["ratios"].items():
         table.add_row(name, *(ratio_text(by_measure[measure]) for measure in found["measures"]))
-    table.caption = "in brackets 90 % intervals over draws of the windows; ≥: better than every rival; ≤: worse than every rival"
+    table.caption = (
+        "in brackets 90 % intervals over draws of the windows; ≥: better than every rival, "
+        "≤: worse than every rival"
+    )
     return [table]
 
 

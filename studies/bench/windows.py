@@ -1,8 +1,8 @@
 """Windows of the image in which a bench measures: drawn from the scene before any configuration is rendered.
 
-A window is a rectangle of pixels, the same in all frames. One is drawn for each of four kinds of content: edges
-of objects, gloss (glossy, mirroring and transparent surfaces), shadows (light that varies over one surface),
-and flat surfaces without any of these.
+A window is a square of pixels, the same in all frames. One is drawn for each of four kinds of content: edges of
+objects, gloss (glossy, mirroring and transparent surfaces), shadows (light that varies over one surface), and
+flat surfaces without any of these.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Window:
     top: int
     side: int
 
-    def crop(self, image: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    def crop(self, image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The window's pixels of an image (H, W, ...)."""
         return image[self.top : self.top + self.side, self.left : self.left + self.side]
 
@@ -59,8 +59,8 @@ class Window:
 def draw_windows(walk: Walkthrough) -> list[Window]:
     """Draw a window of each kind, without overlap.
 
-    Candidates lie on a grid. Each kind in turn takes the candidate with the largest share of its content, averaged
-    over frames along the path.
+    Candidates lie on a grid. Each kind in turn takes the candidate with the largest share of its content,
+    averaged over frames along the path.
 
     Parameters
     ----------
@@ -157,7 +157,8 @@ def _blocks(image: F32 | Map) -> Map:
     """Means over blocks of :data:`BLOCK_PX`; an incomplete block at the border is left out."""
     rows, columns = image.shape[0] // BLOCK_PX, image.shape[1] // BLOCK_PX
     cut = image[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float64)
-    return cut.reshape(rows, BLOCK_PX, columns, BLOCK_PX).mean(axis=(1, 3))
+    means: Map = cut.reshape(rows, BLOCK_PX, columns, BLOCK_PX).mean(axis=(1, 3))
+    return means
 
 
 def _neighbours(blocks: npt.NDArray[Any], axis: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:

@@ -19,10 +19,20 @@ MODE_STYLES = (  # first the published metric, then the modern one
     {"color": VERMILION, "marker": "s", "linestyle": "--"},
     {"color": BLUE, "marker": "o", "linestyle": "-"},
 )
-STUDY_TITLES = {
-    "robson1966": "Robson 1966, 20 cd/m²",
-    "laird2006": "Laird et al. 2006, 60 cd/m²",
-    "modelfest": "Gabors of ModelFest, 30 cd/m²",
+SERIES_COLORS = (INK, GREEN, BLUE, VERMILION, "#AA4499")
+FREQUENCY, RATE, AREA = "frequency_cpd", "temporal_hz", "area_deg2"
+AXES = {FREQUENCY: "spatial frequency, cpd", RATE: "temporal frequency, Hz", AREA: "area, deg²"}
+TICKS = {
+    FREQUENCY: (0.5, 1, 2, 4, 8),
+    RATE: (0.5, 1, 2, 4, 8, 16, 32),
+    AREA: (0.01, 0.1, 1, 10, 100, 1000),
+}
+SERIES = {FREQUENCY: "cpd", RATE: "Hz"}
+STUDIES = {  # title, abscissa, what divides the points into series
+    "robson1966_cpd": ("Robson 1966, flicker at four rates, 20 cd/m²", FREQUENCY, RATE),
+    "robson1966_hz": ("Robson 1966, flicker by rate, 20 cd/m²", RATE, FREQUENCY),
+    "laird2006": ("Laird et al. 2006, drift, 60 cd/m²", FREQUENCY, RATE),
+    "rovamo1993": ("Rovamo et al. 1993, static, 50 cd/m²", AREA, FREQUENCY),
 }
 TEXTURE_COLORS = {"checkerboard": VERMILION, "gradient": GREEN, "grass": GREY, "noise": BLUE}
 DISPLAY_MARKERS = {"pc": "o", "phone": "s", "headset": "^"}
@@ -53,10 +63,10 @@ def plot_validation(validation: Mapping[str, Any], folder: Path) -> list[Path]:
     return [save(figure, folder / name) for name, figure in figures.items()]
 
 
-def _new(columns: int, *, width: float = 1.0) -> tuple[Figure, list[Any]]:
-    size = (PANEL_IN[0] * columns * width, PANEL_IN[1] + 0.5)
+def _new(columns: int, *, rows: int = 1, width: float = 1.0) -> tuple[Figure, list[Any]]:
+    size = (PANEL_IN[0] * columns * width, PANEL_IN[1] * rows + 0.5)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-    axes = figure.subplots(1, columns, squeeze=False)[0]
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax in axes:
         ax.grid(color="#DDDDDD", linewidth=0.6)
         ax.set_axisbelow(True)
@@ -97,64 +107,53 @@ def _modelfest(modes: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def _masking(modes: Sequence[Mapping[str, Any]]) -> Figure:
-    figure, (ax,) = _new(1, width=1.4)
-    observers = modes[0]["masking"]
-    ax.plot(observers["mask_db"], observers["observers_db"], "D", color=INK, markersize=6, label="Foley 1994")
-    for mode, style in zip(modes, MODE_STYLES, strict=False):
-        predicted = mode["masking"]
-        label = f"{mode['mode']}, gain {predicted['gain_db']:+.1f} dB"
-        ax.plot(
-            predicted["mask_db"], predicted["metric_db"], **style, markersize=4, linewidth=1.4, label=label
-        )
-    ax.set_xlabel("contrast of the mask, dB")
-    ax.set_ylabel("contrast of the target at threshold, dB")
-    ax.legend(fontsize=8, frameon=False, loc="upper left")
+    angles = list(modes[0]["masking"])
+    figure, axes = _new(len(angles))
+    for ax, angle in zip(axes, angles, strict=True):
+        observers = modes[0]["masking"][angle]
+        marks = {"color": INK, "markersize": 6}
+        ax.plot(observers["mask_db"], observers["observers_db"], "D", label="Foley 1994", **marks)
+        for mode, style in zip(modes, MODE_STYLES, strict=False):
+            found = mode["masking"][angle]
+            label = f"{mode['mode']}, gain {found['gain_db']:+.1f} dB"
+            lines = {"markersize": 4, "linewidth": 1.4, "label": label}
+            ax.plot(found["mask_db"], found["metric_db"], **style, **lines)
+        ax.set_title(f"mask at {angle} degrees to the target", fontsize=10, color=INK)
+        ax.set(xlabel="contrast of the mask, dB", ylim=(-40.0, -12.0))
+    axes[0].set_ylabel("contrast of the target at threshold, dB")
+    axes[0].legend(fontsize=8, frameon=False, loc="upper left")
     return figure
 
 
 def _sensitivity(modes: Sequence[Mapping[str, Any]]) -> Figure:
-    figure, axes = _new(len(STUDY_TITLES))
-    colors = {
-        0.0: INK,
-        1.0: INK,
-        6.06: GREEN,
-        10.0: INK,
-        16.0: BLUE,
-        20.0: BLUE,
-        22.63: VERMILION,
-        30.0: VERMILION,
-    }
-    for ax, (study, title) in zip(axes, STUDY_TITLES.items(), strict=True):
+    figure, axes = _new(2, rows=2, width=1.2)
+    for ax, (study, (title, abscissa, series)) in zip(axes, STUDIES.items(), strict=True):
+        found = [mode["sensitivity"][study] for mode in modes]
+        _draw_series(ax, found, abscissa, series)
         ax.set_title(title, fontsize=10, color=INK)
-        for hertz, color in colors.items():
-            _draw_rate(ax, [mode["sensitivity"][study] for mode in modes], hertz, color)
-        ax.set(xscale="log", yscale="log", xlabel="spatial frequency, cpd", ylim=(1.0, 500.0))
-        ax.set_xticks([0.5, 1, 2, 4, 8], ["0.5", "1", "2", "4", "8"])
+        ax.set(xscale="log", yscale="log", xlabel=AXES[abscissa], ylim=(1.5, 900.0))
+        x = _array(found[0][abscissa])
+        ticks = [tick for tick in TICKS[abscissa] if 0.9 * x.min() <= tick <= 1.1 * x.max()]
+        ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         ax.minorticks_off()
-        ax.legend(fontsize=8, frameon=False, loc="lower left")
-    axes[0].set_ylabel("contrast sensitivity")
+        ax.legend(fontsize=8, frameon=False, loc="lower left" if abscissa != AREA else "lower right", ncols=2)
+    for ax in axes[::2]:
+        ax.set_ylabel("contrast sensitivity")
     figure.supxlabel("points: observers; dashed: paper; line: modern", fontsize=9, color=INK)
     return figure
 
 
-def _draw_rate(ax: Any, modes: Sequence[Mapping[str, Any]], hertz: float, color: str) -> None:
-    """Draw the points and curves of one temporal frequency, if it has two or more gratings.
-
-    Gratings of the largest area are filled points with one curve; smaller ones are open points with another.
-    """
-    is_rate = np.abs(_array(modes[0]["temporal_hz"]) - hertz) < 0.01
-    area, cpd = (_array(modes[0][name]) for name in ("area_deg2", "frequency_cpd"))
-    is_large = area > 0.99 * area.max()
-    for is_chosen, face in ((is_rate & is_large, color), (is_rate & ~is_large, "white")):
-        if np.count_nonzero(is_chosen) < 2:
-            continue
-        label = f"{hertz:g} Hz" + ("" if face == color else ", smaller")
-        observers = _array(modes[0]["observers"])[is_chosen]
-        ax.plot(cpd[is_chosen], observers, "o", color=color, markerfacecolor=face, markersize=5, label=label)
-        order = np.argsort(cpd[is_chosen], kind="stable")
+def _draw_series(ax: Any, modes: Sequence[Mapping[str, Any]], abscissa: str, series: str) -> None:
+    """Draw the points of the observers and the curves of both modes, with one colour for each series."""
+    x, keys = (_array(modes[0][name]) for name in (abscissa, series))
+    for key, color in zip(np.unique(keys), SERIES_COLORS, strict=False):
+        chosen = np.flatnonzero(keys == key)
+        chosen = chosen[np.argsort(x[chosen], kind="stable")]
+        label = f"{key:.3g} {SERIES[series]}"
+        ax.plot(x[chosen], _array(modes[0]["observers"])[chosen], "o", color=color, markersize=5, label=label)
         for mode, style in zip(modes, MODE_STYLES, strict=False):
-            curve = np.maximum(_array(mode["metric"])[is_chosen][order], 0.01)
-            ax.plot(cpd[is_chosen][order], curve, style["linestyle"], color=color, linewidth=1.2)
+            curve = _array(mode["metric"])[chosen]
+            ax.plot(x[chosen], curve, style["linestyle"], color=color, linewidth=1.2)
 
 
 def _moving_texture(modes: Sequence[Mapping[str, Any]]) -> Figure:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from studies.observers.validate import Validation
 
+WIDTH = 132  # columns of the tables; a narrower terminal wraps their lines
+
 
 @click.command("validate", short_help="Validate the metric on published experiments.")
 @click.option(
@@ -30,10 +32,11 @@ if TYPE_CHECKING:
 @debug_option
 @click.pass_context
 def command(ctx: click.Context, /, *, folder: Path | None, as_json: bool, quiet: bool) -> None:
-    """Compare the metric with observers: thresholds, masking, moving textures, flicker.
+    """Compare the metric with observers: thresholds, masking, gratings, moving textures, flicker.
 
     Both modes of the metric are applied to the stimuli of published experiments. The exit status is 1 if
-    the modern mode misses a target. The fitted constants are cross-validated. This takes about five minutes.
+    the modern mode misses a target that it is not recorded to miss, or misses one by more than is recorded.
+    The fitted constants are cross-validated. This takes about seven minutes of CPU time.
     """
     from enfilade.cli.progress import watch
     from studies.observers.validate import validate
@@ -50,16 +53,19 @@ def command(ctx: click.Context, /, *, folder: Path | None, as_json: bool, quiet:
     else:
         _show(_figures_table(validation))
         _show(_fits_table(validation))
-    if validation.missed:
-        names = ", ".join(figure.name.strip() for figure in validation.missed)
-        click.echo(f"Targets missed: {names}.", err=True)
+    known = [figure for figure in validation.missed if figure not in validation.failed]
+    for text, figures in (("Targets missed, as recorded", known), ("Targets missed", validation.failed)):
+        if figures:
+            click.echo(f"{text}: {', '.join(figure.name for figure in figures)}.", err=True)
+    if validation.failed:
         ctx.exit(FAILURE)
 
 
 def _show(table: Table) -> None:
     from rich.console import Console
 
-    Console().print(table)
+    console = Console()
+    Console(width=max(console.width, WIDTH)).print(table)
 
 
 def _figures_table(validation: Validation) -> Table:
@@ -71,12 +77,13 @@ def _figures_table(validation: Validation) -> Table:
     for heading in (*(mode.mode for mode in validation.modes), "target", ""):
         table.add_column(heading, justify="right")
     table.add_column("unit")
+    table.add_column("fitted to these data")
     for figures in zip(*(mode.figures() for mode in validation.modes), strict=True):
         last = figures[-1]
         target = last.target
         bound = "" if target is None else f"{'≥' if target.is_least else '≤'} {target.bound:.2f}"
-        status = "" if target is None else ("ok" if last.is_met else "MISSED")
-        table.add_row(last.name, *(f"{figure.value:.3f}" for figure in figures), bound, status, last.unit)
+        values = (f"{figure.value:.3f}" for figure in figures)
+        table.add_row(last.name, *values, bound, last.status, last.unit, last.fitted)
     return table
 
 

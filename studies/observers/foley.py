@@ -1,8 +1,8 @@
-"""Masking: a Gabor on a sine of the same frequency and orientation (Foley 1994).
+"""Masking: a Gabor on a sine of the same frequency, at 0, 45 or 90 degrees to it (Foley 1994).
 
 The stimuli lasted 33 ms, too short for the full sensitivity that the metric assumes. One gain corrects for
 this: contrasts are relative to the unmasked threshold, of the observers and of the metric. The comparison
-therefore tests the shape of the masking curve; the unmasked threshold has no error by definition.
+therefore tests the shape of the masking curves; the unmasked threshold has no error by definition.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
 
-__all__ = ["UNMASKED_DB", "Masking", "gabor_and_sine", "measure"]
+__all__ = ["ANGLES_DEG", "UNMASKED_DB", "Masking", "gabor", "measure", "sine"]
 
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
+ANGLES_DEG = (0, 45, 90)  # between the bars of mask and target
 UNMASKED_DB = -31.67  # unmasked threshold of the observers, 20 log10 contrast
 FREQUENCY_CPD = 2.0
 SIGMA_DEG = 0.5
@@ -65,15 +66,27 @@ class Masking:
         return float(np.sqrt(np.mean(self.error_db**2)))
 
 
-def gabor_and_sine() -> tuple[Float64Array, Float64Array]:
-    """Target and mask at contrast 1, (240, 240) float64 each: in phase, bars upright."""
+def sine(angle_deg: float = 0.0) -> Float64Array:
+    """Mask at contrast 1, (240, 240) float64: in phase with the target, upright bars turned by an angle."""
+    x, y = _plane()
+    theta = math.radians(angle_deg)
+    return np.cos(2.0 * np.pi * FREQUENCY_CPD * (x * math.cos(theta) + y * math.sin(theta)))
+
+
+def gabor() -> Float64Array:
+    """Target at contrast 1, (240, 240) float64: upright bars."""
+    x, y = _plane()
+    return sine() * np.exp(-0.5 * (x**2 + y**2) / SIGMA_DEG**2)
+
+
+def _plane() -> tuple[Float64Array, Float64Array]:
+    """Degrees from the centre, which is a pixel: x to the right, y down."""
     steps = (np.arange(SIZE_PX) - SIZE_PX // 2) / PIXELS_PER_DEGREE
     x, y = np.meshgrid(steps, steps)
-    sine = np.cos(2.0 * np.pi * FREQUENCY_CPD * x)
-    return sine * np.exp(-0.5 * (x**2 + y**2) / SIGMA_DEG**2), sine
+    return x, y
 
 
-def measure(mode: Mode, monitor: Monitor) -> Masking:
+def measure(mode: Mode, monitor: Monitor, *, angle_deg: int = 0) -> Masking:
     """Thresholds of the metric on Foley's masks, beside those of the observers.
 
     Parameters
@@ -82,19 +95,22 @@ def measure(mode: Mode, monitor: Monitor) -> Masking:
         The metric.
     monitor : Monitor
         Shows the progress over the masks.
+    angle_deg : int
+        One of ANGLES_DEG.
     """
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
-    gabor, sine = gabor_and_sine()
-    _, observers = read_columns("foley.csv", "mask_db", "threshold_db")
-    unmasked_db = _db(threshold_contrast(observer, gabor, MEAN_CD_M2))
-    gain_db = UNMASKED_DB - unmasked_db
+    target, grating = gabor(), sine(angle_deg)
+    _, table = read_columns("foley.csv", "mask_angle_deg", "mask_db", "threshold_db")
+    is_chosen = table["mask_angle_deg"] == angle_deg
+    masks_db, observers_db = table["mask_db"][is_chosen], table["threshold_db"][is_chosen]
+    gain_db = UNMASKED_DB - _db(threshold_contrast(observer, target, MEAN_CD_M2))
     thresholds_db = []
-    masks = list(zip(observers["mask_db"], observers["threshold_db"], strict=True))
-    for mask_db, observed_db in counted(masks, f"masking, {mode.name}", monitor):
-        mask, guess = (10.0 ** ((db - gain_db) / 20.0) for db in (mask_db, observed_db))
-        contrast = threshold_contrast(observer, gabor, MEAN_CD_M2, mask=mask * sine, guess=guess)
-        thresholds_db.append(_db(contrast) + gain_db)
-    return Masking(observers["mask_db"], observers["threshold_db"], np.array(thresholds_db), gain_db)
+    masks = list(zip(masks_db, observers_db, strict=True))
+    for mask_db, observed_db in counted(masks, f"masking, {angle_deg} deg, {mode.name}", monitor):
+        contrast, guess = (10.0 ** ((db - gain_db) / 20.0) for db in (mask_db, observed_db))
+        found = threshold_contrast(observer, target, MEAN_CD_M2, mask=contrast * grating, guess=guess)
+        thresholds_db.append(_db(found) + gain_db)
+    return Masking(masks_db, observers_db, np.array(thresholds_db), gain_db)
 
 
 def _db(contrast: float) -> float:

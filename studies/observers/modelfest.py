@@ -31,6 +31,7 @@ MEAN_CD_M2 = 30.0
 WIDE_DEG = 0.5  # Gaussian sigma of most targets
 ARCMIN = 1.0 / 60.0
 IMAGES = (35, 43)
+HIGHEST_CPD = 12.0  # of the Gabors that are evaluated without a gain: range of the metric's bands
 COUNT = 43
 
 # The tables below: number of the target, then its parameters.
@@ -87,6 +88,13 @@ class Thresholds:
         """The same, each target with the gain of the other targets."""
         count = len(self.number)
         return self.rms_db * count / (count - 1)
+
+    @property
+    def gabors_rms_db(self) -> float:
+        """Root of the mean square of the errors of round Gabors up to 12 cpd, without a gain."""
+        is_round = [n for n, (cpd, *sigma) in GABORS.items() if sigma[0] == sigma[1] and cpd <= HIGHEST_CPD]
+        errors_db = (self.metric_db - self.observers_db)[np.isin(self.number, is_round)]
+        return float(np.sqrt(np.mean(errors_db**2)))
 
 
 def _plane() -> tuple[Float64Array, Float64Array]:

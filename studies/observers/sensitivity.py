@@ -1,45 +1,48 @@
-"""Contrast sensitivity for static, flickering and moving gratings, against the metric's CSF.
+"""Contrast sensitivity of the metric to flickering, drifting and large gratings, beside that of observers.
 
-Robson 1966 (gratings that change at 0.5 to 32 Hz), Laird et al. 2006 (moving at 10 to 30 Hz), Gabors of
-ModelFest (Watson and Ahumada 2005). No gain is fitted.
+Thresholds are those of sequences through the whole metric (`threshold`, `gratings`). The eye is at rest:
+Robson's and Rovamo's observers fixated, and Laird's velocities are those over the retina. No gain is fitted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.metric import Aqm, Pursuit
+from enfilade.monitor import Monitor
+from enfilade.viewing import Viewing
+from studies.observers.gratings import STIMULI, Grating
 from studies.observers.mode import Mode
 from studies.observers.tables import read_columns
+from studies.observers.threshold import sequence_threshold
+from studies.progress import counted
 
-__all__ = ["STUDIES", "Sensitivities", "measure"]
+__all__ = ["Sensitivities", "gratings", "measure", "rms_db"]
 
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
-STUDIES = ("robson1966", "laird2006", "modelfest")
 LOWEST_CPD, HIGHEST_CPD = 0.5, 12.0  # range of the metric's bands
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Sensitivity of the observers and of the metric in one study.
+    """Sensitivity of the observers and of the metric to a set of gratings.
 
     Attributes
     ----------
-    frequency_cpd, temporal_hz : (N,) float64
+    frequency_cpd, temporal_hz, area_deg2 : (N,) float64
         Of the grating.
-    luminance_cd_m2, area_deg2 : (N,) float64
-        Of the stimulus.
     observers, metric : (N,) float64
         1 / contrast at threshold.
     """
 
     frequency_cpd: Float64Array
     temporal_hz: Float64Array
-    luminance_cd_m2: Float64Array
     area_deg2: Float64Array
     observers: Float64Array
     metric: Float64Array
@@ -50,28 +53,58 @@ class Sensitivities:
         error: Float64Array = 20.0 * np.log10(self.metric / self.observers)
         return error
 
-    @property
-    def rms_db(self) -> float:
-        """Root of the mean square of the errors, without a gain."""
-        return float(np.sqrt(np.mean(self.error_db**2)))
+
+def rms_db(errors_db: Float64Array) -> float:
+    """Root of the mean square of errors, dB."""
+    return float(np.sqrt(np.mean(errors_db**2)))
 
 
-def measure(study: str, mode: Mode) -> Sensitivities:
-    """Sensitivities of the metric at 0.5 to 12 cpd, beside those of the observers.
+def gratings(study: str) -> tuple[Grating, ...]:
+    """Gratings of a study at 0.5 to 12 cpd, in the order of the table.
 
     Parameters
     ----------
     study : str
-        One of STUDIES.
-    mode : Mode
-        The metric.
+        One of STIMULI.
     """
     names = ("frequency_cpd", "temporal_hz", "luminance_cd_m2", "area_deg2", "sensitivity")
     rows, columns = read_columns("sensitivity.csv", *names)
-    frequency = columns["frequency_cpd"]
-    is_chosen = (frequency >= LOWEST_CPD) & (frequency <= HIGHEST_CPD)
-    is_chosen &= np.array([row["study"] == study for row in rows])
-    cpd, hz, luminance, area, observers = (columns[name][is_chosen] for name in names)
-    stimuli = zip(cpd, hz, luminance, area, strict=True)
-    metric = np.array([mode.sensitivity(*stimulus) for stimulus in stimuli])
-    return Sensitivities(cpd, hz, luminance, area, observers, metric)
+    return tuple(
+        Grating(*(float(number) for number in numbers))
+        for row, *numbers in zip(rows, *(columns[name] for name in names), strict=True)
+        if row["study"] == study and LOWEST_CPD <= numbers[0] <= HIGHEST_CPD
+    )
+
+
+def measure(study: str, chosen: Sequence[Grating], mode: Mode, monitor: Monitor) -> Sensitivities:
+    """Sensitivities of the metric to gratings of a study, beside those of the observers.
+
+    Parameters
+    ----------
+    study : str
+        One of STIMULI.
+    chosen : sequence of Grating
+        All `gratings` of the study, or some.
+    mode : Mode
+        The metric.
+    monitor : Monitor
+        Shows the progress over the gratings.
+    """
+    observers: dict[Viewing, Aqm] = {}
+    found = []
+    for grating in counted(chosen, f"{study}, {mode.name}", monitor):
+        stimulus = STIMULI[study](grating)
+        if stimulus.viewing not in observers:
+            observers[stimulus.viewing] = mode.aqm(stimulus.viewing)
+            observers[stimulus.viewing].pursuit = Pursuit.NONE
+        contrast = sequence_threshold(
+            observers[stimulus.viewing],
+            stimulus.patterns,
+            grating.luminance_cd_m2,
+            step_px=stimulus.step_px,
+            guess=1.0 / grating.sensitivity,
+        )
+        found.append(1.0 / contrast)
+    names = ("frequency_cpd", "temporal_hz", "area_deg2", "sensitivity")
+    cpd, hertz, area, published = (np.array([getattr(g, name) for g in chosen]) for name in names)
+    return Sensitivities(cpd, hertz, area, published, np.array(found))

@@ -1,4 +1,4 @@
-"""Measures of the bench: nothing for identical sequences, more for more noise, none of the reference's noise."""
+"""Measures of the bench: nothing for identical sequences, more for noise, nothing for the reference's."""
 
 import math
 from dataclasses import replace

@@ -28,7 +28,7 @@ def test_scenes_of_a_folder(tmp_path):
     (tmp_path / "a" / "scene.xml").unlink()
     with pytest.raises(SceneError, match=r"a has 0 files scene.xml"):
         found_in(tmp_path)
-    with pytest.raises(SceneError, match="no subfolder with camera_path.json"):
+    with pytest.raises(SceneError, match=r"no subfolder with camera_path\.json"):
         found_in(tmp_path / "notes")
 
 

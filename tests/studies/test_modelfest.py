@@ -92,6 +92,13 @@ def test_one_gain_is_taken_off():
     assert found.cross_validation_rms_db == pytest.approx(math.sqrt(1.5))
 
 
+def test_round_gabors_up_to_12_cpd_are_evaluated_without_a_gain():
+    number = np.array(NUMBERS)
+    error = np.full(41, 5.0)
+    error[np.isin(number, [1, 2, 3, 4, 5, 6, 7, 11, 12, 13])] = -3.0
+    assert Thresholds(number, np.zeros(41), error, np.ones(41)).gabors_rms_db == pytest.approx(3.0)
+
+
 def test_a_threshold_is_where_the_response_is_1_jnd():
     observer = PAPER.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     pattern = target(4)

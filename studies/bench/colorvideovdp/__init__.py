@@ -55,7 +55,8 @@ def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) 
         file = Path(scratch) / "pairs.npz"
         np.savez(
             file,
-            **stacks,
+            test=stacks["test"],
+            reference=stacks["reference"],
             fps=viewing.fps,
             ppd=viewing.pixels_per_degree,
             peak_cd_m2=viewing.peak_cd_m2,

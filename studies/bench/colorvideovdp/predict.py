@@ -14,6 +14,7 @@ import torch
 
 
 def main() -> None:
+    """Print the scores of the pairs, or the versions."""
     torch.set_num_threads(1)
     if sys.argv[1] == "--version":
         print(f"ColorVideoVDP on PyTorch {torch.__version__}")
@@ -34,7 +35,7 @@ def main() -> None:
     )
     scores = []
     with torch.no_grad():
-        for test, reference in zip(arrays["test"], arrays["reference"]):
+        for test, reference in zip(arrays["test"], arrays["reference"], strict=True):
             rate = float(arrays["fps"]) if len(test) > 1 else 0.0  # of a single image
             pair = (test.astype(np.float32), reference.astype(np.float32))
             scores.append(float(metric.predict(*pair, dim_order="FHWC", frames_per_second=rate)[0]))
