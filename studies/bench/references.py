@@ -2,10 +2,10 @@
 
 A reference is traced at :data:`SUBPIXELS` x :data:`SUBPIXELS` subpixels of a pixel. The mean over a pixel's
 subpixels is the box filter's value; a weighted sum over those within the Gaussian filter's radius is the
-Gaussian filter's. So the same paths serve both filters. A Gaussian pixel shares subpixels with its neighbours,
-and would have the noise of 3.1 times as many paths: it gets fewer of them, so that both filters have the same
-noise. The Gaussian's weights are constant over a subpixel, which changes the response to an edge by 0.7 % of
-its contrast at most.
+Gaussian filter's. So the same paths serve both filters. A Gaussian pixel shares subpixels with its
+neighbours, and would have the noise of 3.1 times as many paths: it gets fewer of them, so that both filters
+have the same noise. The Gaussian's weights are constant over a subpixel, which changes the response to an
+edge by 0.7 % of its contrast at most.
 
 ::
 

@@ -44,8 +44,8 @@ def _configurations(found: Mapping[str, Any]) -> Table:
         texts = (score_text(name, floor[name]) if name in floor else "" for name in measures)
         table.add_row(f"noise floor, {kind}", "", "", "", "", *texts)
     table.caption = (
-        f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths a pixel in "
-        "two halves; floor: one half against the other; *: error less than a third above it, not decided"
+        f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths in two "
+        "halves; floor: one half against the other; *: error less than a third above it, not decided"
     )
     return table
 

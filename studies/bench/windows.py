@@ -1,8 +1,8 @@
 """Windows of the image in which a bench measures: drawn from the scene before any configuration is rendered.
 
-A window is a square of pixels, the same in all frames. One is drawn for each of four kinds of content: edges of
-objects, gloss (glossy, mirroring and transparent surfaces), shadows (light that varies over one surface), and
-flat surfaces without any of these.
+A window is a square of pixels, the same in all frames. One is drawn for each of four kinds of content: edges
+of objects, gloss (glossy, mirroring and transparent surfaces), shadows (light that varies over one surface),
+and flat surfaces without any of these.
 """
 
 from __future__ import annotations
