@@ -10,7 +10,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
 from enfilade.errors import InputError, SettingsError
 from enfilade.runs.job import Job
-from enfilade.runs.plan import DryRun, excerpt_of, forecast, plan, scaled
+from enfilade.runs.plan import DryRun, excerpt_of, forecast, forecast_rays, plan, scaled
 from support.toys import Recorder, slide, toy_job
 
 
@@ -27,7 +27,7 @@ def test_a_plan(tmp_path):
     assert made.tasks == {"analysis": 2, "light": 20, "mean": 2, "frames": 20, "clips": 1, "video": 1}
     assert (made.excerpt_frames, made.excerpt_size, made.analyzed_size) == (4, (8, 6), (8, 6))
     assert 0.0 < made.seconds < 3600.0
-    assert made.rays == {"camera": 1.0}
+    assert made.rays == pytest.approx({"camera": 1.0})
     assert made.traced_percent["total"] == 0.0
     assert len(made.mean_speed_deg_s) == len(made.slow_percent) == len(made.specular_percent) == 20
     assert monitor.done == [
@@ -60,6 +60,17 @@ def test_a_fixed_cost_and_a_cost_of_each_pixel_are_extrapolated():
 def test_the_compilation_of_the_only_task_of_a_pass_does_not_count():
     small, large = DryRun(100, line("pilot", 90.0), {}), DryRun(300, line("pilot", 4.0), {})
     assert forecast(small, large, 500, {"pilot": 1}, {}) == (4.0, 8.0)
+
+
+def test_rays_are_weighted_by_the_number_of_tasks():
+    """Keyframes are rarer in a walkthrough than in its excerpt."""
+    lines = [
+        {"pass": "irradiance", "rays": {"irradiance": 800}},
+        {"pass": "shading", "rays": {"camera": 200}},
+    ]
+    run = DryRun(100, [*lines, *lines], {})
+    rays = forecast_rays(run, 50, {"irradiance": 10, "shading": 50}, {"irradiance": 0.5})
+    assert rays == pytest.approx({"irradiance": 8.0 * 0.5 * 10 / 50, "camera": 2.0})
 
 
 def test_frames_as_small_as_the_excerpt_cost_as_much():

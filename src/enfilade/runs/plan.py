@@ -56,7 +56,7 @@ class Plan:
     traced_percent : dict of str to float
         Pixels traced in the excerpt, percent, by provenance.
     rays : dict of str to float
-        Rays a pixel and frame in the excerpt, by kind.
+        Forecast of the rays a pixel and frame, by kind.
     excerpt_frames : int
     excerpt_size : tuple of int
         Width and height of the larger dry run.
@@ -157,7 +157,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
         seconds=wall_s,
         cpu_seconds=cpu_s,
         traced_percent=large.summary["traced_percent"],
-        rays=large.summary["rays"],
+        rays=forecast_rays(large, len(path), counts, ratios),
         excerpt_frames=large.summary["frames"],
         excerpt_size=tuple(large.summary["size"]),
     )
@@ -194,6 +194,20 @@ def forecast(
         for k in (0, 1)
     )
     return wall_s, cpu_s
+
+
+def forecast_rays(
+    run: DryRun, frames: int, counts: Mapping[str, int], ratios: Mapping[str, float]
+) -> dict[str, float]:
+    """Rays a pixel and frame of a run of so many frames and tasks, by kind; see :func:`forecast`."""
+    done = Counter(line["pass"] for line in run.lines)
+    rays: dict[str, float] = {}
+    for line in run.lines:
+        name = line["pass"]
+        weight = ratios.get(name, 1.0) * counts[name] / (done[name] * frames * run.pixels)
+        for kind, count in line.get("rays", {}).items():
+            rays[kind] = rays.get(kind, 0.0) + weight * count
+    return rays
 
 
 def _extrapolated(small: float, large: float, ratio: float) -> float:
