@@ -71,6 +71,12 @@ def flags() -> set[str]:
     return own | {"--help"} | {flag for named in FLAGS_OF_OTHER_PROGRAMS.values() for flag in named.split()}
 
 
+def test_nothing_advises_to_install_enfilade_by_name() -> None:
+    """No package index has it: ``pip install 'enfilade[extra]'`` fails, or installs something else."""
+    texts = [*DOCUMENTS, ROOT / "CHANGELOG.md", *ROOT.glob("src/**/*.py"), *ROOT.glob("studies/**/*.py")]
+    assert not [file for file in texts if re.search(r"enfilade\[|pip install '?enfilade", file.read_text())]
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: str(d.relative_to(ROOT)))
 def test_named_files_flags_and_settings_exist(document: Path, flags: set[str]) -> None:
     text = document.read_text()

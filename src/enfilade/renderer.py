@@ -198,11 +198,14 @@ class SceneFacts:
         Backend of its kernels.
     shapes : tuple of str
         Names of shapes 1, 2, ...
+    has_background : bool
+        Whether rays that hit no surface may see light; False only where all of them are black.
     """
 
     renderer: str
     variant: str
     shapes: tuple[str, ...]
+    has_background: bool = True
 
 
 class Renderer(Protocol):

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enfilade.camera import parse_frames
+from enfilade.camera import parse_frames, ranges
 from enfilade.errors import CameraPathError
 
 
@@ -52,3 +52,8 @@ def test_any_text_gives_rising_numbers_or_an_error(text):
     except CameraPathError:
         return
     assert numbers == tuple(sorted(set(numbers)))
+
+
+@pytest.mark.parametrize("text", ["7", "1-250", "1-3,5,9-10"])
+def test_ranges_are_read_back(text):
+    assert ranges(parse_frames(text)) == text

@@ -67,6 +67,8 @@ def test_plan(run, line, tmp_path):
     drawn = run("plan", *words, "--plot", tmp_path / "plan.png")
     assert drawn.exit_code == 0, drawn.output
     assert (tmp_path / "plan.png").exists()
+    named = [text.split("  ")[0] for text in drawn.stdout.splitlines() if not text.startswith(" ")]
+    assert named == ["method", "time", "plot"]  # `reference` has no keyframes, and traces every pixel
     assert run("plan", *words, "--plot", tmp_path / "plan.svg").exit_code == 2
 
 

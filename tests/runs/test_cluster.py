@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
+import socket
 import subprocess
 import sys
 from contextlib import closing
@@ -104,12 +105,20 @@ class Ray:
 
 
 @pytest.fixture
-def joined(tmp_path, monkeypatch):
+def listening():
+    """A socket at the address of a cluster."""
+    with closing(socket.create_server(("127.0.0.1", 0))) as server:
+        yield server
+
+
+@pytest.fixture
+def joined(tmp_path, monkeypatch, listening):
     """Join a cluster of some nodes with a run."""
     prepare(toy_job(tmp_path), tmp_path / "run")
     monkeypatch.setattr(child, "_SERVERS", {})
+    at = f"127.0.0.1:{listening.getsockname()[1]}"
 
-    def join(*nodes, count=None, threads=0, address="head:6379", device="cpu"):
+    def join(*nodes, count=None, threads=0, address=at, device="cpu"):
         monkeypatch.setitem(sys.modules, "ray", ray := Ray(*nodes) if nodes else None)
         run, workers = RunFolder.read(tmp_path / "run"), Workers("ray", count, threads)
         return ray, Cluster(run, LimitSettings(), workers, address=address, device=device)
@@ -117,12 +126,14 @@ def joined(tmp_path, monkeypatch):
     return join
 
 
-def test_a_task_takes_its_share_of_ray(joined):
+def test_a_task_takes_its_share_of_ray(joined, listening):
     ray, cluster = joined(NODE, BIG, count=4, threads=1)
-    assert (cluster.slots, ray.begun["address"]) == (4, "head:6379")
+    assert (cluster.slots, ray.begun["address"]) == (4, f"127.0.0.1:{listening.getsockname()[1]}")
     assert ray.options == {"num_cpus": 1, "num_gpus": 0.0, "max_retries": 0, "max_calls": 0}
     ray, _ = joined(BIG, count=3, threads=2, address="")
     assert (ray.begun["address"], ray.begun["num_cpus"]) == ("local", 6)
+    ray, _ = joined(BIG, address="auto")
+    assert ray.begun["address"] == "auto"
 
 
 def test_clusters_that_can_not_be_used(joined, monkeypatch):
@@ -134,8 +145,25 @@ def test_clusters_that_can_not_be_used(joined, monkeypatch):
     with pytest.raises(EnfiladeError, match=r"no GPU, .* add --device cpu"):
         joined(BIG, device="gpu")
     monkeypatch.setattr(Ray, "init", unreachable)
-    with pytest.raises(EnfiladeError, match="no Ray cluster at head:6379: timed out"):
+    with pytest.raises(
+        EnfiladeError, match=r"no Ray cluster at 127\.0\.0\.1:\d+: timed out; start one there"
+    ):
         joined(BIG)
+    with pytest.raises(EnfiladeError, match="no Ray cluster could be started on this machine: timed out"):
+        joined(BIG, address="")
+
+
+@pytest.mark.parametrize("scheme", ["", "ray://"])
+def test_an_address_at_which_nothing_listens_is_refused_before_ray_tries(
+    joined, monkeypatch, listening, scheme
+):
+    monkeypatch.setattr(Ray, "init", lambda *_given, **_how: pytest.fail("Ray tried"))
+    address = f"{scheme}127.0.0.1:{listening.getsockname()[1]}"
+    listening.close()
+    with pytest.raises(EnfiladeError, match=r"nothing answers there .*; start one there with `ray start"):
+        joined(BIG, address=address)
+    with pytest.raises(EnfiladeError, match="nothing answers there"):
+        joined(BIG, address=f"{scheme}127.0.0.1:99999")
 
 
 def test_results_and_losses(joined, tmp_path):

@@ -7,6 +7,8 @@ import json
 
 import pytest
 
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import (
     NoSpaceError,
     RunFolderError,
@@ -18,9 +20,10 @@ from enfilade.images import open_sequence
 from enfilade.monitor import Silence
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
 from enfilade.runs.render import Shard, prepare, render, render_shard, resume
 from enfilade.scene.opener import Scene
-from enfilade.settings import OutputSettings, TraceSettings, VideoSettings, WarpSettings
+from enfilade.settings import SECTIONS, OutputSettings, Settings, TraceSettings, VideoSettings, WarpSettings
 from support.toys import Recorder, attempts, digest, flip, little_room, order, slide, toy_job
 
 
@@ -288,3 +291,22 @@ def test_a_shard_with_a_task_that_fails_does_the_rest(tmp_path, run, long_whole)
         render_shard(run, Shard("mean"), Silence())
     assert resume(run, Silence())["frames"] == 20
     assert digest(run) == long_whole
+
+
+BALL = '<shape type="sphere"/><emitter type="{}"/>'
+
+
+@pytest.mark.parametrize(("emitter", "black"), [("point", [2, 3]), ("constant", [])])
+def test_frames_that_show_nothing_are_told_of(tmp_path, emitter, black):
+    """Frames 2 and 3 of a path look away from the only surface."""
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{BALL.format(emitter)}</scene>')
+    toward, away = look_at((0, 0, 4), (0, 0, 0)), look_at((0, 0, 4), (0, 0, 8))
+    cameras = tuple(Camera(pose, 50.0, 16, 12) for pose in (toward, away, away))
+    settings = Settings.from_tables({"sampling": {"spp": 1}, "video": {"codec": "ffv1"}}, SECTIONS)
+    job = Job(Scene(tmp_path / "scene.xml"), CameraPath(cameras, (1, 2, 3), 24.0), settings, "reference")
+    summary = render(job, tmp_path / "run", monitor := Recorder())
+    told = [text for text in monitor.said if "show no surface" in text]
+    assert [text.partition(", and the scene")[0] for text in told] == ["frames 2-3 show no surface"] * bool(
+        black
+    )
+    assert [n for n in summary["black_frames"] if n > 1] == black

@@ -52,6 +52,7 @@ def test_statistics_of_a_running_run(run):
     assert found["rays_per_frame"] == [{"frame": 5, "camera": 5.0, "metric": 0.5}]
     assert found["rays"] == pytest.approx({"camera": 5.0 / 3, "metric": 0.5 / 3})
     assert (found["segments"], found["dropped_samples"], found["video"]) == ([{"first": 5, "last": 9}], 3, "")
+    assert found["black_frames"] == []
 
 
 def test_statistics_of_a_run_that_has_just_begun(run):

@@ -44,6 +44,29 @@ def test_the_generated_scenes_pass(name, tmp_path):
     assert fingerprint(file) != before
 
 
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (
+            '<shape type="sphere" id="ball"><float name="radius" value="nan"/></shape>',
+            "'radius' of 'sphere ball",
+        ),
+        ('<shape type="sphere"><point name="center" x="0" y="-inf" z="0"/></shape>', "'center' of 'sphere"),
+        (
+            '<shape type="cube"><transform name="to_world"><scale value="nan"/></transform></shape>',
+            "'to_world'",
+        ),
+        ('<emitter type="constant"><rgb name="radiance" value="nan 0 0"/></emitter>', "'radiance' of 'const"),
+        (
+            '<emitter type="point"><spectrum name="intensity" value="400:1, 700:nan"/></emitter>',
+            "'intensity'",
+        ),
+    ],
+)
+def test_numbers_that_are_not_finite_are_refused(scene, body, words):
+    refused(scene(BALL + body), rf"scene\.xml \(line 1, .*{words}.* NaN or infinite; correct it")
+
+
 @pytest.mark.parametrize("kind", ["../../evil", "/tmp/evil", "Sphere", "", "prb", "blender"])  # noqa: S108
 def test_plugins_other_than_mitsubas_are_refused(scene, kind):
     refused(scene(f'<shape type="{kind}"/>'), rf"scene\.xml \(line 1, .*'{kind}' is not one of Mitsuba's")

@@ -499,3 +499,12 @@ def test_the_cost_is_in_proportion_to_the_list(corner, monkeypatch):
         paths.clear()
         traced(renderer, camera, everything(camera)[:count], spp=spp)
         assert sum(paths) == count * spp
+
+
+def test_a_mesh_with_nan_vertices_is_refused(tmp_path):
+    (tmp_path / "door.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")
+    shape = '<shape type="obj"><string name="filename" value="door.obj"/></shape>'
+    light = '<emitter type="constant"/>'
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{shape}{light}</scene>')
+    with pytest.raises(SceneError, match=r'scene\.xml .*OBJ file "door\.obj": .*invalid vertex position'):
+        MitsubaRenderer(tmp_path / "scene.xml")

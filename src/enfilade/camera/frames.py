@@ -8,6 +8,7 @@ must rise from left to right: a walkthrough has one direction.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 
 from enfilade.errors import CameraPathError
@@ -47,3 +48,10 @@ def parse_frames(text: str) -> tuple[int, ...]:
         if b <= a:
             raise CameraPathError(f"the frames {text!r} must rise, each named once; {b} follows {a}")
     return tuple(numbers)
+
+
+def ranges(numbers: Sequence[int]) -> str:
+    """Rising numbers of frames in the notation of :func:`parse_frames`: ``1-250,300``."""
+    firsts = [n for k, n in enumerate(numbers) if k == 0 or numbers[k - 1] != n - 1]
+    lasts = [n for k, n in enumerate(numbers) if k + 1 == len(numbers) or numbers[k + 1] != n + 1]
+    return ",".join(str(a) if a == b else f"{a}-{b}" for a, b in zip(firsts, lasts, strict=True))

@@ -105,6 +105,7 @@ def reference_forecast(job: Job) -> str:
 
 def show_run(folder: Path, summary: dict[str, Any], *, as_json: bool = False) -> None:
     """Draw the plots of a finished run, and print its tables and the places of its files."""
+    from enfilade.camera import ranges
     from enfilade.reports.plots import plot_run
 
     plots = plot_run(folder)
@@ -121,6 +122,11 @@ def show_run(folder: Path, summary: dict[str, Any], *, as_json: bool = False) ->
         console.print(table)
     if summary["dropped_samples"]:
         click.echo(f"{summary['dropped_samples']} samples were NaN or infinite and were left out.")
+    if black := summary["black_frames"]:
+        click.echo(
+            f"frames {ranges(black)} are black: the camera sees no surface, is inside of one, or no light "
+            "arrives there"
+        )
     files = [("video", folder / summary["video"]), *(("plot", plot) for plot in plots), ("run", folder)]
     for name, file in files:
         click.echo(f"{name:7} {file}")

@@ -31,7 +31,7 @@ class Tap:
     weight: Any
 
 
-def bilinear_taps(x: Any, y: Any, *, width: int, height: int) -> list[Tap]:
+def bilinear_taps(x: Any, y: Any, *, width: Any, height: Any) -> list[Tap]:
     """The four pixels around positions, with weights in steps of 1/65536, which sum to one exactly.
 
     Parameters
@@ -39,19 +39,23 @@ def bilinear_taps(x: Any, y: Any, *, width: int, height: int) -> list[Tap]:
     x, y : Float
         Image coordinates; pixel (0, 0) has its centre at (0.5, 0.5). The outermost pixels are repeated
         beyond the border. At a pixel's centre that pixel has weight one.
+    width, height : int or Int
+        Of the image. Integers are compiled into the kernel.
     """
     u = dr.round((x - 0.5) * STEPS) / STEPS
     v = dr.round((y - 0.5) * STEPS) / STEPS
     return taps_around(u, v, width=width, height=height)
 
 
-def taps_around(u: Any, v: Any, *, width: int, height: int) -> list[Tap]:
+def taps_around(u: Any, v: Any, *, width: Any, height: Any) -> list[Tap]:
     """The four pixels around positions, which are not rounded.
 
     Parameters
     ----------
     u, v : Float
         Image coordinates less one half: pixel (0, 0) has its centre at (0, 0).
+    width, height : int or Int
+        As of :func:`bilinear_taps`.
     """
     left, top = dr.floor(u), dr.floor(v)
     across, down = u - left, v - top

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from enfilade.camera.frames import ranges
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.methods.keyframes import place_keyframes
 from enfilade.methods.walkthrough import Walkthrough
@@ -31,12 +32,15 @@ class FrameStatistics:
         Pixels slower than v_t (``[masks] slow_deg_s``).
     specular_percent : float
         Pixels that show glossy, mirroring or transparent surfaces.
+    is_empty : bool
+        Whether no pixel shows a surface, and the scene has no background: the frame is black.
     """
 
     speed_px: float
     speed_deg_s: float
     slow_percent: float
     specular_percent: float
+    is_empty: bool = False
 
 
 def analyze(walk: Walkthrough, frame: int) -> FrameStatistics:
@@ -51,6 +55,7 @@ def analyze(walk: Walkthrough, frame: int) -> FrameStatistics:
         speed_deg_s=float(np.minimum(view.speed_deg_s, fastest).mean()),
         slow_percent=100.0 * float((view.speed_deg_s < slow_deg_s).mean()),
         specular_percent=100.0 * float(view.geometry.is_specular.mean()),
+        is_empty=not (view.geometry.is_hit.any() or walk.renderer.describe().has_background),
     )
 
 
@@ -74,6 +79,17 @@ class Analysis:
     def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
         """Build from :func:`to_table` of every frame."""
         return cls(path, settings, tuple(FrameStatistics(**table) for table in tables))
+
+    @property
+    def warning(self) -> str:
+        """A message on frames that show nothing; empty where there are none."""
+        numbers = [n for n, of in zip(self.path.numbers, self.frames, strict=True) if of.is_empty]
+        if not numbers:
+            return ""
+        return (
+            f"frames {ranges(numbers)} show no surface, and the scene has no environment emitter: they are "
+            "black; check the camera path against the scene: units, axes, the side to which the camera looks"
+        )
 
     def segments(self, spacing: int = SPACING) -> list[list[Segment]]:
         """Segments between the initial keyframes of each shot (§4.2).
@@ -112,6 +128,6 @@ def keyframes_of(segments: Sequence[Segment]) -> list[int]:
     return sorted({s.first for s in segments} | {s.last for s in segments})
 
 
-def to_table(statistics: FrameStatistics) -> dict[str, float]:
+def to_table(statistics: FrameStatistics) -> dict[str, float | bool]:
     """Statistics as a table, fit for JSON."""
     return asdict(statistics)

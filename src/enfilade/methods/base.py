@@ -70,7 +70,8 @@ class Pass:
     record : type or None
         Class of the records that its tasks write, one file a frame; None for passes that have facts only.
     reads : tuple of str
-        Earlier passes whose records or facts its tasks read; others are refused.
+        Passes whose records or facts its tasks read: earlier ones, or the pass itself, of whose tasks those
+        must be in ``needs``. Others are refused.
     is_barrier : bool
         Whether its tasks begin when all tasks of earlier passes of the same shot are finished.
     is_shared : bool

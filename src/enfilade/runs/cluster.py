@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import pickle
+import socket
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,8 @@ from enfilade.runs.failure import Failure, FailureKind
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.resources import cores
 from enfilade.settings import LimitSettings
+
+PROBE_S = 10.0  # Ray itself tries for minutes to reach an address
 
 
 class Cluster:
@@ -56,7 +59,12 @@ class Cluster:
             self._connect(address, cpus=max((workers.count or cores() // threads) * threads, 1))
             nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
         except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
-            raise EnfiladeError(f"no Ray cluster at {address or 'this machine'}: {error}") from error
+            start = "start one there with `ray start --head`, or correct --executor ray:HOST:PORT"
+            raise EnfiladeError(
+                f"no Ray cluster at {address}: {error}; {start}"
+                if address
+                else f"no Ray cluster could be started on this machine: {error}"
+            ) from error
         try:
             share = Share.of(nodes, workers, has_gpu=device == "gpu")
         except EnfiladeError:
@@ -106,6 +114,7 @@ class Cluster:
     def _connect(self, address: str, *, cpus: int) -> None:
         quiet = {"log_to_driver": False, "logging_level": "error"}
         if address:
+            _probe(address)
             self._ray.init(address=address, **quiet)
         else:
             self._ray.init(address="local", num_cpus=cpus, include_dashboard=False, **quiet)
@@ -170,6 +179,22 @@ class Share:
         each = max(min(wanted, max(cpus, default=0)), 1)
         slots = workers.count or (gpus if has_gpu else max(sum(count // each for count in cpus), 1))
         return Share(slots, each, 1 / math.ceil(slots / gpus) if has_gpu else 0.0)
+
+
+def _probe(address: str) -> None:
+    """Refuse an address at which nothing listens; names such as ``auto`` are left to Ray.
+
+    Raises
+    ------
+    ConnectionError
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdecimal():
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=PROBE_S).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise ConnectionError(f"nothing answers there ({error})") from error
 
 
 def _first_line(error: Exception) -> str:

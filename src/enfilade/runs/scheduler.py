@@ -93,6 +93,8 @@ def work(
             executor = executor or open_executor(job, run, workers)
             damaged = _Loop(job, run, left, executor, monitor, mine).run()
             if damaged is None:
+                if left[0].pass_name == ANALYSIS.name:
+                    _warn(job, run, monitor)
                 continue
 
             # New workers: the old ones have the damaged file in memory, and would not write it again.
@@ -109,6 +111,14 @@ def work(
     finally:
         if executor is not None:
             executor.close()
+
+
+def _warn(job: Job, run: RunFolder, monitor: Monitor) -> None:
+    """Tell of black frames as soon as the whole path is analyzed, by this command or by several."""
+    run.refresh()
+    is_analyzed = all(is_done(job, run, task) for task in analysis_tasks(len(job.path)))
+    if is_analyzed and (warning := analysis_of(job, run).warning):
+        monitor.message(warning)
 
 
 def open_executor(job: Job, run: RunFolder, workers: Workers) -> Executor:

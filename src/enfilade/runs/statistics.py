@@ -30,7 +30,8 @@ def statistics(run: RunFolder) -> dict[str, Any]:
         frame of the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of
         the pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
         frame of the path, by kind; ``rays_per_frame``: of each frame. ``segments``: the metric's result for
-        each segment. ``dropped_samples``: NaN or infinite samples that were left out.
+        each segment. ``dropped_samples``: NaN or infinite samples that were left out. ``black_frames``:
+        numbers of the finished frames whose pixels are all black.
     """
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
@@ -56,6 +57,7 @@ def statistics(run: RunFolder) -> dict[str, Any]:
         "rays_per_frame": rays,
         "segments": [segment for line in lines for segment in line.get("segments", ())],
         "dropped_samples": sum(line.get("dropped", 0) for line in lines),
+        "black_frames": sorted(line["frame"] for line in lines if line.get("is_black")),
     }
 
 

@@ -11,8 +11,9 @@ from enfilade.cache import LruCache
 from enfilade.errors import RunFolderError
 from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis, analyze, to_table
-from enfilade.methods.base import FRAMES, Output, Pass, Task
+from enfilade.methods.base import FRAMES, Method, Output, Pass, Task
 from enfilade.methods.walkthrough import Walkthrough
+from enfilade.renderer import Renderer
 from enfilade.runs.delivery import (
     ANALYSIS,
     ANALYZED_FRAMES,
@@ -39,12 +40,17 @@ class Worker:
     job
     run
         It is only read; the lines that :meth:`do` returns are appended by the scheduler.
+    method, renderer
+        Already opened, to share their kernels among several runs; by default the job's, opened when needed.
     """
 
-    def __init__(self, job: Job, run: RunFolder) -> None:
+    def __init__(
+        self, job: Job, run: RunFolder, *, method: Method | None = None, renderer: Renderer | None = None
+    ) -> None:
         self._job = job
         self._run = run
-        self._method = job.opened_method()
+        self._method = method or job.opened_method()
+        self._renderer = renderer
         self._stopwatch = Stopwatch()
         self._inputs = _Inputs(job, run, self._method.passes, self._stopwatch)
 
@@ -93,7 +99,7 @@ class Worker:
                 stem = self._run.stem(task.pass_name, self._job.path.numbers[frame])
                 if task.pass_name == FRAMES:
                     files.append(write_frame(stem, record, self._walk.view(frame), self._job))
-                    facts = {**facts, "provenance": record.counts}
+                    facts = {**facts, "provenance": record.counts, "is_black": not record.color.any()}
                 else:
                     files.append(write_record(stem, record))
                     self._inputs.keep(task.pass_name, frame, record)
@@ -102,7 +108,8 @@ class Worker:
     @cached_property
     def _walk(self) -> Walkthrough:
         settings = self._job.rendering_settings()
-        return Walkthrough(self._job.path, settings, self._job.open_renderer(), timed=self._stopwatch.timed)
+        renderer = self._renderer or self._job.open_renderer()
+        return Walkthrough(self._job.path, settings, renderer, timed=self._stopwatch.timed)
 
 
 class _Inputs:

@@ -1,10 +1,14 @@
 """Lookup of irradiance images at points in the world, against loops."""
 
+from types import SimpleNamespace
+
+import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, UInt, lanes, matrix3, vector3
+from enfilade.arrays import Array3f, Bool, Float, Int, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled.irradiance_cache import upload_layers
 from enfilade.methods.decoupled.lookup import MIN_TAP_WEIGHT, UploadedImage, footprint, lookup, packed
 
 HEIGHT, WIDTH = 12, 16
@@ -35,8 +39,8 @@ def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
         eye=vector3(CAMERA.eye),
         direction_from_pixel=matrix3(CAMERA.direction_from_pixel),
         pixel_from_direction=matrix3(CAMERA.pixel_from_direction),
-        width=WIDTH,
-        height=HEIGHT,
+        width=opaque(WIDTH, Int),
+        height=opaque(HEIGHT, Int),
     )
     position = Array3f(np.asarray(points, np.float32).T)
     return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, plane_tolerance=TOLERANCE)
@@ -118,3 +122,26 @@ def test_footprints_grow_with_the_square_of_distance_and_at_grazing_angles():
     assert area(1000, -1) == pytest.approx(20 * (1000**2 + 1) * near, rel=1e-4)
     twice_as_fine = Camera(CAMERA.world_from_camera, CAMERA.fov_deg, 2 * WIDTH, 2 * HEIGHT)
     assert area(0, -1, twice_as_fine) == pytest.approx(0.25 * near, rel=1e-5)
+
+
+def kernels_of_lookup(height, width):
+    """Hashes of the kernels of a lookup in an image of some size, at three points."""
+    camera = Camera(CAMERA.world_from_camera, CAMERA.fov_deg, width, height)
+    wall = SimpleNamespace(
+        camera=camera,
+        depth=np.full((height, width), 4.0, np.float32),
+        shape_index=np.ones((height, width), np.uint32),
+        normal=np.full((height, width, 3), (0.0, 0.0, 1.0), np.float32),
+    )
+    layer = dr.opaque(Array3f, 1.0, height * width), dr.opaque(Float, 1.0, height * width)
+    uploaded = upload_layers(wall, dr.opaque(Bool, True, height * width), [layer])
+    position = dr.opaque(Array3f, 0.1, 3)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        dr.eval(lookup(position, Array3f(0, 0, 1), UInt(1), uploaded, plane_tolerance=TOLERANCE))
+        return [k["hash"] for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+
+
+def test_one_kernel_serves_images_of_all_sizes():
+    """A size that were compiled into kernels would cost seconds at every new size of the frames."""
+    assert kernels_of_lookup(12, 16) == kernels_of_lookup(30, 40) != []

@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, image, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array3f, Float, Int, image, lanes, matrix3, opaque, vector3
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
@@ -119,8 +119,8 @@ def upload_layers(
         eye=vector3(camera.eye),
         direction_from_pixel=matrix3(camera.direction_from_pixel),
         pixel_from_direction=matrix3(camera.pixel_from_direction),
-        width=camera.width,
-        height=camera.height,
+        width=opaque(camera.width, Int),
+        height=opaque(camera.height, Int),
     )
     dr.eval(uploaded.depths, uploaded.shape_indices, uploaded.normals, uploaded.values, uploaded.variances)
     return uploaded
@@ -179,9 +179,9 @@ def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
     return image(is_known, *geometry.shape_index.shape)
 
 
-def total_irradiance(uploaded: UploadedImage) -> F32:
+def total_irradiance(uploaded: UploadedImage, height: int, width: int) -> F32:
     """The sum of all layers, (H, W, 3); 0 where there is no irradiance."""
-    return image(sum(uploaded.values, Array3f(0)), uploaded.height, uploaded.width)
+    return image(sum(uploaded.values, Array3f(0)), height, width)
 
 
 def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> Layer:

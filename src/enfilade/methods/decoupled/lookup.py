@@ -31,7 +31,8 @@ class UploadedImage:
     eye : Array3f
     direction_from_pixel, pixel_from_direction : Matrix3f
         Of the camera.
-    width, height : int
+    width, height : Int
+        One lane each, so that one kernel serves images of all sizes.
     """
 
     depths: Any
@@ -42,8 +43,8 @@ class UploadedImage:
     eye: Any
     direction_from_pixel: Any
     pixel_from_direction: Any
-    width: int
-    height: int
+    width: Any
+    height: Any
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,8 @@ def lookup(
     seen = image.pixel_from_direction @ (position - image.eye)
     is_ahead = seen.z > 0.0
     x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
-    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < image.width - 0.5) & (y < image.height - 0.5)
+    right, bottom = Float(image.width) - 0.5, Float(image.height) - 0.5
+    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < right) & (y < bottom)
 
     # Prepare the distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
     scale = dr.rcp(dr.norm(normal))

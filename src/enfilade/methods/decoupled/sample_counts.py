@@ -147,7 +147,8 @@ def _pilot_jnd(shot: ShotContext, frame: int, where: Mask) -> float:
     shown = []
     for purpose in (Purpose.PILOT, Purpose.SECOND_PILOT):
         image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
-        irradiance = total_irradiance(accumulate(geometry, where, [upload(geometry, image)]))
+        accumulated = accumulate(geometry, where, [upload(geometry, image)])
+        irradiance = total_irradiance(accumulated, *where.shape)
         shown.append(walk.display_luminance(geometry.albedo * irradiance))
     metric = Aqm.modern(walk.viewing, workers=FFT_THREADS)
     return metric.compare(shown[0], shown[1], valid=where).score

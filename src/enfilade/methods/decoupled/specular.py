@@ -134,4 +134,4 @@ def accumulate_temporally(
         total += frame_weight * value
         weight += frame_weight
         dr.eval(total, weight)  # so that one kernel serves any number of frames
-    return image(total / weight, here.height, here.width)
+    return image(total / weight, *geometry.shape_index.shape)

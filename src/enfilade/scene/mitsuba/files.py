@@ -27,13 +27,15 @@ PARSER_VARIANT = "scalar_rgb"  # required by the parser, which is the same for a
 PLUGINS = Path(mi.__file__).resolve().parent / "plugins"
 BLENDER = "blender"  # its meshes are addresses in the memory of a process
 SOURCE_LOCATION = re.compile(r"\[\w+\.(?:cpp|h):\d+\] ")
+NUMBERS = ("Float", "Vector", "Color", "Transform")  # types of properties
+NOT_FINITE = re.compile(r"\b(?:nan|inf)\b")
 QUOTED_SPECTRUM = re.compile(r'(failed to load spectrum from file ".*?"): .*', re.DOTALL)
 
 
 def check_scene(scene: Path, limits: LimitSettings) -> None:
-    """Refuse a scene with plugins other than Mitsuba's own, or with files outside the allowed folders.
+    """Refuse a scene with plugins other than Mitsuba's own, files outside the allowed folders, or NaN.
 
-    These are the scene's own folder and those of ``limits.allow``.
+    Allowed folders are the scene's own and those of ``limits.allow``.
 
     Raises
     ------
@@ -48,6 +50,7 @@ def check_scene(scene: Path, limits: LimitSettings) -> None:
             if name != "scene" and not _is_own_plugin(name, resolver):
                 where = mi.parser.file_location(state, node)
                 raise SceneError(f"{where}: {name!r} is not one of Mitsuba's plugins for scene files")
+            _check_numbers(state, node)
         for file in _files(state, resolver):
             if not file.is_file():
                 raise SceneError(f"{scene} uses {file}, which is missing or not a regular file")
@@ -117,6 +120,25 @@ def _check_there(scene: Path) -> None:
 def _is_own_plugin(name: str, resolver: Any) -> bool:
     library = Path(str(resolver.resolve(f"plugins/{name}.so")))
     return name != BLENDER and library.is_file() and library.resolve().parent == PLUGINS
+
+
+def _check_numbers(state: Any, node: Any) -> None:
+    """Refuse NaN and infinite numbers: Mitsuba renders such a shape black, or not at all.
+
+    Meshes with such vertices are refused by Mitsuba itself.
+    """
+    properties = node.props
+    for name in properties.keys():  # noqa: SIM118  (not a dictionary)
+        kind = properties.type(name).name
+        numbers = kind in NUMBERS and properties.as_string(name)
+        if kind == "Spectrum":  # its string leaves the values out
+            numbers = repr(list(properties[name].values))
+        if numbers and NOT_FINITE.search(numbers):
+            owner = f"{properties.plugin_name()} {properties.id()}".strip()
+            raise SceneError(
+                f"{mi.parser.file_location(state, node)}: {name!r} of {owner!r} has a number that is NaN or "
+                "infinite; correct it in the scene file"
+            )
 
 
 def _files(state: Any, resolver: Any) -> Iterator[Path]:

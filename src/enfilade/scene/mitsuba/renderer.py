@@ -83,7 +83,12 @@ class MitsubaRenderer:
 
     def describe(self) -> SceneFacts:
         """Facts of the scene and the renderer."""
-        return SceneFacts(f"Mitsuba {mi.__version__}", self._device.variant, self._shapes.names)
+        return SceneFacts(
+            renderer=f"Mitsuba {mi.__version__}",
+            variant=self._device.variant,
+            shapes=self._shapes.names,
+            has_background=self._scene.environment() is not None,
+        )
 
     def surfaces(self, rays: Rays) -> Surfaces:
         """Find the first surface along each ray that is at least half opaque."""
