@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, Int, image, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array3f, Float, Int, UInt, image, lanes, matrix3, opaque, vector3
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
@@ -124,6 +124,37 @@ def upload_layers(
     )
     dr.eval(uploaded.depths, uploaded.shape_indices, uploaded.normals, uploaded.values, uploaded.variances)
     return uploaded
+
+
+def blank_image(layers: int) -> UploadedImage:
+    """An image that shows nothing, in place of a missing one, so that one kernel serves any number of images.
+
+    Its arrays are its own: Dr.Jit merges arrays that appear twice, which would make another kernel.
+
+    Parameters
+    ----------
+    layers
+        Number of layers of the other images.
+    """
+
+    def zeros(kind: Any) -> Any:
+        found = dr.zeros(kind, 2)  # gathering from a single lane would be another kernel
+        dr.make_opaque(found)
+        return found
+
+    nowhere = np.zeros((3, 3))
+    return UploadedImage(
+        depths=zeros(Float),
+        shape_indices=zeros(UInt),
+        normals=zeros(UInt),
+        values=tuple(zeros(Array3f) for _ in range(layers)),
+        variances=tuple(zeros(Float) for _ in range(layers)),
+        eye=vector3(np.zeros(3)),
+        direction_from_pixel=matrix3(nowhere),
+        pixel_from_direction=matrix3(nowhere),  # all points are behind its camera
+        width=opaque(2, Int),
+        height=opaque(1, Int),
+    )
 
 
 def accumulate(

@@ -16,6 +16,7 @@ from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
     IrradianceCache,
     accumulate,
+    blank_image,
     is_covered,
     reproject_to,
     upload,
@@ -78,6 +79,7 @@ class ShotContext:
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
         self._disocclusions: dict[int, list[int]] | None = None
+        self._blank: list[UploadedImage] = []
 
     def is_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> bool:
         """Whether its caches are valid for a task."""
@@ -93,9 +95,7 @@ class ShotContext:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
-        missing = PREPASS_IMAGES - len(images)
-        weights = [*[1.0] * len(images), *[0.0] * missing]
-        return IrradianceCache.of([*images, *[images[0]] * missing], weights)
+        return IrradianceCache.of(*self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES))
 
     def final_gather_cache(self, frame: int) -> IrradianceCache:
         """Prepass images and hash grid near a frame, for final gathering."""
@@ -118,12 +118,17 @@ class ShotContext:
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
         images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
-        # Fill up to a fixed number of images, so that one kernel serves all frames.
-        missing = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES - len(images)
-        images, own = [*images, *[images[0]] * missing], [*own, *[0.0] * missing]
-        return IrradianceCache.of([reprojected], [1.0]), IrradianceCache.of(
-            images, own, self.hash_grid(frame)
-        )
+        filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
+        return IrradianceCache.of([reprojected], [1.0]), IrradianceCache.of(*filled_up, self.hash_grid(frame))
+
+    def _filled_up(
+        self, images: list[UploadedImage], weights: list[float], count: int
+    ) -> tuple[list[UploadedImage], list[float]]:
+        """Images and weights with blank ones up to a number, so that one kernel serves all frames."""
+        missing = count - len(images)
+        while len(self._blank) < missing:
+            self._blank.append(blank_image(layers=1))
+        return [*images, *self._blank[:missing]], [*weights, *[0.0] * missing]
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
         """Diffuse pixels of a frame that neither the nearest keyframes nor other images show, (H, W)."""
