@@ -25,7 +25,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from enfilade.camera.path import CameraPath
 from enfilade.cli.progress import watch
 from enfilade.device import Choice, activate
 from enfilade.errors import EnfiladeError, InputError, SettingsError
@@ -39,7 +38,7 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
-from enfilade.settings import SampleFilter, SamplingSettings, Settings, ViewingSettings
+from enfilade.settings import SampleFilter, SamplingSettings, ViewingSettings
 from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
 from studies.bench.measures import QUALITIES
@@ -51,7 +50,7 @@ from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
 
 PATHS_PER_CPU_S = 6.0e5  # measured in six interiors on one core of 2026; for the forecast
-WARM_FRAMES = 3  # rendered and discarded before the measurement, to compile the kernels
+WARM_HEIGHT = 45  # pixels of the frames that are rendered and discarded first, to compile the kernels
 UNCHARGED = (CLIPS.name, VIDEO.name)  # equal for all
 BASELINES_UNCHARGED = (*UNCHARGED, ANALYSIS.name)  # nor statistics of the path
 DECIDED = 4.0 / 3.0  # times the error of the noise floor
@@ -336,9 +335,9 @@ def _is_finished(job: Job, folder: Path) -> bool:
 
 
 def _warm(job: Job) -> None:
-    """Render a few frames, so that the compiled kernels are in the cache on disk."""
+    """Render the job in small, so that the compiled kernels are in the cache on disk."""
     with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
-        render(_excerpt(job), Path(scratch) / "run", Silence())
+        render(_small(job), Path(scratch) / "run", Silence())
 
 
 def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:
@@ -349,12 +348,13 @@ def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:
     return {"cpu_s": time.process_time(), "peak_mib": peak_mib}
 
 
-def _excerpt(job: Job) -> Job:
-    """A few frames of a job, spread over the path, as one shot."""
-    path = job.path
-    count = min(WARM_FRAMES, len(path))
-    frames = sorted({round(i * (len(path) - 1) / max(count - 1, 1)) for i in range(count)})
-    spp = min(job.settings[SamplingSettings].spp, SPP_PER_SUM)  # more need no other kernel
-    cameras, numbers = tuple(path.cameras[f] for f in frames), tuple(path.numbers[f] for f in frames)
-    settings: Settings = job.settings.replace(SamplingSettings, spp=spp)
-    return replace(job, path=CameraPath(cameras, numbers, path.fps), settings=settings)
+def _small(job: Job) -> Job:
+    """A job in small: kernels do not depend on the size of the frames, nor on their number of paths."""
+    path, settings = job.path, job.settings
+    scale = min(WARM_HEIGHT / path.height, 1.0)
+    width, height = max(round(path.width * scale), 1), max(round(path.height * scale), 1)
+    cameras = tuple(replace(camera, width=width, height=height) for camera in path.cameras)
+    spp = min(settings[SamplingSettings].spp, SPP_PER_SUM)  # more need no other kernel
+    diagonal_m = settings[ViewingSettings].diagonal_m * scale
+    settings = settings.replace(SamplingSettings, spp=spp).replace(ViewingSettings, diagonal_m=diagonal_m)
+    return replace(job, path=replace(path, cameras=cameras), settings=settings)

@@ -1,8 +1,8 @@
 """Tables have the figures of the summary, for any method."""
 
-from enfilade.reports.tables import comparison_table, percent, plan_tables, result_line, run_tables, seconds
+from enfilade.reports.tables import comparison_table, percent, result_line, run_tables, seconds
 from support.console import as_text
-from support.synthetic_runs import synthetic_plan, synthetic_summary
+from support.synthetic_runs import synthetic_summary
 
 
 def rows(table):
@@ -25,28 +25,6 @@ def test_time_is_listed_by_stage_and_adds_up():
     table = rows(run_tables(synthetic_summary())[1])
     assert ["final", "gather", "2.5", "min", "4.8", "min", "1.25", "s", "62.5"] in table
     assert table[-1] == ["total", "4.0", "min", "7.2", "min", "2.00", "s", "100.0"]
-
-
-def test_plan_of_traced_pixels():
-    walk, forecast = plan_tables(synthetic_plan())
-    assert "60 frames, 4 initial keyframes: 1, 21, 41, 60" in as_text(walk)
-    assert ["pixels", "traced,", "%", "31.5"] in rows(forecast)
-    assert ["disoccluded", "1.5"] in rows(forecast)
-    assert ["time", "8.5", "min"] in rows(forecast)
-
-
-def test_plan_of_rays():
-    table = rows(plan_tables(synthetic_plan(method="decoupled"))[1])
-    assert ["rays", "per", "pixel", "and", "frame", "15.0"] in table
-    assert ["final", "gather", "12.00"] in table
-    assert ["tasks", "64"] in table
-    assert table[-1] == ["From", "a", "dry", "run", "of", "9", "frames", "at", "365x274."]
-
-
-def test_many_keyframes_are_cut_short_and_none_are_left_out():
-    plan = {**synthetic_plan(), "keyframes": list(range(1, 61, 2))}
-    assert "21, 23, ... 59" in as_text(plan_tables(plan)[0])
-    assert rows(plan_tables({**plan, "keyframes": []})[0])[-1] == ["60", "frames"]
 
 
 def test_comparison():

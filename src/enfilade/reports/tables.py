@@ -1,4 +1,4 @@
-"""Tables of a run, a plan and a comparison for a terminal, and their number formats."""
+"""Tables of a run and a comparison for a terminal, and their number formats."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ __all__ = [
     "TRACED_COLUMNS",
     "comparison_table",
     "percent",
-    "plan_tables",
     "psnr_text",
     "result_line",
     "run_tables",
@@ -29,7 +28,6 @@ TRACED_COLUMNS = {  # titles of the columns of Table 1, by key of the summary
     "total": "total",
 }
 WORST_FRAMES = 8  # of a comparison
-LISTED = 12  # keyframes
 
 
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
@@ -41,11 +39,6 @@ def run_tables(summary: Mapping[str, Any]) -> list[Table]:
         See :func:`~enfilade.runs.statistics.statistics`.
     """
     return [_rays_table(summary) if summary["rays"] else _traced_table(summary), _time_table(summary)]
-
-
-def plan_tables(plan: Mapping[str, Any]) -> list[Table]:
-    """The walkthrough and the forecast of a plan, ``Plan.to_dict()``."""
-    return [_walk_table(plan), _forecast_table(plan)]
 
 
 def result_line(found: Mapping[str, Any]) -> str:
@@ -129,49 +122,6 @@ def _time_table(summary: Mapping[str, Any]) -> Table:
     sums = (seconds(times[key]) for key in ("total_s", "cpu_s", "per_frame_s"))
     table.add_row("total", *sums, percent(100.0))
     return table
-
-
-def _walk_table(plan: Mapping[str, Any]) -> Table:
-    frames, keyframes = plan["frames"], plan["keyframes"]
-    table = _table("Walkthrough", ("per frame", "mean", "least", "most"))
-    for title, key, form in (
-        ("image velocity, deg/s", "mean_speed_deg_s", "{:.2f}"),
-        ("slow pixels, %", "slow_percent", "{:.1f}"),
-        ("specular pixels, %", "specular_percent", "{:.1f}"),
-    ):
-        values = plan[key]
-        table.add_row(title, *(form.format(v) for v in (sum(values) / len(values), min(values), max(values))))
-    table.caption = f"{len(frames)} frames"
-    if keyframes:
-        shown = ", ".join(str(n) for n in keyframes[:LISTED])
-        more = f", ... {keyframes[-1]}" if len(keyframes) > LISTED else ""
-        table.caption += f", {len(keyframes)} initial keyframes: {shown}{more}"
-    return table
-
-
-def _forecast_table(plan: Mapping[str, Any]) -> Table:
-    table = _table("Forecast", ("", ""))
-    if rays := plan["rays"]:
-        table.add_row("rays per pixel and frame", f"{sum(rays.values()):.1f}")
-        _add_parts(table, ((spoken(kind), f"{count:.2f}") for kind, count in rays.items()))
-    else:
-        traced = plan["traced_percent"]
-        table.add_row("pixels traced, %", percent(traced["total"]))
-        _add_parts(
-            table, ((title, percent(traced[key])) for key, title in TRACED_COLUMNS.items() if key != "total")
-        )
-    table.add_row("tasks", str(sum(plan["tasks"].values())))
-    _add_parts(table, ((spoken(name), str(count)) for name, count in plan["tasks"].items()))
-    table.add_row("time", seconds(plan["seconds"]))
-    table.add_row("CPU time", seconds(plan["cpu_seconds"]))
-    width, height = plan["excerpt_size"]
-    table.caption = f"From a dry run of {plan['excerpt_frames']} frames at {width}x{height}."
-    return table
-
-
-def _add_parts(table: Table, parts: Iterable[tuple[str, str]]) -> None:
-    for name, value in parts:
-        table.add_row(f"  {name}", value)
 
 
 def _difference(row: Mapping[str, Any], visible: float) -> list[str]:
