@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mitsuba as mi
 import numpy as np
 
 from enfilade.arrays import Array3f, lanes, rows
 from enfilade.kernels.random import R2
 from enfilade.renderer import Emitters
+from enfilade.scene.mitsuba.merge import MergedScene
 
 MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
 
 
-def find_emitters(scene: Any) -> Emitters:
+def find_emitters(merged: MergedScene) -> Emitters:
     """Distribute points over all emitting surfaces; environments, point and directional lights have none."""
-    shapes = [(index, shape) for index, shape in enumerate(scene.shapes(), start=1) if shape.is_emitter()]
+    numbered = zip(merged.sources, merged.scene.shapes(), strict=True)
+    shapes = [(int(source[0]), shape) for source, shape in numbered if shape.is_emitter()]
     count = int(np.clip(MAX_POINTS // max(len(shapes), 1), *POINTS))
     sample_points = mi.Point2f(
         *(lanes(np.mod(step / 2**32 * np.arange(count), 1.0).astype(np.float32)) for step in R2)

@@ -19,8 +19,8 @@ OUT_OF_MEMORY = ("out of memory", "bad_alloc")  # in errors of Dr.Jit and C++
 def load_scene(file: Path) -> Any:
     """Load a scene of at least one shape and one emitter.
 
-    Meshes of the same material are not merged, so that shapes are those of the file. Symbolic links are
-    followed first: Mitsuba looks for files beside the XML file.
+    Its shapes are those of the file. Symbolic links are followed first: Mitsuba looks for files beside the
+    XML file.
 
     Raises
     ------

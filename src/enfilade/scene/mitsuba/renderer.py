@@ -37,6 +37,7 @@ from enfilade.scene.mitsuba.emitters import find_emitters
 from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_inseparable
 from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.lobes import Lobes
+from enfilade.scene.mitsuba.merge import merge_meshes
 from enfilade.scene.mitsuba.shapes import Shapes, surface_class
 from enfilade.scene.mitsuba.transport import LightTransport
 
@@ -66,7 +67,8 @@ class MitsubaRenderer:
     def __init__(self, file: Path, *, max_depth: int = 0, chunk: int = 1 << 20) -> None:
         self._device = active()
         mi.set_variant(self._device.variant)
-        self._scene = scene = load_scene(file)
+        self._merged = merge_meshes(load_scene(file))
+        self._scene = scene = self._merged.scene
         self._chunk = chunk
         self._integrator = scene_integrator(scene, max_depth)
         self._continued = [shortened(self._integrator, depth) for depth in range(1, MAX_PATH_DEPTH + 1)]
@@ -75,7 +77,7 @@ class MitsubaRenderer:
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
         self._transport = LightTransport(scene, self._lobes, self._continued_radiance)
-        self._shapes = Shapes(scene)
+        self._shapes = Shapes(self._merged)
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
         # while a kernel is recorded.
@@ -124,7 +126,7 @@ class MitsubaRenderer:
     @cached_property
     def emitters(self) -> Emitters:
         """See :attr:`enfilade.renderer.LobeRenderer.emitters`."""
-        return find_emitters(self._scene)
+        return find_emitters(self._merged)
 
     def intersect(
         self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False

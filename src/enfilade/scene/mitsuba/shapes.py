@@ -11,6 +11,7 @@ import numpy as np
 
 from enfilade.arrays import Bool, UInt
 from enfilade.records import SurfaceClass
+from enfilade.scene.mitsuba.merge import MergedScene
 
 __all__ = ["Shapes", "bsdf_table", "has_lobe", "surface_class"]
 
@@ -18,11 +19,11 @@ NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has on
 
 
 class Shapes:
-    """The shapes of a scene.
+    """The shapes of a scene's file.
 
     Parameters
     ----------
-    scene : mitsuba.Scene
+    merged
 
     Attributes
     ----------
@@ -32,27 +33,34 @@ class Shapes:
         Whether any BSDF has null interactions.
     """
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, merged: MergedScene) -> None:
+        scene = merged.scene
         shapes = scene.shapes()
         registry = [_registry_index(mi.ShapePtr(shape)) for shape in shapes]
-        index = np.zeros(max(registry) + 1, np.uint32)
-        index[registry] = np.arange(1, len(shapes) + 1)
-        self._index = UInt(index)
+        sizes = [len(source) for source in merged.sources]
+        first, count = np.zeros((2, max(registry) + 1), np.uint32)
+        first[registry] = np.cumsum([0, *sizes[:-1]])
+        count[registry] = sizes
+        self._index = UInt(np.concatenate([*merged.sources, [0]]).astype(np.uint32))  # two lanes at least
+        self._first, self._last = UInt(first), UInt(np.maximum(count, 1) - 1)
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
         self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
-        self.names = tuple(s.id() or f"{s.class_name()} {i}" for i, s in enumerate(shapes, start=1))
+        self.names = merged.names
         self.may_be_null = bool(dr.any(self._is_null))
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read, and all BSDFs, which makes Dr.Jit consider those of no shape, too."""
-        return self._index, self._is_null, self._bsdfs
+        return self._index, self._first, self._last, self._is_null, self._bsdfs
 
     def index(self, si: Any) -> Any:
         """Index of the shape that is hit, from 1; an instance is a shape. 0 for a miss; UInt."""
         shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
         instance: Any = dr.reinterpret_array(mi.UInt32, si.instance)
-        return dr.gather(UInt, self._index, dr.select(instance != 0, instance, shape), si.is_valid())
+        number = dr.select(instance != 0, instance, shape)
+        first = dr.gather(UInt, self._first, number, si.is_valid())
+        last = dr.gather(UInt, self._last, number, si.is_valid())
+        return dr.gather(UInt, self._index, first + dr.minimum(si.prim_index, last), si.is_valid())
 
     def is_null(self, si: Any, transmittance: float) -> Any:
         """Whether a hit is a null interaction: its surface transmits more than this share of light; Bool.
