@@ -4,8 +4,8 @@ FOLDER holds a finished bench. Its windows are traced again by the references' o
 numbers, and measured as they are and with an injected error:
 
 * ``brighter``: the largest object of the windows 3 % brighter,
-* ``blurred``: irradiance (colour over albedo of diffuse surfaces) blurred within each shape, sigma 2 pixels; it
-  also changes textures where the albedo varies within a pixel,
+* ``blurred``: irradiance (colour over albedo of diffuse surfaces) blurred within each shape, sigma 2 pixels;
+  it also changes textures where the albedo varies within a pixel,
 * ``repeated``: the middle frame replaced by the one before.
 
 Without an error the score is that of the noise of so many paths.
