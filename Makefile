@@ -1,7 +1,7 @@
 # make demo    set up, render a small walkthrough into runs/demo, and write its report
 # make test    set up, run the tests in two processes (JOBS=4: four); installs Chromium by apt if it is missing
 # make validate-metric   set up, validate the metric on published experiments with observers (seven minutes)
-# make bench   set up, compare enfilade's methods with rivals on the generated scenes (BENCH=--quick: ten minutes)
+# make bench   set up, compare enfilade's methods with baselines on the generated scenes (BENCH=--quick: ten minutes)
 # make judge   set up ColorVideoVDP in .venv-judge, for the bench (two minutes, 1.7 GB)
 # make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
 # make check   set up, check formatting, lint, types and import rules

@@ -2,7 +2,7 @@
 
     python -m studies.bench [--quick] [--scene NAME ...] [--scenes FOLDER] [--sizes 320x180 1280x720]
 
-Runs or continues the bench of each scene and size, prints the geometric means of the ratios by camp, and
+Runs or continues the bench of each scene and size, prints the geometric means of the ratios by split, and
 writes all results with date, machine and code as one JSON file, and one page of figures. Further options go
 to `python -m studies bench`, such as --reference-spp and --references.
 """
@@ -10,6 +10,7 @@ to `python -m studies bench`, such as --reference-spp and --references.
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def main() -> int:
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
     frames = arguments.frames or (QUICK_FRAMES if arguments.quick else FRAMES)
-    if arguments.quick and "--reference-spp" not in options:
+    if arguments.quick and not any(option.startswith("--reference-spp") for option in options):
         options += ["--reference-spp", QUICK_SPP]
     names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
     benches: list[dict[str, Any]] = []
@@ -80,18 +81,24 @@ def keep(benches: list[dict[str, Any]], folder: Path) -> None:
     """Write the results and the page of figures, named by their date, and print the summary."""
     folder.mkdir(parents=True, exist_ok=True)
     means = summary(benches)
-    file = folder / f"{benches[-1]['date']}.json"
+    file = folder / time.strftime("%Y-%m-%d-%H%M.json")
     file.write_text(json.dumps({"summary": means, "benches": benches}, indent=1) + "\n")
     page = plot_page(benches, file.with_suffix(".png"))
     measures = [name for name in QUALITIES if all(name in one["ratios"] for one in means)]
     table = Table(
-        title="CPU time of the strongest rival over ours, at equal quality: geometric means over scenes"
+        title="CPU time of the strongest baseline over ours, at equal quality: geometric means over scenes"
     )
-    for heading in ("size", "camp", "scenes", "configuration", *(QUALITIES[name].title for name in measures)):
+    for heading in (
+        "size",
+        "split",
+        "scenes",
+        "configuration",
+        *(QUALITIES[name].title for name in measures),
+    ):
         table.add_column(heading)
     for one in means:
         cells = [ratio_text(one["ratios"][name]) for name in measures]
-        table.add_row(one["size"], one["camp"], str(len(one["scenes"])), one["configuration"], *cells)
+        table.add_row(one["size"], one["split"], str(len(one["scenes"])), one["configuration"], *cells)
     Console().print(table)
     print(file, page, sep="\n")
 

@@ -38,7 +38,8 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
-from enfilade.settings import SampleFilter, SamplingSettings, ViewingSettings
+from enfilade.settings import MetricSettings, SampleFilter, SamplingSettings, ViewingSettings
+from studies.bench import colorvideovdp
 from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
 from studies.bench.measures import QUALITIES
@@ -136,7 +137,7 @@ def bench(
     found = {
         **origin(),
         "machine": machine(),
-        "versions": package_versions(),
+        "versions": {**package_versions(), "cvvdp": colorvideovdp.version()},
         "scene": job.scene.file.resolve().parent.name,
         "size": [job.path.width, job.path.height],
         "fps": job.path.fps,
@@ -172,7 +173,7 @@ def _prepare(job: Job, place: Place, spp: int, *, quiet: bool) -> list[Window]:
     held = read_json(file) if file.is_file() else None
     if held is not None and held["identity"] != identity:
         raise InputError(
-            f"{place.folder} holds the bench of another scene or path; name another folder by --out"
+            f"{place.folder} holds the bench of another scene or other frames; name another folder by --out"
         )
     if held is None:
         walk = Walkthrough(job.path, job.settings, job.open_renderer())
@@ -215,6 +216,7 @@ class _Bench:
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
             "cost": self._cost(one, run),
+            "origin": read_json(self._folder / "costs" / f"{one.name}.json")["origin"],
             "scores": {name: QUALITIES[name].score(values[name]) for name in self._names},
             "values": values,
             "undecided": undecided(values, floors),
@@ -233,6 +235,8 @@ class _Bench:
             "windows": [asdict(window) for window in self._windows],
             "references": [self._references.spp(frame) for frame in frames],
             **self._job.settings.to_tables([ViewingSettings]),
+            "metering": self._job.settings[MetricSettings].metering.value,
+            "versions": [package_versions(), colorvideovdp.version()],
         }
         file = self._folder / "scores" / f"{name}.json"
         found: dict[str, Any] = read_json(file) if file.is_file() else {}
@@ -258,7 +262,7 @@ class _Bench:
         before = _ledger_cpu_s(folder)
         spent = _alone("cpu", _render, one.job, folder, quiet=self._quiet)
         spent["start_cpu_s"] = spent.pop("cpu_s") - (_ledger_cpu_s(folder) - before)
-        write_json(file, spent)
+        write_json(file, {"cost": spent, "origin": {**origin(), "machine": machine()}})
 
     def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
         """CPU and wall seconds of a run, by stage and in total, over all sessions; the start included."""
@@ -268,7 +272,7 @@ class _Bench:
         )
         charged = {name: spent for name, spent in stages.items() if name not in uncharged}
         total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
-        start = read_json(self._folder / "costs" / f"{one.name}.json")
+        start = read_json(self._folder / "costs" / f"{one.name}.json")["cost"]
         total["cpu_s"] += start["start_cpu_s"]
         return {**total, **start, "stages": charged}
 
@@ -327,11 +331,10 @@ def _begin(parent: int, device: Choice) -> None:
 
 
 def _is_finished(job: Job, folder: Path) -> bool:
-    """Whether a run folder holds the finished run of a job, on any device."""
+    """Whether a run folder holds the finished run of a job."""
     if not (folder / "summary.json").is_file():
         return False
-    wanted, existing = json.loads(json.dumps(job.identity())), RunFolder.read(folder).identity
-    return bool({**wanted, "renderer": None} == {**existing, "renderer": None})
+    return bool(json.loads(json.dumps(job.identity())) == RunFolder.read(folder).identity)
 
 
 def _warm(job: Job) -> None:

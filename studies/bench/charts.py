@@ -1,4 +1,4 @@
-"""Charts of benches: quality over CPU time, with the front of rivals."""
+"""Charts of benches: quality over CPU time, with the baselines' Pareto front."""
 
 from __future__ import annotations
 
@@ -60,9 +60,8 @@ def plot_page(benches: Sequence[Mapping[str, Any]], file: Path) -> Path:
             ax.set_title(
                 f"{QUALITIES[name].title}, {QUALITIES[name].unit}", loc="left", fontsize=9, color=INK
             )
-        row[0].set_title(
-            f"{_title(found)}\n{QUALITIES[names[0]].title}, JOD", loc="left", fontsize=9, color=INK
-        )
+        first = f"{QUALITIES[names[0]].title}, {QUALITIES[names[0]].unit}"
+        row[0].set_title(f"{_title(found)}\n{first}", loc="left", fontsize=9, color=INK)
     _legend(figure, axes[0, 0])
     return save(figure, file)
 
@@ -89,7 +88,7 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
     best = front([place(row) for row in rows if row["family"] in BASELINES])
     ax.plot(
         [p.cpu_s for p in best], [sign * p.error for p in best],
-        color=ORANGE, linewidth=1.8, label="front of rivals", zorder=2,
+        color=ORANGE, linewidth=1.8, label="baselines' Pareto front", zorder=2,
     )  # fmt: skip
     for family, style in STYLES.items():
         members = [(place(row), row) for row in rows if row["family"] == family]

@@ -23,7 +23,7 @@ from enfilade.viewing import Viewing
 FLICKER_BLOCK_PX = 8
 RELATIVE_FLOOR = 0.01  # added to the squared reference of the relative error (Rousselle et al. 2011)
 BEST_JOD = 10.0
-LEAST_ERROR = 1e-6  # of a measure that finds none, or none above its noise
+LEAST_ERROR = 1e-4  # where a measure finds none, or none above its noise: 80 dB
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class WindowPair(DisplayedPair):
 
 @dataclass(frozen=True)
 class Quality:
-    """The scale of a measure. Its values are additive: windows and frames are averaged.
+    """The scale of a measure, whose values are averaged over windows.
 
     Attributes
     ----------

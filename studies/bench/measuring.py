@@ -94,7 +94,7 @@ def measure(
     exposure_ev = job.settings[ViewingSettings].exposure_ev
     others = [name for name in names if name != "cvvdp"]
     opened = [{name: open_measure(name, viewing, pursuit) for name in others} for _ in windows]
-    kept: list[list[WindowPair]] = [[] for _ in windows]
+    kept: list[list[colorvideovdp.Pair]] = [[] for _ in windows]
     for frame in range(len(job.path)):
         monitor.progress("measures", frame, len(job.path))
         reference = references.read(frame)
@@ -103,7 +103,7 @@ def measure(
             for one in opened[index].values():
                 one.add(pair)
             if "cvvdp" in names:
-                kept[index].append(pair)
+                kept[index].append((pair.test.astype(np.float16), pair.reference.astype(np.float16)))
     values = {name: [of[name].value() for of in opened] for name in others}
     if "cvvdp" in names:
         values["cvvdp"] = colorvideovdp.predict_jod(kept, viewing)

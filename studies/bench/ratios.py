@@ -1,4 +1,4 @@
-"""CPU time at equal quality: enfilade's configurations against the front of rivals, with intervals."""
+"""CPU time at equal quality: enfilade's configurations against the Pareto front of the baselines."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from studies.bench.configurations import BASELINES
 from studies.bench.measures import QUALITIES
 
-DRAWS = 1000  # of windows, with replacement
-INTERVAL = (5.0, 95.0)  # percentiles of the draws
+DRAWS = 1000  # bootstrap resamples
+INTERVAL = (5.0, 95.0)  # percentiles of the resamples
 SEED = 0
 
 
@@ -27,28 +27,30 @@ class Point:
 
 @dataclass(frozen=True)
 class Ratio:
-    """CPU time of the strongest rival over that of a configuration, at equal quality.
+    """CPU time of the strongest baseline over that of a configuration, at equal quality.
 
     Attributes
     ----------
     times : float
         Above 1 where the configuration is faster.
     kind : {"equal", "at least", "at most"}
-        ``at least``: it is better than every rival; the best rival is compared, which would need more time.
-        ``at most``: it is worse than every rival; the cheapest is compared.
+        ``at least``: it is better than every baseline; the best one is compared, which would need more time.
+        ``at most``: it is no better than the cheapest baseline, which is compared.
     low, high : float
-        Interval of 90 % over draws of the windows, with replacement. It does not contain the spread of CPU
-        times.
+        Bootstrap interval of 90 % over the windows. It does not contain the spread of CPU times.
+    is_decided : bool
+        Whether the score is apart from the noise floor of the references.
     """
 
     times: float
     kind: str
     low: float
     high: float
+    is_decided: bool
 
 
 def ratios(rows: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Ratios by configuration and measure; empty where there is no rival.
+    """Ratios by configuration and measure; empty where there is no baseline.
 
     Parameters
     ----------
@@ -57,25 +59,26 @@ def ratios(rows: Sequence[Mapping[str, Any]], measures: Sequence[str]) -> dict[s
     measures
         Names.
     """
-    rivals = [row for row in rows if row["family"] in BASELINES]
+    baselines = [row for row in rows if row["family"] in BASELINES]
     ours = [row for row in rows if row["family"] not in BASELINES]
-    if not rivals:
+    if not baselines:
         return {}
-    return {one["name"]: {m: asdict(ratio(one, rivals, m)) for m in measures} for one in ours}
+    return {one["name"]: {m: asdict(ratio(one, baselines, m)) for m in measures} for one in ours}
 
 
-def ratio(one: Mapping[str, Any], rivals: Sequence[Mapping[str, Any]], measure: str) -> Ratio:
-    """CPU time of the rivals' front over that of a configuration, at its quality by a measure."""
+def ratio(one: Mapping[str, Any], baselines: Sequence[Mapping[str, Any]], measure: str) -> Ratio:
+    """CPU time of the baselines' front over that of a configuration, at its quality by a measure."""
     windows = len(one["values"][measure])
-    cost, kind = cost_at([_point(rival, measure) for rival in rivals], _point(one, measure).error)
+    cost, kind = cost_at([_point(baseline, measure) for baseline in baselines], _point(one, measure).error)
     random = np.random.default_rng(SEED)
     drawn = []
     for _ in range(DRAWS):
         chosen = random.integers(windows, size=windows).tolist()
-        points = [_point(rival, measure, chosen) for rival in rivals]
+        points = [_point(baseline, measure, chosen) for baseline in baselines]
         drawn.append(cost_at(points, _point(one, measure, chosen).error)[0] / one["cost"]["cpu_s"])
     low, high = np.percentile(drawn, INTERVAL).tolist()
-    return Ratio(cost / one["cost"]["cpu_s"], kind, low, high)
+    is_decided = measure not in one["undecided"]
+    return Ratio(cost / one["cost"]["cpu_s"], kind, low, high, is_decided)
 
 
 def _point(row: Mapping[str, Any], measure: str, windows: Sequence[int] | None = None) -> Point:
@@ -121,7 +124,7 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
 
 
 def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Geometric mean of ratios over scenes, with an interval over draws of the scenes.
+    """Geometric mean of ratios over scenes, with an interval over the scenes.
 
     Parameters
     ----------
@@ -131,7 +134,8 @@ def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Returns
     -------
     dict
-        As :class:`Ratio`; its `kind` is None where it contains bounds in both directions.
+        As :class:`Ratio`; its `kind` is None where it contains bounds in both directions, and it is decided
+        if all are.
     """
     logs = np.log([one["times"] for one in found])
     random = np.random.default_rng(SEED)
@@ -139,4 +143,5 @@ def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     low, high = np.exp(np.percentile(drawn, INTERVAL)).tolist()
     bounds = {one["kind"] for one in found} - {"equal"}
     kind = None if len(bounds) > 1 else next(iter(bounds), "equal")
-    return {"times": float(np.exp(logs.mean())), "kind": kind, "low": low, "high": high}
+    times, is_decided = float(np.exp(logs.mean())), all(one["is_decided"] for one in found)
+    return {"times": times, "kind": kind, "low": low, "high": high, "is_decided": is_decided}

@@ -13,18 +13,22 @@ from typing import Any
 
 from enfilade.camera import load_path
 from enfilade.errors import EnfiladeError, SceneError
-from studies.bench.camps import camp_of
 from studies.bench.ratios import mean_ratio
+from studies.bench.splits import UNLISTED, split_of
 from studies.scenes import SCENES
 
 PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
 FIRST_FRAME = 11  # where the path is long enough
 LARGE_PX = 500_000  # from this size on, few configurations
 SMALL = (
-    *(f"denoised-{spp}" for spp in (2, 4, 8, 16)), "denoised-4-fast", "denoised-8-fast",
-    "denoised-4-accumulated-after", "denoised-8-accumulated-after", "paper-16", "decoupled-*",
+    *(f"denoised-{spp}" for spp in (2, 4, 8, 16)), "denoised-2-fast", "denoised-4-fast",
+    *(f"denoised-{name}" for name in ("4-accumulated", "4-accumulated-after", "8-accumulated-after")),
+    "paper-16", "decoupled-*",
 )  # fmt: skip
-LARGE = ("denoised-4", "denoised-8", "denoised-4-accumulated-after", "decoupled-60", "decoupled-15")
+LARGE = (
+    *(f"denoised-{name}" for name in ("2-fast", "4-fast", "4", "8", "4-accumulated-after")),
+    "decoupled-60", "decoupled-15",
+)  # fmt: skip
 QUICK = ("denoised-2", "denoised-4", "denoised-8", "decoupled-60", "decoupled-15")
 
 
@@ -36,11 +40,14 @@ class Case:
     ----------
     name : str
     scene, path : Path
+    split : str
+        See :func:`studies.bench.splits.split_of`.
     """
 
     name: str
     scene: Path
     path: Path
+    split: str
 
 
 def generated(names: Iterable[str], size: str, folder: Path) -> list[Case]:
@@ -49,8 +56,12 @@ def generated(names: Iterable[str], size: str, folder: Path) -> list[Case]:
     for name in names:
         files = folder / f"{name}-{size}"
         command = ["scene", name, "--preset", "small", "--size", size, "--out", str(files)]
-        subprocess.run([sys.executable, "-m", "studies", *command], check=True, stdout=subprocess.DEVNULL)
-        cases.append(Case(name, files / "scene.xml", files / "camera_path.json"))
+        done = subprocess.run(
+            [sys.executable, "-m", "studies", *command], check=False, stdout=subprocess.DEVNULL
+        )
+        if done.returncode:
+            raise EnfiladeError(f"the generated scene {name} could not be written")
+        cases.append(Case(name, files / "scene.xml", files / "camera_path.json", split_of(name)))
     return cases
 
 
@@ -68,7 +79,8 @@ def found_in(folder: Path) -> list[Case]:
         scenes = [home / "scene.xml"] if (home / "scene.xml").is_file() else sorted(home.glob("*/scene.xml"))
         if len(scenes) != 1:
             raise SceneError(f"{home} has {len(scenes)} files scene.xml; it must have one")
-        cases.append(Case(home.name, scenes[0], path))
+        split = UNLISTED if home.name in SCENES else split_of(home.name)  # not the generated one of that name
+        cases.append(Case(home.name, scenes[0], path, split))
     if not cases:
         raise SceneError(f"{folder} has no subfolder with camera_path.json and scene.xml")
     return cases
@@ -87,7 +99,7 @@ def run_case(
     width, height = map(int, size.split("x"))
     length = len(load_path(case.path, size=None, frames=None, fps=None))
     last = min(FIRST_FRAME + frames - 1, length)
-    folder = out / f"{case.name}-{size}"
+    folder = out / f"{case.name}-{size}-{frames}"
     command = [
         sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path),
         "--out", str(folder),
@@ -98,7 +110,7 @@ def run_case(
     if subprocess.run(command, check=False).returncode:
         raise EnfiladeError(f"the bench of {case.name} at {size} failed; the same command continues")
     found: dict[str, Any] = json.loads((folder / "bench.json").read_text())
-    return found | {"scene": case.name, "camp": camp_of(case.name)}
+    return found | {"scene": case.name, "split": case.split}
 
 
 def only_for(size: str, *, is_quick: bool) -> tuple[str, ...]:
@@ -110,22 +122,24 @@ def only_for(size: str, *, is_quick: bool) -> tuple[str, ...]:
 
 
 def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Geometric means of the ratios over the scenes of a size and camp, by configuration.
+    """Geometric means of the ratios over the scenes of a size and split, by configuration.
 
     Returns
     -------
     list of dict
-        ``size``, ``camp``, ``configuration``, ``scenes`` and ``ratios`` by measure, as `ratios.mean_ratio`.
+        ``size``, ``split``, ``configuration``, ``scenes`` and ``ratios`` by measure, as `ratios.mean_ratio`.
     """
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for found in benches:
         size = "x".join(map(str, found["size"]))
         for name, by_measure in found["ratios"].items():
-            groups.setdefault((size, found["camp"], name), []).append({"scene": found["scene"], **by_measure})
+            groups.setdefault((size, found["split"], name), []).append(
+                {"scene": found["scene"], **by_measure}
+            )
     return [
         {
             "size": size,
-            "camp": camp,
+            "split": split,
             "configuration": name,
             "scenes": [one["scene"] for one in members],
             "ratios": {
@@ -134,9 +148,9 @@ def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
                 if measure != "scene" and all(measure in one for one in members)
             },
         }
-        for (size, camp, name), members in sorted(groups.items())
+        for (size, split, name), members in sorted(groups.items())
     ]
 
 
 GENERATED = SCENES
-QUICK_SCENES = ("room", "gallery")  # one of each camp
+QUICK_SCENES = ("room", "gallery")  # one of each split

@@ -54,29 +54,30 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
     if not found["ratios"]:
         return []
     table = _table(
-        "CPU time of the strongest rival over ours, at equal quality", "configuration",
+        "CPU time of the strongest baseline over ours, at equal quality", "configuration",
         *(of["title"] for of in found["measures"].values()),
     )  # fmt: skip
     for name, by_measure in found["ratios"].items():
         table.add_row(name, *(ratio_text(by_measure[measure]) for measure in found["measures"]))
     table.caption = (
-        "in brackets 90 % intervals over draws of the windows; ≥: better than every rival, "
-        "≤: worse than every rival"
+        "in brackets bootstrap intervals of 90 % over the windows; ≥: better than every baseline; "
+        "≤: no better than the cheapest baseline; *: within the noise of the references"
     )
     return [table]
 
 
 def ratio_text(ratio: Mapping[str, Any]) -> str:
-    """A ratio with its kind and interval: ``≥ 3.12 [2.90, 3.40]``."""
+    """A ratio with its kind and interval: ``≥ 3.12 [2.90, 3.40]``; an asterisk where it is not decided."""
     low, high = number_text(ratio["low"]), number_text(ratio["high"])
-    return f"{SIGNS[ratio['kind']]}{number_text(ratio['times'])} [{low}, {high}]"
+    mark = "" if ratio["is_decided"] else " *"
+    return f"{SIGNS[ratio['kind']]}{number_text(ratio['times'])} [{low}, {high}]{mark}"
 
 
 def score_text(measure: str, values: list[float]) -> str:
     """The score of windows together in about three digits."""
     quality = QUALITIES[measure]
     if quality.error(values) <= LEAST_ERROR:
-        return "none found"
+        return "below noise"
     return number_text(quality.score(values))
 
 

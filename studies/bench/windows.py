@@ -23,7 +23,8 @@ from enfilade.renderer import PixelFilter, Purpose
 KINDS = ("edges", "gloss", "shadows", "flat")
 MARGIN_PX = 1  # between a window and the border of the image: the Gaussian filter reaches beyond its pixels
 LARGEST_PX = 256  # side
-SHARE_OF_HEIGHT = 0.4  # side of a window over the height of the image, below `LARGEST_PX`
+SHARE_OF_SIDE = 0.4  # side of a window over the shorter side of the image, below `LARGEST_PX`
+MIN_SHARE = 0.02  # of a kind in its window; a scene with less has no window of this kind
 STEPS = 4  # positions of candidates per side
 SAMPLED_FRAMES = 4  # spread over the path
 PREVIEW_SPP = 32
@@ -57,7 +58,7 @@ class Window:
 
 
 def draw_windows(walk: Walkthrough) -> list[Window]:
-    """Draw a window of each kind, without overlap.
+    """Draw a window of each kind that the scene has, without overlap.
 
     Candidates lie on a grid. Each kind in turn takes the candidate with the largest share of its content,
     averaged over frames along the path.
@@ -73,9 +74,9 @@ def draw_windows(walk: Walkthrough) -> list[Window]:
         The image is too small.
     """
     height, width = walk.path.height, walk.path.width
-    side = min(LARGEST_PX, int(SHARE_OF_HEIGHT * height) // 8 * 8)
-    if side < 8 or width < 2 * side + 2 * MARGIN_PX:
-        raise InputError(f"a bench needs images of 54x24 pixels or more, landscape; this is {width}x{height}")
+    side = min(LARGEST_PX, int(SHARE_OF_SIDE * min(height, width)) // 8 * 8)
+    if side < 8:
+        raise InputError(f"a bench needs images of 20 pixels or more on each side; this is {width}x{height}")
     count = min(SAMPLED_FRAMES, len(walk.path))
     frames = sorted({round((i + 0.5) * len(walk.path) / count - 0.5) for i in range(count)})
     maps = [content(walk, frame) for frame in frames]
@@ -93,8 +94,9 @@ def draw_windows(walk: Walkthrough) -> list[Window]:
             for window in (Window(kind, left, top, side) for top, left in corners)
             if not any(_overlap(window, other) for other in chosen)
         ]
-        if found:  # at the first of equal shares
-            chosen.append(max(found, key=lambda one: one[0])[1])
+        share, window = max(found, key=lambda one: one[0], default=(0.0, None))  # the first of equal shares
+        if window is not None and share > MIN_SHARE:
+            chosen.append(window)
     return chosen
 
 

@@ -35,6 +35,10 @@ def sequence(size):
     return pairs
 
 
+def shown(pairs):
+    return [(one.test.astype(np.float16), one.reference.astype(np.float16)) for one in pairs]
+
+
 def value(measure, pairs):
     for one in pairs:
         measure.add(one)
@@ -56,7 +60,7 @@ def test_identical_sequences_have_no_error_and_more_noise_has_more(name):
 
 @pytest.mark.skipif(bool(colorvideovdp.why_missing()), reason="ColorVideoVDP is set up by make judge")
 def test_colorvideovdp_judges_several_sequences_in_its_own_environment():
-    jods = colorvideovdp.predict_jod([sequence(size) for size in (0.0, 0.01, 0.1)], VIEWING)
+    jods = colorvideovdp.predict_jod([shown(sequence(size)) for size in (0.0, 0.01, 0.1)], VIEWING)
     assert jods[0] == pytest.approx(10.0, abs=1e-3)
     assert 10.0 > jods[1] > jods[2]
 
@@ -69,7 +73,7 @@ def test_a_missing_colorvideovdp_is_named_and_a_failing_one_is_an_error(tmp_path
     python.write_text("#!/bin/sh\necho 'no torch' >&2\nexit 3\n")
     python.chmod(0o755)
     with pytest.raises(EnfiladeError, match=r"ColorVideoVDP failed: no torch; .*make judge"):
-        colorvideovdp.predict_jod([sequence(0.0)], VIEWING)
+        colorvideovdp.predict_jod([shown(sequence(0.0))], VIEWING)
 
 
 def test_squared_errors_of_a_known_error():

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from studies.bench.measures import QUALITIES
+from studies.bench.measures import LEAST_ERROR, QUALITIES
 from studies.bench.ratios import Point, cost_at, front, mean_ratio, ratios
 
 # Monte Carlo: four times the paths, half the error.
-RIVALS = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
+BASELINES = [Point(10.0, 0.4), Point(40.0, 0.2), Point(160.0, 0.1)]
 
 
 def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
@@ -17,18 +17,24 @@ def test_a_point_that_a_cheaper_one_beats_is_off_the_front():
 
 
 def test_between_points_both_axes_are_logarithmic():
-    cost, kind = cost_at(RIVALS, 0.1 * math.sqrt(2.0))
+    cost, kind = cost_at(BASELINES, 0.1 * math.sqrt(2.0))
     assert cost == pytest.approx(80.0)
     assert kind == "equal"
-    assert cost_at(RIVALS, 0.5) == (10.0, "at most")
-    assert cost_at(RIVALS, 0.05) == (160.0, "at least")
+    assert cost_at(BASELINES, 0.5) == (10.0, "at most")
+    assert cost_at(BASELINES, 0.05) == (160.0, "at least")
 
 
-def row(name, family, cpu_s, flip):
-    return {"name": name, "family": family, "cost": {"cpu_s": cpu_s}, "values": {"flip": flip}}
+def row(name, family, cpu_s, flip, undecided=()):
+    return {
+        "name": name,
+        "family": family,
+        "cost": {"cpu_s": cpu_s},
+        "values": {"flip": flip},
+        "undecided": undecided,
+    }
 
 
-def rivals():
+def baselines():
     return [
         row("denoised-2", "denoised", 10.0, [0.4, 0.4]),
         row("denoised-8", "denoised", 40.0, [0.2, 0.2]),
@@ -45,21 +51,21 @@ def rivals():
         (10.0, 0.2 * math.sqrt(2.0), 2.0, "equal"),
     ],
 )
-def test_the_strongest_rival_counts_whatever_its_family(cpu_s, flip, times, kind):
-    found = ratios([*rivals(), row("decoupled-15", "decoupled", cpu_s, [flip, flip])], ["flip"])
+def test_the_strongest_baseline_counts_whatever_its_family(cpu_s, flip, times, kind):
+    found = ratios([*baselines(), row("decoupled-15", "decoupled", cpu_s, [flip, flip])], ["flip"])
     assert list(found) == ["decoupled-15"]
     assert found["decoupled-15"]["flip"]["times"] == pytest.approx(times)
     assert found["decoupled-15"]["flip"]["kind"] == kind
 
 
 def test_windows_that_agree_have_no_interval_and_others_enclose_the_ratio():
-    same = ratios([*rivals(), row("a", "decoupled", 5.0, [0.3, 0.3])], ["flip"])["a"]["flip"]
+    same = ratios([*baselines(), row("a", "decoupled", 5.0, [0.3, 0.3])], ["flip"])["a"]["flip"]
     assert same["low"] == pytest.approx(same["times"])
     assert same["high"] == pytest.approx(same["times"])
-    mixed = ratios([*rivals(), row("a", "paper", 5.0, [0.22, 0.38])], ["flip"])["a"]["flip"]
+    mixed = ratios([*baselines(), row("a", "paper", 5.0, [0.22, 0.38])], ["flip"])["a"]["flip"]
     assert mixed["low"] < mixed["times"] < mixed["high"]
     assert mixed["times"] == pytest.approx(same["times"])
-    assert ratios(rivals(), ["flip"]) == {}
+    assert ratios(baselines(), ["flip"]) == {}
     assert ratios([row("a", "decoupled", 5.0, [0.3])], ["flip"]) == {}
 
 
@@ -68,11 +74,11 @@ def test_errors_of_scores():
     assert QUALITIES["cvvdp"].error([9.0, 8.0]) == pytest.approx(1.5)
     assert QUALITIES["cvvdp"].score([9.0, 8.0]) == pytest.approx(8.5)
     assert QUALITIES["psnr"].score([1e-2, 3e-2]) == pytest.approx(-10.0 * math.log10(2e-2))
-    assert QUALITIES["psnr"].error([1e-6, -2e-6]) == pytest.approx(1e-6)  # within the noise: the least error
+    assert QUALITIES["psnr"].error([1e-6, -2e-6]) == LEAST_ERROR  # within the noise
 
 
 def test_means_over_scenes():
-    one = {"times": 2.0, "kind": "equal", "low": 1.0, "high": 3.0}
+    one = {"times": 2.0, "kind": "equal", "low": 1.0, "high": 3.0, "is_decided": True}
     found = mean_ratio([one, one | {"times": 0.5}])
     assert found["times"] == pytest.approx(1.0)
     assert found["kind"] == "equal"

@@ -52,7 +52,7 @@ def test_a_small_image_is_refused(job):
     path = job.path
     cameras = tuple(replace(camera, width=16, height=12) for camera in path.cameras)
     walk = Walkthrough(replace(path, cameras=cameras), job.settings, job.open_renderer())
-    with pytest.raises(InputError, match=r"54x24 pixels or more.*16x12"):
+    with pytest.raises(InputError, match=r"20 pixels or more.*16x12"):
         draw_windows(walk)
 
 

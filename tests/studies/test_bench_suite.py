@@ -1,20 +1,24 @@
-"""The bench on several scenes: their camps, those of a folder, and means over them."""
+"""The bench on several scenes: their splits, those of a folder, and means over them."""
 
 import pytest
 
 from enfilade.errors import SceneError
-from studies.bench.camps import camp_of, camps
 from studies.bench.configurations import all_configurations, selected
+from studies.bench.splits import split_of, splits
 from studies.bench.suite import GENERATED, LARGE, QUICK, QUICK_SCENES, SMALL, found_in, only_for, summary
 from support.study_runs import room_job
 
 
-def test_every_generated_scene_is_in_one_camp():
-    assert set(camps()) == {"tuning", "held-out"}
-    assert not camps()["tuning"].keys() & camps()["held-out"].keys()
-    assert all(camp_of(name) != "not listed" for name in GENERATED)
-    assert {camp_of(name) for name in QUICK_SCENES} == {"tuning", "held-out"}
-    assert (camp_of("room"), camp_of("gallery"), camp_of("my house")) == ("tuning", "held-out", "not listed")
+def test_every_generated_scene_is_in_one_split():
+    assert set(splits()) == {"tuning", "held-out"}
+    assert not splits()["tuning"].keys() & splits()["held-out"].keys()
+    assert all(split_of(name) != "not listed" for name in GENERATED)
+    assert {split_of(name) for name in QUICK_SCENES} == {"tuning", "held-out"}
+    assert (split_of("room"), split_of("gallery"), split_of("my house")) == (
+        "tuning",
+        "held-out",
+        "not listed",
+    )
 
 
 def test_scenes_of_a_folder(tmp_path):
@@ -41,12 +45,20 @@ def test_configurations_of_the_suite_exist(tmp_path):
     assert only_for("1280x720", is_quick=True) == QUICK
 
 
-def test_the_summary_has_a_mean_for_each_size_camp_and_configuration():
+def test_the_summary_has_a_mean_for_each_size_split_and_configuration():
     def bench(scene, camp, times):
-        ratio = {"times": times, "kind": "equal", "low": times, "high": times}
-        return {"size": [320, 180], "scene": scene, "camp": camp, "ratios": {"decoupled-15": {"flip": ratio}}}
+        ratio = {"times": times, "kind": "equal", "low": times, "high": times, "is_decided": True}
+        return {
+            "size": [320, 180],
+            "scene": scene,
+            "split": camp,
+            "ratios": {"decoupled-15": {"flip": ratio}},
+        }
 
     found = summary([bench("room", "tuning", 4.0), bench("a", "held-out", 2.0), bench("b", "held-out", 0.5)])
-    assert [(one["camp"], one["scenes"]) for one in found] == [("held-out", ["a", "b"]), ("tuning", ["room"])]
+    assert [(one["split"], one["scenes"]) for one in found] == [
+        ("held-out", ["a", "b"]),
+        ("tuning", ["room"]),
+    ]
     assert found[0]["ratios"]["flip"]["times"] == pytest.approx(1.0)
     assert found[1]["ratios"]["flip"]["times"] == pytest.approx(4.0)

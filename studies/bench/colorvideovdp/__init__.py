@@ -8,16 +8,20 @@ import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
-from enfilade.comparison.measures import DisplayedPair
 from enfilade.errors import EnfiladeError
 from enfilade.viewing import Viewing
 
 HERE = Path(__file__).resolve().parent
 ENVIRONMENT = HERE.parents[2] / ".venv-judge"
 LEAST_BLACK_CD_M2 = 1e-3  # ColorVideoVDP takes a contrast, which must be finite
+
+Image: TypeAlias = npt.NDArray[np.float16]
+Pair: TypeAlias = tuple[Image, Image]
 
 
 def why_missing() -> str:
@@ -27,13 +31,19 @@ def why_missing() -> str:
     )
 
 
-def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) -> list[float]:
+def version() -> str:
+    """Version of its environment; empty where it is missing."""
+    file = ENVIRONMENT / ".ready"
+    return file.read_text(encoding="utf-8").strip() if file.is_file() else ""
+
+
+def predict_jod(sequences: Sequence[Sequence[Pair]], viewing: Viewing) -> list[float]:
     """ColorVideoVDP of sequences of one size and length, on one thread.
 
     Parameters
     ----------
     sequences
-        Frames of each sequence in order.
+        Frames of each sequence in order: test and reference, (H, W, 3) float16, sRGB-encoded, 0..1.
     viewing
         Viewing conditions.
 
@@ -47,16 +57,14 @@ def predict_jod(sequences: Sequence[Sequence[DisplayedPair]], viewing: Viewing) 
     EnfiladeError
         Its process failed; the message has its last words.
     """
-    stacks = {
-        name: np.stack([[getattr(pair, name).astype(np.float16) for pair in pairs] for pairs in sequences])
-        for name in ("test", "reference")
-    }
+    tests = np.stack([[test for test, _ in pairs] for pairs in sequences])
+    references = np.stack([[reference for _, reference in pairs] for pairs in sequences])
     with tempfile.TemporaryDirectory(prefix="enfilade-") as scratch:
         file = Path(scratch) / "pairs.npz"
         np.savez(
             file,
-            test=stacks["test"],
-            reference=stacks["reference"],
+            test=tests,
+            reference=references,
             fps=viewing.fps,
             ppd=viewing.pixels_per_degree,
             peak_cd_m2=viewing.peak_cd_m2,

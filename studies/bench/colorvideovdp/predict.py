@@ -7,6 +7,7 @@ predict.py --version     prints the versions
 
 import json
 import sys
+from importlib.metadata import version
 
 import numpy as np
 import pycvvdp
@@ -17,7 +18,7 @@ def main() -> None:
     """Print the scores of the pairs, or the versions."""
     torch.set_num_threads(1)
     if sys.argv[1] == "--version":
-        print(f"ColorVideoVDP on PyTorch {torch.__version__}")
+        print(f"ColorVideoVDP {version('cvvdp')}, PyTorch {torch.__version__}")
         return
     with np.load(sys.argv[1]) as given:
         arrays = {name: given[name] for name in given.files}

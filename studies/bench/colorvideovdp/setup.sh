@@ -36,5 +36,6 @@ for name in libcusparse.so.12 libcufft.so.12 libcufile.so.0 libcusparseLt.so.0 l
     gcc -shared -fPIC -Wl,-soname,$name -o "$libraries/$name" "$work/empty.c"
 done
 gcc -shared -fPIC -w -Wl,-soname,libcudnn.so.9 -o "$libraries/libcudnn.so.9" "$work/symbols.c"
-"$folder/bin/python" "$here/predict.py" --version
-touch "$folder/.ready"
+"$folder/bin/python" "$here/predict.py" --version >"$work/version"
+mv "$work/version" "$folder/.ready"
+cat "$folder/.ready"

@@ -1,13 +1,14 @@
-"""Can the bench tell small faults from none? `python -m studies.bench.planted FOLDER [--spp 1024]`.
+"""Can the bench tell small errors from none? `python -m studies.bench.injected FOLDER [--spp 1024]`.
 
 FOLDER holds a finished bench. Its windows are traced again by the references' own tracer, with other random
-numbers, and measured as they are and with a small fault planted:
+numbers, and measured as they are and with an injected error:
 
 * ``brighter``: the largest object of the windows 3 % brighter,
-* ``blurred``: irradiance (colour over albedo of diffuse surfaces) blurred within each shape, sigma 2 pixels,
+* ``blurred``: irradiance (colour over albedo of diffuse surfaces) blurred within each shape, sigma 2 pixels;
+  it also changes textures where the albedo varies within a pixel,
 * ``repeated``: the middle frame replaced by the one before.
 
-The run without a fault should score as the noise of so many paths; those with one should score worse.
+Without an error the score is that of the noise of so many paths.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from enfilade.device import activate
 from enfilade.monitor import Silence
 from enfilade.records import F32, Geometry
 
-FAULTS = ("none", "brighter", "blurred", "repeated")
+ERRORS = ("none", "brighter", "blurred", "repeated")
 SEED = 0x7F4A7C15  # unlike the references'
 GAIN = 1.03
 SIGMA_PX = 2.0
@@ -53,11 +54,11 @@ def blurred(image: F32, geometry: Geometry, crop: Any) -> F32:
 
 
 def main() -> None:
-    """Measure the planted faults and print their scores."""
+    """Measure the injected errors and print their scores."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--references", type=Path, default=Path("runs/references"))
-    parser.add_argument("--spp", type=int, default=1024)
+    parser.add_argument("--references", type=Path, deerror=Path("runs/references"))
+    parser.add_argument("--spp", type=int, deerror=1024)
     arguments = parser.parse_args()
     activate("cpu")
     from enfilade.methods.walkthrough import Walkthrough
@@ -80,15 +81,15 @@ def main() -> None:
     indices = np.concatenate([w.crop(walk.view(middle).geometry.shape_index).ravel() for w in windows])
     largest = int(np.bincount(indices[indices > 0]).argmax())
 
-    def source(fault: str) -> Any:
+    def source(error: str) -> Any:
         def images(frame: int) -> Sequence[F32]:
-            shown = frame - 1 if fault == "repeated" and frame == middle else frame
+            shown = frame - 1 if error == "repeated" and frame == middle else frame
             clean = traced.read(shown).halves[SampleFilter.GAUSSIAN].mean(axis=0)
             geometry = walk.view(shown).geometry
-            if fault == "brighter":
+            if error == "brighter":
                 pairs = zip(clean, windows, strict=True)
                 return [brightened(image, w.crop(geometry.shape_index), largest) for image, w in pairs]
-            if fault == "blurred":
+            if error == "blurred":
                 return [blurred(image, geometry, w.crop) for image, w in zip(clean, windows, strict=True)]
             return list(clean)
 
@@ -97,11 +98,11 @@ def main() -> None:
     names = available((), job)[0]
     arguments_of = (SampleFilter.GAUSSIAN, references, windows, job)
     floor = measure(None, *arguments_of, [name for name in names if QUALITIES[name].has_noise], Silence())
-    print("fault", *names, sep="\t")
+    print("error", *names, sep="\t")
     print("floor", *(score_text(name, floor[name]) if name in floor else "" for name in names), sep="\t")
-    for fault in FAULTS:
-        values = measure(source(fault), *arguments_of, names, Silence())
-        print(fault, *(score_text(name, values[name]) for name in names), sep="\t", flush=True)
+    for error in ERRORS:
+        values = measure(source(error), *arguments_of, names, Silence())
+        print(error, *(score_text(name, values[name]) for name in names), sep="\t", flush=True)
 
 
 if __name__ == "__main__":

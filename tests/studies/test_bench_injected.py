@@ -1,9 +1,9 @@
-"""Planted faults change what they name, and nothing else."""
+"""Injected errors change what they name, and nothing else."""
 
 import numpy as np
 
 from enfilade.gbuffer import find_geometry
-from studies.bench.planted import blurred, brightened
+from studies.bench.injected import blurred, brightened
 from support.analytic import AnalyticRenderer
 from support.example_scenes import room, room_walk
 
