@@ -53,7 +53,9 @@ def merge_meshes(scene: Any) -> MergedScene:
         return MergedScene(scene, names, tuple(np.array([i], np.uint32) for i in range(1, len(names) + 1)))
 
     # Replace each group by one shape, in the order of their first members.
-    content: dict[str, Any] = {"type": "scene", "integrator": scene.integrator()}
+    content: dict[str, Any] = {"type": "scene"}
+    if scene.integrator() is not None:
+        content["integrator"] = scene.integrator()
     content |= {f"sensor {i}": sensor for i, sensor in enumerate(scene.sensors())}
     content |= {f"emitter {i}": e for i, e in enumerate(scene.emitters()) if e.get_shape() is None}
     sources = []
