@@ -55,6 +55,14 @@ class RandomKey:
     purpose: Purpose
 
 
+class Branch(IntEnum):
+    """The branch of a path at a clear interface, such as a smooth pane of glass."""
+
+    RANDOM = 0
+    REFLECTED = 1
+    TRANSMITTED = 2
+
+
 class PixelFilter(IntEnum):
     """Distribution of camera rays over the image plane."""
 
@@ -162,6 +170,9 @@ class BsdfSample:
     direct : Array3f
         Radiance reflected by the lobe from sampled emitters (next-event estimation).
     is_alive : Bool
+    is_split : Bool
+        Whether this is one of two branches of a clear interface: with :attr:`Branch.REFLECTED` or
+        :attr:`Branch.TRANSMITTED`, and a throughput that is that of the branch.
     """
 
     rays: Rays
@@ -169,6 +180,7 @@ class BsdfSample:
     throughput: Any
     direct: Any
     is_alive: Any
+    is_split: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,7 +332,9 @@ class LobeRenderer(Renderer, Protocol):
         """Sample a direction of the diffuse lobe, divided by the albedo."""
         ...
 
-    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
+    def sample_specular(
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+    ) -> BsdfSample:
         """Sample a direction of the specular lobes.
 
         Parameters
@@ -329,6 +343,9 @@ class LobeRenderer(Renderer, Protocol):
         rng : PCG32
         choice : Float
             Selects the lobe, in [0, 1), transmission last; random by default.
+        branch
+            At clear interfaces. A sum over both branches has no noise of their choice. Other lobes are
+            sampled as usual.
         """
         ...
 

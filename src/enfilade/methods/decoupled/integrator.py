@@ -22,7 +22,7 @@ from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.paths import Path, compact, scatter_add, spawn
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
-from enfilade.renderer import MAX_PATH_DEPTH, BsdfSample, LobeRenderer, Rays, ShadingPoint
+from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, Rays, ShadingPoint
 
 MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
 ROULETTE_GAIN = 4.0  # Russian roulette: a path survives with this times its throughput, if that is below one
@@ -33,6 +33,7 @@ MIN_SURVIVAL = 0.05  # least probability of survival
 ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
+BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
 
 OnMiss = Callable[[Entries], None]
@@ -104,7 +105,10 @@ class Integrator:
 
         self._see = recorded(self._see_kernel, state)
         self._query_further = recorded(_query_kernel, lambda: None)
-        self._extend = recorded(self._extend_kernel, state)
+        self._extend = {
+            Branch.REFLECTED: recorded(lambda *path: self._extend_kernel(Branch.REFLECTED, *path), state),
+            Branch.TRANSMITTED: recorded(lambda *path: self._extend_kernel(Branch.TRANSMITTED, *path), state),
+        }
         self._gather = recorded(self._gather_kernel, state)
         self._estimate = recorded(self._estimate_kernel, state)
         self._terminate = recorded(self._terminate_kernel, state)
@@ -242,27 +246,31 @@ class Integrator:
         transmitted_at
             Offset of the lanes that receive transmission through clear surfaces.
         """
+        if not dr.width(path.lane):
+            return
+        if bounces == MAX_BOUNCES:
+            scatter_add(radiance, self._terminate(path), path.lane)
+            return
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
-        jitter = 1.0 if bounces == 0 else 0.0
-        while bounces < MAX_BOUNCES and dr.width(path.lane):
-            # The first bounce off the visible surface always survives; Russian roulette begins with the
-            # second.
-            survival = 1.0 if bounces == 0 else MIN_SURVIVAL
+        # The first bounce off the visible surface always survives; Russian roulette begins with the second.
+        jitter, survival = (1.0, 1.0) if qmc_point is not None else (0.0, MIN_SURVIVAL)
+        for branch in (Branch.REFLECTED, Branch.TRANSMITTED):
             first = None if qmc_point is None else dr.gather(Array4f, qmc_point, path.lane)
             dr.eval(first)
-            qmc_point = None
 
             # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-            direct, vertex = self._extend(cache, path, opaque(survival), first, opaque(transmitted_at))
+            extend = self._extend[branch]
+            direct, is_split, vertex = extend(cache, path, opaque(survival), first, opaque(transmitted_at))
             scatter_add(radiance, direct, path.lane)
             scatter_add(radiance, vertex.radiance, vertex.path.lane)
             self._add_missed(radiance, cache, vertex, jitter=jitter, on_miss=on_miss)
 
-            # Keep the paths that meet another specular lobe.
-            path = compact(vertex.path, dr.compress(vertex.has_specular))
-            bounces += 1
-        if dr.width(path.lane):
-            scatter_add(radiance, self._terminate(path), path.lane)
+            # Follow the paths that meet another specular lobe, then the other branch of clear interfaces.
+            onward = compact(vertex.path, dr.compress(vertex.has_specular & vertex.path.is_active))
+            self._trace_specular(radiance, cache, onward, bounces + 1, on_miss, None, transmitted_at)
+            path = compact(path, dr.compress(is_split))
+            if not dr.width(path.lane):
+                break
 
     def _add_missed(
         self,
@@ -338,15 +346,25 @@ class Integrator:
         return Array3f(emitted), vertex
 
     def _extend_kernel(
-        self, cache: IrradianceCache, path: Path, min_survival: Any, qmc_point: Any, transmitted_at: Any
-    ) -> tuple[Any, _Vertex]:
-        """Scatter off a specular lobe at the next surface, and intersect the one after."""
+        self,
+        branch: Branch,
+        cache: IrradianceCache,
+        path: Path,
+        min_survival: Any,
+        qmc_point: Any,
+        transmitted_at: Any,
+    ) -> tuple[Any, Any, _Vertex]:
+        """Scatter off a specular lobe at the next surface, and intersect the one after.
+
+        Returns the radiance of next-event estimates, and whether the path has another branch, too.
+        """
         rng = PCG32(path.rng)
+        rng.state ^= BRANCH_SALT * int(branch)
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         sample = self._renderer.sample_specular(
-            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng)
+            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=branch
         )
 
         # Play Russian roulette.
@@ -368,7 +386,9 @@ class Integrator:
 
         # Query the cache at the next vertex.
         emitted, vertex = self._intersect(cache, extended)
-        return Array3f(path.throughput * sample.direct), replace(vertex, radiance=emitted + vertex.radiance)
+        is_split = Bool(sample.is_split & path.is_active)
+        vertex = replace(vertex, radiance=emitted + vertex.radiance)
+        return Array3f(path.throughput * sample.direct), is_split, vertex
 
     def _gather_kernel(self, cache: IrradianceCache, path: Path, qmc_point: Any) -> tuple[Any, _Vertex]:
         """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""

@@ -18,11 +18,15 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Bool, UInt
+from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured"}  # not split by a context
 NOT_DIFFUSE = ("metallic", "spec_trans")  # attributes: shares of the base colour without a diffuse lobe
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
+
+CLEAR = {"SmoothDielectric", "ThinDielectric"}  # their sample chooses reflection first
+ALMOST_ONE = 1.0 - 2.0**-24
 
 
 class Lobes:
@@ -43,12 +47,13 @@ class Lobes:
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
         self._whole = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
+        self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._whole, self._lambertian
+        return self._whole, self._lambertian, self._clear
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -109,13 +114,20 @@ class Lobes:
         difference, mixture_pdf = self._difference(si, bsdf, wo, active & is_whole)
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
-    def sample_specular(self, si: Any, bsdf: Any, rng: Any, choice: Any = None) -> tuple[Any, Any, Any, Any]:
+    def is_clear(self, si: Any, bsdf: Any) -> Any:
+        """Whether a BSDF is a clear interface: it reflects or transmits, in one direction each."""
+        return _of(self._clear, si, bsdf)
+
+    def sample_specular(
+        self, si: Any, bsdf: Any, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+    ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight of a sample, and whether it is of a delta lobe.
 
         The difference between a whole BSDF and its Lambertian lobe is sampled by both with equal probability,
         so that the weight stays bounded where only one of them is large. A masked Lambertian BSDF is sampled
         by itself: only its null interaction counts. A given `choice` of the lobe, 0..1, yields a direction
-        of that lobe, and a weight without meaning.
+        of that lobe, and a weight without meaning. A branch of a clear interface has its own weight: what is
+        reflected, or transmitted.
         """
         is_whole = _of(self._whole, si, bsdf)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
@@ -123,6 +135,9 @@ class Lobes:
         by_bsdf = is_masked | (rng.next_float32() < 0.5)
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
+        if branch is not Branch.RANDOM:
+            is_clear = self.is_clear(si, bsdf)
+            first = dr.select(is_clear, 0.0 if branch is Branch.REFLECTED else ALMOST_ONE, first)
         sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
         whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
@@ -135,6 +150,8 @@ class Lobes:
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
         difference = dr.select(is_delta, dr.select(is_masked, 1.0, 2.0) * whole_weight, difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
+        if branch is not Branch.RANDOM:
+            weight = dr.select(is_clear, weight * sample.pdf, weight)
 
         wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
         return wo, pdf, dr.select(is_whole, difference, weight), is_delta

@@ -24,6 +24,7 @@ from enfilade.records import Shading
 from enfilade.renderer import (
     MAX_PATH_DEPTH,
     Bounce,
+    Branch,
     BsdfSample,
     Emitters,
     PixelFilter,
@@ -157,9 +158,11 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         return self._transport.sample_diffuse(point, rng)
 
-    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
+    def sample_specular(
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+    ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
-        return self._transport.sample_specular(point, rng, choice)
+        return self._transport.sample_specular(point, rng, choice, branch)
 
     def _intersect(
         self, rays: Rays, active: Any = True, null_transmittance: float | None = NULL_GBUFFER

@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool
 from enfilade.records import MIN_DIFFUSE_ALBEDO
-from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
+from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
@@ -72,13 +72,18 @@ class LightTransport:
             throughput=_divided(weight, albedo),
             direct=Array3f(direct),
             is_alive=Bool(active & (pdf > 0.0)),
+            is_split=Bool(False),
         )
 
-    def sample_specular(self, point: ShadingPoint, rng: Any, choice: Any = None) -> BsdfSample:
+    def sample_specular(
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+    ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         si = point.native
         bsdf = si.bsdf()
-        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, rng, choice)
+        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, rng, choice, branch)
+        # Total reflection has a density of one, and no other branch.
+        is_split = point.has_specular & self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
         has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
         direct = self._next_event(si, bsdf, self._lobes.eval_specular, rng, has_glossy)
@@ -89,6 +94,7 @@ class LightTransport:
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
+            is_split=Bool(is_split & (branch is not Branch.RANDOM)),
         )
 
     def _next_event(
