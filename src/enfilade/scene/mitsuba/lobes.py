@@ -180,7 +180,9 @@ def _classes(bsdf: Any) -> set[str]:
 
 
 def _opacity(si: Any, bsdf: Any, active: Any) -> Any:
-    return 1.0 - dr.mean(bsdf.eval_null_transmission(si, active))
+    # Not `dr.mean`: it compiles the number of lanes into the kernel.
+    transmitted = bsdf.eval_null_transmission(si, active)
+    return 1.0 - (transmitted.x + transmitted.y + transmitted.z) / 3.0
 
 
 def _cosine_direction(si: Any, sample_point: Any) -> Any:
