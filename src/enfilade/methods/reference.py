@@ -18,6 +18,7 @@ class Reference(Method):
     """Path tracing."""
 
     name = "reference"
+    revision = 2
     settings = (TraceSettings, SamplingSettings, ReferenceSettings)
     passes = (Pass(FRAMES, Frame),)
 

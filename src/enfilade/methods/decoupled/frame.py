@@ -17,7 +17,10 @@ from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
 from enfilade.methods.decoupled.sample_counts import (
     EDGE_CONTRAST,
+    UNCERTAIN_FACTORS,
+    displayed_deviation,
     edge_spp,
+    is_outline,
     small_emitter_pixels,
     specular_spp,
 )
@@ -25,7 +28,7 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import accumulate_temporally, filter_spatially, upload_aov
 from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings
+from enfilade.settings import LimitSettings, ViewingSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 
@@ -164,15 +167,22 @@ def _shade_diffuse(
     )
     estimate.add(settings.min_spp)
 
-    # Add camera rays where the first ones differ, and at small emitters, which they may have missed.
+    # Add camera rays where the first ones differ, and where they may have missed an outline or a small emitter.
     more = edge_spp(settings) - settings.min_spp
     if more > 0:
-        shading = estimate.shading
-        contrast = EDGE_CONTRAST * settings.quality * luminance(shading.color)
-        is_edge = np.sqrt(shading.variance) > contrast
-        is_edge = is_edge.reshape(camera.height, camera.width)
-        is_edge |= small_emitter_pixels(shot.renderer.emitters, walk.view(frame).geometry)
+        geometry, shading = walk.view(frame).geometry, estimate.shading
+        contrast = EDGE_CONTRAST * settings.quality
+        is_edge = np.sqrt(shading.variance) > contrast * luminance(shading.color)
+        is_edge = is_edge.reshape(camera.height, camera.width) | is_outline(geometry)
+        is_edge |= small_emitter_pixels(shot.renderer.emitters, geometry)
         estimate.add(more, _dilated(is_edge).ravel())
+
+        # Add more where the displayed value is uncertain still: a bar before a bright sky.
+        exposure_ev = walk.settings[ViewingSettings].exposure_ev
+        for factor in UNCERTAIN_FACTORS:
+            is_uncertain = displayed_deviation(estimate.shading, exposure_ev) > contrast
+            if is_uncertain.any():
+                estimate.add(factor * edge_spp(settings), is_uncertain)
     return estimate
 
 

@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from enfilade.kernels.tone import luminance, srgb_encode
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.irradiance import gather
 from enfilade.methods.decoupled.irradiance_cache import accumulate, total_irradiance, upload
 from enfilade.methods.decoupled.shot import ACCUMULATED, ShotContext
 from enfilade.metric import Aqm
-from enfilade.records import Geometry, Mask
+from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import Emitters, Purpose
 from enfilade.settings import DecoupledSettings
 
@@ -20,6 +21,10 @@ PILOT_SPP = 4  # of each of the two images that the pilot compares
 IRRADIANCE_SPP = 4, 256  # fewest and most
 MIN_DIFFUSE = 0.5  # of the largest number of diffuse pixels of a keyframe: the pilot uses none with fewer
 EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel has more camera rays
+UNCERTAIN_FACTORS = (
+    1,
+    2,
+)  # times the camera rays of an edge, added in turn while a displayed value is uncertain
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 FFT_THREADS = 2
 
@@ -89,6 +94,37 @@ def edge_spp(settings: DecoupledSettings) -> int:
 def specular_spp(settings: DecoupledSettings) -> int:
     """Rays of a pixel with specular lobes."""
     return settings.specular_spp or SPECULAR_SPP.at(math.sqrt(settings.quality))
+
+
+def is_outline(geometry: Geometry) -> Mask:
+    """Pixels beside which another shape is seen, (H, W)."""
+    index = geometry.shape_index
+    found = np.zeros(index.shape, np.bool_)
+    across, down = index[:, 1:] != index[:, :-1], index[1:] != index[:-1]
+    found[:, 1:] |= across
+    found[:, :-1] |= across
+    found[1:] |= down
+    found[:-1] |= down
+    return found
+
+
+def displayed_deviation(shading: Shading, exposure_ev: float) -> F32:
+    """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (N,).
+
+    What is clipped at white has none: a pixel that is half sky needs no more samples if a quarter is white.
+
+    Parameters
+    ----------
+    shading
+        Estimates of pixels.
+    exposure_ev
+        In stops.
+    """
+    scale = np.float32(2.0**exposure_ev)
+    mean, deviation = luminance(shading.color) * scale, np.sqrt(shading.variance) * scale
+    low, high = (np.clip(value, 0.0, 1.0) for value in (mean - deviation, mean + deviation))
+    found: F32 = np.float32(0.5) * (srgb_encode(high) - srgb_encode(low))
+    return found
 
 
 def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:

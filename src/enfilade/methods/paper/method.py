@@ -40,6 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
+    revision = 2
     settings = (
         TraceSettings,
         SamplingSettings,
