@@ -167,7 +167,7 @@ def _shade_diffuse(
     )
     estimate.add(settings.min_spp)
 
-    # Add camera rays where the first ones differ, and where they may have missed an outline or a small emitter.
+    # Add camera rays where the first ones differ, or may have missed an outline or a small emitter.
     more = edge_spp(settings) - settings.min_spp
     if more > 0:
         geometry, shading = walk.view(frame).geometry, estimate.shading
