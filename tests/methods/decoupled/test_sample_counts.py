@@ -6,12 +6,14 @@ import pytest
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.sample_counts import (
+    displayed_deviation,
     edge_spp,
     irradiance_spp,
+    is_outline,
     small_emitter_pixels,
     specular_spp,
 )
-from enfilade.records import Geometry
+from enfilade.records import Geometry, Shading
 from enfilade.renderer import Emitters
 from enfilade.settings import DecoupledSettings, Settings
 
@@ -86,3 +88,21 @@ def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
     assert ratios == pytest.approx({"irradiance": expected, "disocclusion": expected}, rel=0.05)
     fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)
     assert Decoupled().cost_ratios(fixed, excerpt, whole) == {}
+
+
+def test_outlines_are_pixels_beside_another_shape():
+    index = np.ones((H, W), np.uint32)
+    index[5, 7] = 2
+    rows, columns = np.nonzero(is_outline(geometry_of(index)))
+    assert set(zip(rows, columns, strict=True)) == {(5, 7), (4, 7), (6, 7), (5, 6), (5, 8)}
+
+
+def test_what_is_clipped_at_white_is_not_uncertain():
+    grey = np.repeat(np.array([[0.2], [0.2], [50.0], [1.1], [1.1]], np.float32), 3, axis=1)
+    deviation = np.array([0.0, 0.02, 5.0, 0.05, 0.5], np.float32)
+    found = displayed_deviation(Shading(grey, deviation**2), 0.0)
+    assert found[[0, 2, 3]].tolist() == [0.0, 0.0, 0.0]
+    # sRGB of 0.22 and of 0.18; of 0.6 and of white
+    np.testing.assert_allclose(found[[1, 4]], [(0.5064 - 0.4614) / 2.0, (1.0 - 0.7977) / 2.0], atol=1e-3)
+    darker = displayed_deviation(Shading(grey, deviation**2), -1.0)
+    assert darker[3] > 0.01
