@@ -57,8 +57,8 @@ def main() -> None:
     """Measure the injected errors and print their scores."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--references", type=Path, deerror=Path("runs/references"))
-    parser.add_argument("--spp", type=int, deerror=1024)
+    parser.add_argument("--references", type=Path, default=Path("runs/references"))
+    parser.add_argument("--spp", type=int, default=1024)
     arguments = parser.parse_args()
     activate("cpu")
     from enfilade.methods.walkthrough import Walkthrough

@@ -19,7 +19,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 for file in torch_cuda torch_python torch_nvshmem torch_cuda_linalg c10_cuda torch_cpu; do
     nm -D --undefined-only "$libraries/lib$file.so"
-done | awk '{ print $2 }' |
+done | awk '{ sub(/@.*/, "", $2); print $2 }' |
     grep -E '^(cublas|cudnn|cusparse|nccl|nvrtc|nvshmem|cuFile|cusolver|cufft|nvJitLink|pnccl)' | sort -u >"$work/symbols"
 {
     echo '#include <stdlib.h>'
