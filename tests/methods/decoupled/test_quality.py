@@ -19,7 +19,7 @@ SEEDS = range(1, 7)
 COMPARED = (0, 3, 6)  # frames: a keyframe, and frames that are nearer to one or the other
 PARTS, PART_SPP = 8, 24  # of the reference: independent images
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-PATHS = 19  # rays a pixel of the method, and paths a pixel of path tracing at equal cost
+PATHS = 18  # rays a pixel of the method, and paths a pixel of path tracing at equal cost
 PATH = room_path(9, (144, 96))
 
 pytestmark = pytest.mark.slow

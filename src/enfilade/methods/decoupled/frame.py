@@ -173,9 +173,9 @@ def _shade_diffuse(
         geometry, shading = walk.view(frame).geometry, estimate.shading
         contrast = EDGE_CONTRAST * settings.quality
         is_edge = np.sqrt(shading.variance) > contrast * luminance(shading.color)
-        is_edge = is_edge.reshape(camera.height, camera.width) | is_outline(geometry)
+        is_edge = is_edge.reshape(camera.height, camera.width)
         is_edge |= small_emitter_pixels(shot.renderer.emitters, geometry)
-        estimate.add(more, _dilated(is_edge).ravel())
+        estimate.add(more, (_dilated(is_edge) | is_outline(geometry)).ravel())
 
         # Add more where the displayed value is uncertain still: a bar before a bright sky.
         exposure_ev = walk.settings[ViewingSettings].exposure_ev
