@@ -286,8 +286,19 @@ class LobeRenderer(Renderer, Protocol):
         """Points on all emitters: few camera rays hit an emitter that is small in the image."""
         ...
 
+    @property
+    def has_sharp_light(self) -> bool:
+        """Whether any emitter casts sharp shadows: a point, spot or directional one, or the sun."""
+        ...
+
     def intersect(
-        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False
+        self,
+        rays: Rays,
+        bounce: Bounce | None = None,
+        active: Any = True,
+        *,
+        opaque_only: bool = False,
+        soft_only: bool = False,
     ) -> ShadingPoint:
         """Find the first surface along each ray, and its emission.
 
@@ -301,6 +312,8 @@ class LobeRenderer(Renderer, Protocol):
         opaque_only
             Take surfaces as either opaque or absent, as :meth:`surfaces` does, so that the point matches the
             G-buffer. Otherwise the transparency of a surface is one of its specular lobes.
+        soft_only
+            Leave out the emission of emitters that cast sharp shadows.
         """
         ...
 
@@ -328,8 +341,31 @@ class LobeRenderer(Renderer, Protocol):
         """Estimate the radiance scattered by the specular lobes; see :meth:`estimate_diffuse`."""
         ...
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
-        """Sample a direction of the diffuse lobe, divided by the albedo."""
+    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+        """Estimate the light of emitters with sharp shadows that the diffuse lobe reflects.
+
+        Parameters
+        ----------
+        point
+        rng : PCG32
+
+        Returns
+        -------
+        Array3f
+            Reflected radiance divided by the albedo, with one shadow ray.
+        """
+        ...
+
+    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
+        """Sample a direction of the diffuse lobe, divided by the albedo.
+
+        Parameters
+        ----------
+        point
+        rng : PCG32
+        soft_only
+            Leave out emitters that cast sharp shadows: :meth:`sharp_light`.
+        """
         ...
 
     def sample_specular(

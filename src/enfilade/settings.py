@@ -287,8 +287,8 @@ class DecoupledSettings(Section):
         0, "Rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.", least=0, most=4096
     )
     denoiser: str = option(
-        "none",
-        "Quality of Open Image Denoise on irradiance images, instead of the wavelet filter.",
+        "balanced",
+        "Quality of Open Image Denoise on irradiance images and specular AOVs; none: a wavelet filter.",
         choices=("none", "fast", "balanced", "high"),
     )
 

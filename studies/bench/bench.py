@@ -231,7 +231,7 @@ class _Bench:
         identity = {
             "run": run and RunFolder.read(run).digest(),
             "windows": [asdict(window) for window in self._windows],
-            "references": [self._references.spp(frame) for frame in frames],
+            "references": [self._references.folder.name, *map(self._references.spp, frames)],
             **self._job.settings.to_tables([ViewingSettings]),
             "metering": self._job.settings[MetricSettings].metering.value,
             "versions": [package_versions(), colorvideovdp.version()],

@@ -7,15 +7,20 @@ sequential one (PCG32, O'Neill 2014) for each path.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
 from drjit.auto.ad import Philox4x32
 
-from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, opaque
+from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, lanes, opaque
 from enfilade.renderer import RandomKey
 
 WHOLE_PIXEL = 0xFFFFFFFF  # in place of the path: the offset that all paths of a pixel share in two dimensions
 WHOLE_PIXEL_4 = 0xFFFFFFFE  # the same in four dimensions
+BELOW_ONE = 1.0 - 2.0**-24  # the largest float32 below one
 R2 = (3242174889, 2447445414)  # 2**32 over powers of the plastic number, the root of x^3 = x + 1
 R4 = (3679390609, 3152041523, 2700274806, 2313257605)  # 2**32 over powers of the root of x^5 = x + 1
 
@@ -89,3 +94,37 @@ def _philox(pixel: Any, path: Any, random: RandomKey) -> Any:
         counter_1=path,
         counter_2=opaque(((random.frame & 0xFFFFFF) << 8) | int(random.purpose)),
     ).next_uint32x4()
+
+
+@dataclass(frozen=True)
+class Discrete:
+    """A discrete distribution. Unlike Mitsuba's, a recorded kernel finds its arrays.
+
+    Attributes
+    ----------
+    before, pmf : Float
+        By index: probability of all earlier ones, and its own.
+    """
+
+    before: Any
+    pmf: Any
+
+    @staticmethod
+    def of(weights: npt.NDArray[np.float64]) -> Discrete:
+        """The distribution with probabilities in proportion to weights, (N,), not all of them 0."""
+        pmf = weights / weights.sum()
+        before = np.cumsum(pmf) - pmf
+        before[np.flatnonzero(pmf)[-1] + 1 :] = 2.0  # rounding must not reach the impossible ones at the end
+        return Discrete(lanes(before.astype(np.float32)), lanes(pmf.astype(np.float32)))
+
+    def sample(self, sample: Any) -> tuple[Any, Any, Any]:
+        """An index (UInt), the sample (Float in [0, 1)) within it, to be used again, and its probability."""
+        last = dr.width(self.pmf) - 1
+
+        def is_later(index: Any) -> Any:
+            return dr.gather(Float, self.before, dr.minimum(index + 1, last)) <= sample
+
+        index = UInt(dr.binary_search(0, last, is_later))  # type: ignore[no-untyped-call]
+        pmf = dr.gather(Float, self.pmf, index)
+        within = (sample - dr.gather(Float, self.before, index)) / pmf
+        return index, dr.clip(within, 0.0, BELOW_ONE), pmf

@@ -53,7 +53,7 @@ def test_camera_and_specular_rays_follow_the_quality_or_the_settings():
     counts = [
         (edge_spp(s), specular_spp(s)) for s in (DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64))
     ]
-    assert counts == [(64, 34), (64, 17), (16, 8), (8, 4)]
+    assert counts == [(64, 17), (64, 8), (16, 4), (8, 2)]
     given = DecoupledSettings(edge_spp=5, specular_spp=3)
     assert (edge_spp(given), specular_spp(given)) == (5, 3)
 

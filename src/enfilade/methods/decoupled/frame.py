@@ -135,7 +135,7 @@ class Frames:
         reflection, *more = (shading.to_image(where) for shading in estimate.shadings)
         aovs = [reflection, *(aov for aov in more if aov.color.any())]
         virtual = self._virtual_geometry(shot, frame, len(aovs))
-        return filter_spatially(virtual, aovs, where), estimate
+        return filter_spatially(virtual, aovs, where, shot.settings.denoiser), estimate
 
     def _virtual_geometry(self, shot: ShotContext, frame: int, count: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its first AOVs."""

@@ -34,6 +34,7 @@ ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
+SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
 STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
 
 OnMiss = Callable[[Entries], None]
@@ -51,6 +52,8 @@ class CacheQuery:
         Of the path there, scene units.
     weight : Array3f
         Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
+    sharp : tuple of Array3f
+        Irradiance over pi by emitters with sharp shadows, where the images of the cache are without it.
     """
 
     position: Any
@@ -58,6 +61,7 @@ class CacheQuery:
     shape_index: Any
     width: Any
     weight: Any
+    sharp: Any
 
     @property
     def is_needed(self) -> Any:
@@ -210,7 +214,8 @@ class Integrator:
         Returns
         -------
         Samples
-            Two layers: by light straight from emitters, and by all other.
+            Two layers: by light straight from emitters, without those that cast sharp shadows; and by all
+            other.
         """
         dr.eval(qmc_point)  # see `spawn`
         direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), qmc_point)
@@ -327,17 +332,25 @@ class Integrator:
         emitted, vertex = self._intersect(cache, path)
         return replace(vertex, radiance=emitted + vertex.radiance)
 
-    def _intersect(self, cache: IrradianceCache, path: Path) -> tuple[Any, _Vertex]:
+    def _intersect(
+        self, cache: IrradianceCache, path: Path, *, soft_only: bool = False
+    ) -> tuple[Any, _Vertex]:
         """Emission at the next surface, and the vertex there, with its cached diffuse reflection."""
-        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, soft_only=soft_only)
         albedo = point.surfaces.albedo
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        sharp: tuple[Any, ...] = ()
+        if cache.is_soft:
+            rng = PCG32(path.rng)
+            rng.state ^= SHARP_SALT
+            sharp = (self._renderer.sharp_light(point, rng),)
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
             shape_index=point.surfaces.shape_index,
             width=path.width_at(point),
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
+            sharp=sharp,
         )
         reflected, is_miss = _query(cache, query)
         vertex = _Vertex(reflected, is_miss, Bool(point.has_specular), path, query)
@@ -396,7 +409,7 @@ class Integrator:
 
         # Intersect, and sample the diffuse lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
-        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng))
+        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng), soft_only=True)
 
         # Extend the path.
         extended = Path(
@@ -410,7 +423,7 @@ class Integrator:
         )
 
         # Query the cache at the next vertex.
-        emitted, vertex = self._intersect(cache, extended)
+        emitted, vertex = self._intersect(cache, extended, soft_only=True)
         return Array3f(sample.direct + emitted), vertex
 
     def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
@@ -460,7 +473,8 @@ def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_a
 def _query(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
     """Diffuse reflection of cached irradiance, and where the images of the cache miss."""
     found, is_known = cache.lookup(query.position, query.normal, query.shape_index)
-    return Array3f(dr.select(is_known, query.weight * found, 0.0)), Bool(~is_known & query.is_needed)
+    reflected = dr.select(is_known, query.weight * sum(query.sharp, found), 0.0)
+    return Array3f(reflected), Bool(~is_known & query.is_needed)
 
 
 def _query_kernel(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:

@@ -13,7 +13,8 @@ from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext, either_side
-from enfilade.records import Mask
+from enfilade.methods.denoise import denoise
+from enfilade.records import Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
@@ -63,15 +64,32 @@ def gather(
 
 
 def gather_keyframe(shot: ShotContext, frame: int, spp: int) -> Output:
-    """The irradiance image of a keyframe."""
-    where = shot.walk.view(frame).geometry.has_diffuse
-    image, paths = gather(shot, frame, where, spp, Purpose.IRRADIANCE)
+    """The irradiance image of a keyframe, denoised."""
+    geometry = shot.walk.view(frame).geometry
+    image, paths = gather(shot, frame, geometry.has_diffuse, spp, Purpose.IRRADIANCE)
+    if shot.settings.denoiser != "none":
+        image = _denoised(geometry, image, shot.settings.denoiser)
     return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
+
+
+def _denoised(geometry: Geometry, image: IrradianceImage, quality: str) -> IrradianceImage:
+    """A denoised image, whose variance is 0."""
+    albedo = np.repeat(image.is_known[..., None], 3, axis=2).astype(np.float32)  # irradiance has none
+    direct, indirect = (
+        replace(
+            layer,
+            color=denoise(layer.color, albedo, geometry.normal, quality=quality),
+            variance=np.zeros_like(layer.variance),
+        )
+        for layer in (image.direct, image.indirect)
+    )
+    return IrradianceImage(direct, indirect, image.is_known)
 
 
 def fill_disocclusions(shot: ShotContext, segment: Segment, spp: int) -> Output:
     """Disocclusion images: irradiance of surfaces between two keyframes that no keyframe shows.
 
+    These images are too sparse for a denoiser: the wavelet filter smooths them.
     The segment is halved until no further surface comes into view. An image contains all surfaces of its
     frame that the keyframes do not show, so that other frames find them in the images before and after.
     """

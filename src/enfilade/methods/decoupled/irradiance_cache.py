@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,18 +38,26 @@ class IrradianceCache:
     weights : tuple of Float
         One an image, for surfaces that several of them show.
     hash_grid : HashGrid or None
+    is_soft : bool
+        Whether the images are without direct light of emitters that cast sharp shadows.
     """
 
     images: tuple[UploadedImage, ...] = ()
     weights: tuple[Any, ...] = ()
     hash_grid: HashGrid | None = None
+    is_soft: bool = False
 
     @staticmethod
     def of(
-        images: Sequence[UploadedImage], weights: Sequence[float], hash_grid: HashGrid | None = None
+        images: Sequence[UploadedImage],
+        weights: Sequence[float],
+        hash_grid: HashGrid | None = None,
+        *,
+        is_soft: bool = False,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
-        return IrradianceCache(tuple(images), tuple(opaque(float(weight)) for weight in weights), hash_grid)
+        own = tuple(opaque(float(weight)) for weight in weights)
+        return IrradianceCache(tuple(images), own, hash_grid, is_soft)
 
     def lookup(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the images.
@@ -157,12 +165,7 @@ def blank_image(layers: int) -> UploadedImage:
     )
 
 
-def accumulate(
-    geometry: Geometry,
-    is_known: Mask,
-    images: Sequence[UploadedImage],
-    denoise: Callable[[F32], F32] | None = None,
-) -> UploadedImage:
+def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImage]) -> UploadedImage:
     """Average an irradiance image with others, and smooth it along its surfaces.
 
     Irradiance does not depend on the view, so that all images that show a point have independent estimates
@@ -176,9 +179,7 @@ def accumulate(
     is_known : (H, W) bool
         Its pixels with irradiance.
     images
-        Irradiance images, itself among them.
-    denoise
-        Denoiser of images (H, W, 3); None: the wavelet filter.
+        Irradiance images, itself among them. Denoised ones are not smoothed again: their variance is 0.
 
     Returns
     -------
@@ -186,11 +187,8 @@ def accumulate(
         One layer, direct plus indirect.
     """
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
-    if denoise is None:
-        groups = np.where(is_known, geometry.shape_index, np.uint32(0))
-        smoothed = [smooth_along(geometry, groups, value, variance) for value, variance in layers]
-    else:
-        smoothed = [(lanes(denoise(image(value, *is_known.shape))), variance) for value, variance in layers]
+    groups = np.where(is_known, geometry.shape_index, np.uint32(0))
+    smoothed = [smooth_along(geometry, groups, value, variance) for value, variance in layers]
     irradiance = sum((value for value, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
     return upload_layers(geometry, lanes(is_known), [(irradiance, variance)])

@@ -42,7 +42,7 @@ class SppRange(NamedTuple):
 
 
 EDGE_SPP = SppRange(256.0, least=8, most=64)  # of a pixel at an edge
-SPECULAR_SPP = SppRange(34.0, least=2, most=34)  # of a pixel with specular lobes, by the root of the quality
+SPECULAR_SPP = SppRange(17.0, least=2, most=34)  # of a pixel with specular lobes, by the root of the quality
 
 
 def run_pilot(shot: ShotContext) -> Output:

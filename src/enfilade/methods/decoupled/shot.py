@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-
-import numpy as np
 
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
@@ -24,9 +21,8 @@ from enfilade.methods.decoupled.irradiance_cache import (
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.prepass import prepass_geometry
 from enfilade.methods.decoupled.virtual_images import VirtualImages
-from enfilade.methods.denoise import denoise
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, Geometry, Mask
+from enfilade.records import Geometry, Mask
 from enfilade.renderer import LobeRenderer
 from enfilade.settings import DecoupledSettings
 
@@ -119,7 +115,9 @@ class ShotContext:
         images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
         filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
-        return IrradianceCache.of([reprojected], [1.0]), IrradianceCache.of(*filled_up, self.hash_grid(frame))
+        is_soft = self.renderer.has_sharp_light
+        images_near = IrradianceCache.of(*filled_up, self.hash_grid(frame), is_soft=is_soft)
+        return IrradianceCache.of([reprojected], [1.0], is_soft=is_soft), images_near
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int
@@ -169,20 +167,11 @@ class ShotContext:
             disocclusions = sorted({f for frames in self.disocclusions().values() for f in frames})
             around += nearest(self.walk.path, disocclusions, frame, 2 * ACCUMULATED + 1)
             images = [self.image(f) for f in sorted({*around, frame})]
-            is_keyframe = frame in self.keyframes
-            own = self.inputs.record("irradiance" if is_keyframe else "disocclusion", frame)
-            geometry = self.walk.view(frame).geometry
-            # Disocclusion images are too sparse for a denoiser.
-            has_denoiser = self.settings.denoiser != "none" and is_keyframe
-            denoiser = partial(self._denoised, geometry) if has_denoiser else None
-            return accumulate(geometry, own.is_known, images, denoiser)
+            pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
+            is_known = self.inputs.record(pass_name, frame).is_known
+            return accumulate(self.walk.view(frame).geometry, is_known, images)
 
         return self._accumulated.get(frame, make)
-
-    def _denoised(self, geometry: Geometry, irradiance: F32) -> F32:
-        has_diffuse = geometry.has_diffuse[..., None].astype(np.float32)
-        white = np.broadcast_to(has_diffuse, irradiance.shape)  # irradiance is without albedo
-        return denoise(irradiance, white, geometry.normal, quality=self.settings.denoiser)
 
     def _keyframe_weights(self, frame: int) -> dict[int, float]:
         """Weights of the nearest keyframes, which fall to zero where the next one replaces them."""

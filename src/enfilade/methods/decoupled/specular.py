@@ -8,6 +8,7 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+import scipy.ndimage
 
 from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX
@@ -23,15 +24,20 @@ from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
+from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
+DENOISED_SHARE = 0.25  # of the samples' deviation that the denoiser leaves
+DENOISED_SUPPORT = 5  # pixels, over which that deviation is averaged
 FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 
 
-def filter_spatially(virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask) -> list[SpecularAov]:
-    """Smooth specular AOVs along the surfaces that are seen in them by the wavelet filter.
+def filter_spatially(
+    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, denoiser: str
+) -> list[SpecularAov]:
+    """Denoise specular AOVs, or smooth them along the surfaces that are seen in them by the wavelet filter.
 
     Parameters
     ----------
@@ -41,16 +47,34 @@ def filter_spatially(virtual: Sequence[Geometry], aovs: Sequence[Shading], where
         Of shape (H, W).
     where : (H, W) bool
         Pixels that were sampled; others do not contribute.
+    denoiser
+        Quality of the denoiser, or ``none``.
 
     Returns
     -------
     list of SpecularAov
     """
+    if denoiser != "none":
+        return [_denoised(g, aov, where, denoiser) for g, aov in zip(virtual, aovs, strict=True)]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
     weights = firefly_weights(total, width=width, height=height, times=FIREFLY)
     return [_filtered(g, aov, where, weights) for g, aov in zip(virtual, aovs, strict=True)]
+
+
+def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
+    """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
+    own = (where & geometry.is_hit)[..., None]
+    normal = np.where(own, geometry.normal, np.float32(0))
+    white = np.repeat(own, 3, axis=2).astype(np.float32)
+    color = denoise(aov.color, white, normal, quality=quality)
+    height, width = where.shape
+    softened = soften_edges(
+        lanes(color), lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
+    )
+    deviation = DENOISED_SHARE * scipy.ndimage.uniform_filter(np.sqrt(aov.variance), DENOISED_SUPPORT)
+    return SpecularAov(to_half(image(softened, height, width)), to_half(deviation.astype(np.float32)))
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:

@@ -122,15 +122,27 @@ class MitsubaRenderer:
     def state(self) -> Any:
         """See :attr:`enfilade.renderer.LobeRenderer.state`."""
         integrators = self._integrator, self._continued
-        return self._scene, integrators, self._shapes.state, self._lobes.state
+        lights = self._transport.sharp_emitters.state
+        return self._scene, integrators, self._shapes.state, self._lobes.state, lights
 
     @cached_property
     def emitters(self) -> Emitters:
         """See :attr:`enfilade.renderer.LobeRenderer.emitters`."""
         return find_emitters(self._merged)
 
+    @property
+    def has_sharp_light(self) -> bool:
+        """See :attr:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
+        return not self._transport.sharp_emitters.is_empty
+
     def intersect(
-        self, rays: Rays, bounce: Bounce | None = None, active: Any = True, *, opaque_only: bool = False
+        self,
+        rays: Rays,
+        bounce: Bounce | None = None,
+        active: Any = True,
+        *,
+        opaque_only: bool = False,
+        soft_only: bool = False,
     ) -> ShadingPoint:
         """Find the first surface along each ray, and its emission.
 
@@ -141,7 +153,7 @@ class MitsubaRenderer:
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
-            emission=self._transport.emission(si, bounce),
+            emission=self._transport.emission(si, bounce, soft_only=soft_only),
             has_specular=self._lobes.has_specular(si, si.bsdf()),
             native=si,
         )
@@ -154,9 +166,13 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
         return self._transport.estimate(self._transport.sample_specular(point, rng), rng, path_depth)
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
+    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+        """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
+        return self._transport.sharp_light(point, rng)
+
+    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
-        return self._transport.sample_diffuse(point, rng)
+        return self._transport.sample_diffuse(point, rng, soft_only=soft_only)
 
     def sample_specular(
         self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM

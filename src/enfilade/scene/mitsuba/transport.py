@@ -12,6 +12,7 @@ from enfilade.arrays import Array3f, Bool
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
+from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
 
@@ -33,8 +34,9 @@ class LightTransport:
         self._scene = scene
         self._lobes = lobes
         self._radiance = radiance
+        self.sharp_emitters = SharpEmitters(scene)
 
-    def emission(self, si: Any, bounce: Bounce | None) -> Any:
+    def emission(self, si: Any, bounce: Bounce | None, *, soft_only: bool = False) -> Any:
         """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
         emitted = si.emitter(self._scene).eval(si)
         if bounce is None:
@@ -43,6 +45,9 @@ class LightTransport:
         origin.p = mi.Point3f(bounce.position)
         direction = mi.DirectionSample3f(self._scene, si, origin)
         emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
+        if soft_only:
+            emitter_pdf = self.sharp_emitters.soft_pdf(emitter_pdf)
+            emitted = dr.select(~si.is_valid() & self.sharp_emitters.is_sun(-si.wi), 0.0, emitted)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
 
     def estimate(self, sample: BsdfSample, rng: Any, path_depth: int) -> tuple[Any, Any]:
@@ -58,12 +63,24 @@ class LightTransport:
         indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any) -> BsdfSample:
+    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+        """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
+        si, albedo = point.native, point.surfaces.albedo
+        active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        bsdf = si.bsdf()
+
+        def evaluate(direction: Any) -> Any:
+            value, _ = self._lobes.eval_diffuse(si, bsdf, si.to_local(direction), active)
+            return _divided(value, albedo)
+
+        return self.sharp_emitters.estimate(si, rng, evaluate, active)
+
+    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         si, albedo = point.native, point.surfaces.albedo
         active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         bsdf = si.bsdf()
-        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, rng, active, albedo)
+        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, rng, active, albedo, soft_only)
         wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, rng, active)
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
@@ -98,11 +115,21 @@ class LightTransport:
         )
 
     def _next_event(
-        self, si: Any, bsdf: Any, evaluate: Any, rng: Any, active: Any, albedo: Any = None
+        self,
+        si: Any,
+        bsdf: Any,
+        evaluate: Any,
+        rng: Any,
+        active: Any,
+        albedo: Any = None,
+        soft_only: bool = False,
     ) -> Any:
         """Radiance of a lobe from one sampled point on the emitters, MIS-weighted, divided by the albedo."""
         sample_point = mi.Point2f(rng.next_float32(), rng.next_float32())
-        emitter, radiance = self._scene.sample_emitter_direction(si, sample_point, True, active)
+        if soft_only:
+            emitter, radiance = self.sharp_emitters.sample_soft(si, sample_point, active)
+        else:
+            emitter, radiance = self._scene.sample_emitter_direction(si, sample_point, True, active)
         active = active & (emitter.pdf != 0.0)
         value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), active)
         if albedo is not None:

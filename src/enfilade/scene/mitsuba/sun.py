@@ -1,0 +1,139 @@
+"""The sun of an environment: a small area of the sky with a considerable part of its flux."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import scipy.ndimage
+
+from enfilade.arrays import Array3f, Float, lanes, opaque
+from enfilade.kernels.random import Discrete
+from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.records import F32
+
+__all__ = ["Sun", "find_sun"]
+
+SEARCH_WIDTH = 1024  # of the latitude-longitude map in which the sun is searched: cells of 0.35 degrees
+MAX_RADIUS = math.radians(2.5)  # the disc seen from the Earth has 0.27 degrees; many photographs blur it
+MIN_SHARE = 0.05  # of the sky's flux
+CONTAINED = 0.99  # of the flux within that radius, to be on the map
+CELLS = 64  # of the map along each axis
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A map of the sun in square cells, on the plane that touches the sphere of directions at its centre.
+
+    Attributes
+    ----------
+    environment : mitsuba.Emitter
+    frame : mitsuba.Frame3f
+        Its normal points to the centre.
+    extent : Float
+        Of the map from the centre to each side: a tangent.
+    cells : Discrete
+        Flux of each cell, row by row.
+    """
+
+    environment: Any
+    frame: Any
+    extent: Any
+    cells: Any
+
+    @property
+    def state(self) -> Any:
+        """Arrays that the methods read."""
+        return self.frame, self.extent, self.cells
+
+    def contains(self, direction: Any) -> Any:
+        """Whether directions (Vector3f, unit length) are on the map; Bool."""
+        local = self.frame.to_local(direction)
+        limit = self.extent * local.z
+        return (local.z > 0.0) & (dr.abs(local.x) < limit) & (dr.abs(local.y) < limit)
+
+    def sample(self, rng: Any) -> tuple[Any, Any]:
+        """A direction on the map (Vector3f), and its radiance over its density (Color3f)."""
+        cell, across, pmf = self.cells.sample(rng.next_float32())
+        row = cell // CELLS
+        x = (Float(cell - row * CELLS) + across) * (2.0 / CELLS) - 1.0
+        y = (Float(row) + rng.next_float32()) * (2.0 / CELLS) - 1.0
+        direction = mi.Vector3f(x * self.extent, y * self.extent, 1.0)
+        cosine = dr.rsqrt(dr.squared_norm(direction))
+        direction = self.frame.to_world(direction * cosine)
+        solid_angle = dr.square(self.extent * (2.0 / CELLS)) * cosine**3  # of a cell
+        return direction, _radiance(self.environment, direction) * (solid_angle / pmf)
+
+
+def find_sun(environment: Any) -> Sun | None:
+    """Find the sun of an environment.
+
+    Parameters
+    ----------
+    environment : mitsuba.Emitter or None
+
+    Returns
+    -------
+    Sun or None
+        None where no direction within 2.5 degrees of the brightest one stands out.
+    """
+    if environment is None:
+        return None
+    # Find the brightest direction of the sphere.
+    step = 2.0 * math.pi / SEARCH_WIDTH
+    polar, azimuth = (np.mgrid[0 : SEARCH_WIDTH // 2, 0:SEARCH_WIDTH] + 0.5).reshape(2, -1) * step
+    sine = np.sin(polar)
+    directions = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], axis=1)
+    sky = _luminance(environment, mi.Vector3f(lanes(directions.astype(np.float32)[None])))
+    frame = _facing(directions[np.argmax(sky)])
+
+    # Compare the flux around it, beyond that of its surroundings, with that of the sphere.
+    limit = math.tan(MAX_RADIUS)
+    x, y, luminance = _map(environment, frame, limit)
+    excess = np.where(np.hypot(x, y) < limit, luminance - luminance.min(), 0.0)
+    flux = float(excess.sum()) * (2.0 * limit / CELLS) ** 2
+    if flux <= MIN_SHARE * float(np.dot(sky, sine)) * step**2:
+        return None
+
+    # Map the disc alone.
+    x_centre, y_centre = (float(np.average(axis, weights=excess)) for axis in (x, y))
+    distance = np.hypot(x - x_centre, y - y_centre)
+    order = np.argsort(distance)
+    contained = np.cumsum(excess[order]) / excess.sum()
+    radius = distance[order][np.searchsorted(contained, CONTAINED)] + 2.0 * limit / CELLS
+    frame = _facing(np.array(frame.to_world(mi.Vector3f(x_centre, y_centre, 1.0))).ravel())
+    _, _, luminance = _map(environment, frame, float(radius))
+    # Cells at the outline may be brighter elsewhere than at their centres.
+    weights = scipy.ndimage.maximum_filter(luminance.reshape(CELLS, CELLS), 3)
+    cells = Discrete.of(np.maximum(weights, 1e-6 * weights.max()).ravel().astype(np.float64))
+    return Sun(environment, frame, opaque(float(radius)), cells)
+
+
+def _map(environment: Any, frame: Any, extent: float) -> tuple[F32, F32, F32]:
+    """Coordinates of the cells of a map, and the luminance at their centres, (N,) each."""
+    along = (((np.arange(CELLS) + 0.5) * (2.0 / CELLS) - 1.0) * extent).astype(np.float32)
+    x, y = np.tile(along, CELLS), np.repeat(along, CELLS)
+    directions = mi.Vector3f(lanes(x), lanes(y), 1.0)
+    return x, y, _luminance(environment, frame.to_world(dr.normalize(directions)))
+
+
+def _facing(direction: Any) -> Any:
+    found = mi.Frame3f(dr.normalize(mi.Vector3f(*(float(axis) for axis in direction))))
+    dr.make_opaque(found)
+    return found
+
+
+def _luminance(environment: Any, directions: Any) -> F32:
+    radiance = Array3f(_radiance(environment, directions)) + dr.zeros(Array3f, dr.width(directions))
+    found: F32 = np.array(dr.dot(radiance, Array3f(*REC709_LUMINANCE)))
+    return found
+
+
+def _radiance(environment: Any, direction: Any) -> Any:
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
+    si.wi = -direction
+    return environment.eval(si)

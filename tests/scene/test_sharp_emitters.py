@@ -1,0 +1,116 @@
+"""Emitters that cast sharp shadows: the sun is found, and their light and all other add up to the whole."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from enfilade.arrays import PCG32, Array3f, Float, UInt, rows
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.images import write_exr
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.random import Discrete
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+from enfilade.scene.mitsuba.sun import find_sun
+
+SUN = np.array([0.6, 0.64, 0.48])
+LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
+<point name="position" value="{1}, 0.7, {2}"/></emitter>"""
+AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/><rotate x="1" angle="90"/>
+<translate y="1.5"/></transform><emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>"""
+SKIES = {
+    "sun and sky": '<emitter type="sunsky"><vector name="sun_direction" x="0.6" y="0.64" z="0.48"/>'
+    '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>',
+    "photographed": '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>',
+    "lamps": '<emitter type="directional"><vector name="direction" x="-1" y="-2" z="0.3"/>'
+    '<rgb name="irradiance" value="2, 1, 1"/></emitter><emitter type="spot"><transform name="to_world">'
+    '<lookat origin="1, 2, 0" target="0, 0, 0" up="0, 0, 1"/></transform>'
+    f'<rgb name="intensity" value="3"/></emitter>{LAMP.format(0.4, -0.8, 0.5)}{AREA}',
+    "many lamps": "".join(LAMP.format(0.1 + 0.01 * i, i / 10 - 1, i % 3 - 1) for i in range(20)) + AREA,
+    "soft": '<emitter type="constant"/>' + AREA,
+}
+SHARP = {"sun and sky", "photographed", "lamps", "many lamps"}
+
+
+def photographed_sky():
+    """A sky whose sun has a radius of one degree, about half of its flux."""
+    rows_, columns = np.mgrid[0:256, 0:512] + 0.5
+    polar, azimuth = rows_ * np.pi / 256, columns * 2 * np.pi / 512
+    sine = np.sin(polar)
+    directions = np.stack([sine * np.sin(azimuth), np.cos(polar), -sine * np.cos(azimuth)], axis=-1)
+    is_sun = directions @ SUN > np.cos(np.radians(1.0))
+    return np.where(is_sun[..., None], [9000.0, 8000.0, 7000.0], [0.5, 0.6, 0.9]).astype(np.float32)
+
+
+def opened(folder, sky):
+    write_exr(folder / "sky.exr", {"RGB": photographed_sky()}, is_portable=True)
+    (folder / "scene.xml").write_text(
+        f"""<scene version="3.0.0"><integrator type="path"/>{sky}
+<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf></shape>
+<shape type="cube"><transform name="to_world"><scale value="0.3"/><translate y="0.3"/></transform></shape>
+</scene>"""
+    )
+    return MitsubaRenderer(folder / "scene.xml")
+
+
+@pytest.mark.parametrize("name", SKIES)
+def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name):
+    renderer = opened(tmp_path, SKIES[name])
+    assert renderer.has_sharp_light == (name in SHARP)
+
+    def both(rays, rng):
+        point = renderer.intersect(rays)
+        sample = renderer.sample_diffuse(point, rng, soft_only=True)
+        ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive, soft_only=True)
+        soft = sample.direct + dr.select(sample.is_alive, sample.throughput * ahead.emission, 0.0)
+        sharp = renderer.sharp_light(point, rng) if renderer.has_sharp_light else Array3f(0)
+        whole, _ = renderer.estimate_diffuse(point, rng)
+        return Samples((soft + sharp, whole))
+
+    camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 24, 16)
+    estimate = Estimate(
+        camera, np.arange(camera.width * camera.height, dtype=np.uint32), both, chunk=1 << 18,
+        pixel_filter=PixelFilter.BOX, random=RandomKey(3, 1, Purpose.DIFFUSE), layers=2,
+    )  # fmt: skip
+    estimate.add(256)
+    ours, whole = estimate.shadings
+    error = (ours.color - whole.color) @ [0.2126, 0.7152, 0.0722]
+    deviation = np.sqrt(ours.variance + whole.variance) + 1e-4 * whole.color.max()
+    assert np.mean(np.abs(error) > 4.0 * deviation) < 0.02
+    assert ours.color.mean() == pytest.approx(whole.color.mean(), rel=0.02)
+
+
+def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):
+    renderer = opened(
+        tmp_path,
+        '<emitter type="directional"><vector name="direction" x="0" y="-1" z="0"/>'
+        '<rgb name="irradiance" value="2, 1, 1"/></emitter>',
+    )
+    rays = Rays(Array3f([0.0, 1.0, 1.5], 0.1, 0.0), Array3f(0.0, -1.0, 0.0) + dr.zeros(Array3f, 3))
+    found = rows(renderer.sharp_light(renderer.intersect(rays), PCG32(3)))
+    assert np.allclose(found[1:], np.array([2.0, 1.0, 1.0]) / np.pi, rtol=1e-5)
+    assert not found[0].any()  # inside the cube
+
+
+@pytest.mark.parametrize(("name", "radius_deg"), [("sun and sky", 0.267), ("photographed", 1.0)])
+def test_the_sun_is_found(tmp_path, name, radius_deg):
+    opened(tmp_path, SKIES[name])
+    sun = find_sun(mi.load_file(str(tmp_path / "scene.xml")).environment())
+    angle_deg = np.degrees(np.arccos(np.clip(np.array(sun.frame.n).ravel() @ SUN, -1.0, 1.0)))
+    assert angle_deg < 0.1
+    assert radius_deg < np.degrees(np.arctan(sun.extent[0])) < radius_deg + 0.5
+
+
+def test_skies_without_a_sun_have_none(tmp_path):
+    for sky in ('<emitter type="constant"/>', SKIES["sun and sky"].replace('"0.01"', '"0"'), AREA):
+        assert not opened(tmp_path, sky).has_sharp_light
+
+
+def test_a_discrete_distribution_draws_in_proportion():
+    distribution = Discrete.of(np.array([0.0, 3.0, 0.0, 1.0, 0.0]))
+    drawn, within, pmf = distribution.sample((dr.arange(Float, 1000) + 0.5) / 1000)
+    assert np.bincount(np.array(UInt(drawn)), minlength=5).tolist() == [0, 750, 0, 250, 0]
+    assert np.unique(np.array(pmf)).tolist() == [0.25, 0.75]
+    assert np.array(within)[:750] == pytest.approx((np.arange(750) + 0.5) / 750, abs=1e-5)
