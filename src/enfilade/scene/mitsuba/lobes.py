@@ -123,8 +123,9 @@ class Lobes:
     ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight of a sample, and whether it is of a delta lobe.
 
-        The difference between a whole BSDF and its Lambertian lobe is sampled by both with equal probability,
-        so that the weight stays bounded where only one of them is large. A masked Lambertian BSDF is sampled
+        The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
+        of its albedo as probability, so that the weight stays bounded where only one of them is large. A
+        masked Lambertian BSDF is sampled
         by itself: only its null interaction counts. A given `choice` of the lobe, 0..1, yields a direction
         of that lobe, and a weight without meaning. A branch of a clear interface has its own weight: what is
         reflected, or transmitted.
@@ -132,7 +133,8 @@ class Lobes:
         is_whole = _of(self._whole, si, bsdf)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
         is_masked = is_whole & _of(self._lambertian, si, bsdf)
-        by_bsdf = is_masked | (rng.next_float32() < 0.5)
+        share = self._bsdf_share(si, bsdf, is_whole)
+        by_bsdf = is_masked | (rng.next_float32() < share)
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
         if branch is not Branch.RANDOM:
@@ -148,7 +150,7 @@ class Lobes:
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
         difference, pdf = self._difference(si, bsdf, wo, is_whole & ~is_delta)
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
-        difference = dr.select(is_delta, dr.select(is_masked, 1.0, 2.0) * whole_weight, difference)
+        difference = dr.select(is_delta, dr.select(is_masked, 1.0, dr.rcp(share)) * whole_weight, difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
         if branch is not Branch.RANDOM:
             weight = dr.select(is_clear, weight * sample.pdf, weight)
@@ -160,7 +162,11 @@ class Lobes:
         """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""
         whole, whole_pdf = bsdf.eval_pdf(self._all, si, wo, active)
         lambert, lambert_pdf = self._lambert(si, bsdf, wo, active)
-        return whole - lambert, 0.5 * (whole_pdf + lambert_pdf)
+        return whole - lambert, dr.lerp(lambert_pdf, whole_pdf, self._bsdf_share(si, bsdf, active))
+
+    def _bsdf_share(self, si: Any, bsdf: Any, active: Any) -> Any:
+        """Probability with which the difference is sampled by the BSDF."""
+        return 1.0 - 0.5 * dr.max(self.albedo(si, bsdf, active))
 
     def _lambert(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         is_reflected = wo.z * si.wi.z > 0.0
