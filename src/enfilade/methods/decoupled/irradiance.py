@@ -9,12 +9,12 @@ import numpy as np
 from enfilade.camera.path import Segment
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.denoising import denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext, either_side
-from enfilade.methods.denoise import denoise
-from enfilade.records import Geometry, Mask
+from enfilade.records import Geometry, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
@@ -74,12 +74,11 @@ def gather_keyframe(shot: ShotContext, frame: int, spp: int) -> Output:
 
 def _denoised(geometry: Geometry, image: IrradianceImage, quality: str) -> IrradianceImage:
     """A denoised image, whose variance is 0."""
-    albedo = np.repeat(image.is_known[..., None], 3, axis=2).astype(np.float32)  # irradiance has none
     direct, indirect = (
-        replace(
-            layer,
-            color=denoise(layer.color, albedo, geometry.normal, quality=quality),
-            variance=np.zeros_like(layer.variance),
+        Shading(
+            denoise_irradiance(geometry, layer, image.is_known, quality),
+            np.zeros_like(layer.variance),
+            layer.dropped,
         )
         for layer in (image.direct, image.indirect)
     )

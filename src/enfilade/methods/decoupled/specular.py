@@ -13,6 +13,7 @@ import scipy.ndimage
 from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX
 from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import (
     MIN_WEIGHT,
     PLANE_TOLERANCE,
@@ -24,7 +25,6 @@ from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
-from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
@@ -65,10 +65,7 @@ def filter_spatially(
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
-    own = (where & geometry.is_hit)[..., None]
-    normal = np.where(own, geometry.normal, np.float32(0))
-    white = np.repeat(own, 3, axis=2).astype(np.float32)
-    color = denoise(aov.color, white, normal, quality=quality)
+    color = denoise_light(geometry, aov.color, where, quality)
     height, width = where.shape
     softened = soften_edges(
         lanes(color), lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
