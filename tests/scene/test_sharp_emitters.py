@@ -18,7 +18,8 @@ SUN = np.array([0.6, 0.64, 0.48])
 LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
 <point name="position" value="{1}, 0.7, {2}"/></emitter>"""
 AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/><rotate x="1" angle="90"/>
-<translate y="1.5"/></transform><emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>"""
+<translate y="1.5"/></transform>
+<emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>"""
 SKIES = {
     "sun and sky": '<emitter type="sunsky"><vector name="sun_direction" x="0.6" y="0.64" z="0.48"/>'
     '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>',

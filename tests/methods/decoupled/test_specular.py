@@ -24,14 +24,15 @@ def pane_scene(tmp_path_factory):
     return renderer, camera, seen, [images.reflected(seen), images.transmitted(seen)]
 
 
-def test_thin_regions_are_smoothed_and_keep_their_energy():
+@pytest.mark.parametrize("denoiser", ["none", "balanced"])
+def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
     geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 32, 24))
     size = geometry.shape_index.shape
     where = np.zeros(size, bool)
     where[11:13] = True
     light = np.random.default_rng(5).gamma(1.0, 1.0, (*size, 1)).astype(np.float32).repeat(3, axis=2)
     band = Shading(light * where[..., None], np.where(where, 1.0, 0.0).astype(np.float32))
-    (found,) = filter_spatially([geometry], [band], where)
+    (found,) = filter_spatially([geometry], [band], where, denoiser)
     assert found.color[where].std() < 0.5 * light[where].std()
     assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
 
@@ -80,12 +81,13 @@ def test_total_internal_reflection_is_transmission(tmp_path):
     assert (images.transmitted(seen).shape_index[where] >= IN_VIRTUAL_IMAGE).all()
 
 
+@pytest.mark.parametrize("denoiser", ["none", "balanced"])
 @pytest.mark.parametrize("spp", [2, 4, 12])
-def test_reflections_in_a_pane_have_no_noise_and_keep_their_energy(pane_scene, spp):
+def test_reflections_in_a_pane_have_no_noise_and_keep_their_energy(pane_scene, spp, denoiser):
     renderer, camera, seen, virtual = pane_scene
     where = np.ones(seen.shape_index.shape, bool)
     aovs = [aov.to_image(where) for aov in specular_aovs(renderer, camera, spp)]
-    reflection, _ = filter_spatially(virtual, aovs, where)
+    reflection, _ = filter_spatially(virtual, aovs, where, denoiser)
     front = seen.shape_index == renderer.describe().shapes.index("front") + 1
     filtered, unfiltered = (aov.color[front].mean(dtype=float) for aov in (reflection, aovs[0]))
     assert filtered == pytest.approx(unfiltered, rel=0.02)

@@ -12,54 +12,41 @@ from enfilade.methods.decoupled.wavelet import ALL, smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
-OUTLIER = 64.0  # times the denoised value: what is brighter counts as that bright in the correction
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
-def denoise_light(geometry: Geometry, color: F32, where: Mask, quality: str) -> F32:
-    """Denoise light with normals as guides.
+def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: str, outlier: float) -> F32:
+    """Denoise light with normals as guides, and keep its mean along surfaces.
+
+    The denoiser loses some percent of the light where samples are skewed, and adds a third to regions two
+    pixels wide. The difference from its input, smoothed along surfaces over a range that leaves little noise,
+    is added to its result, as far as it exceeds its own standard error. Outliers are limited, so that no
+    single path tints a surface.
 
     Parameters
     ----------
     geometry
         G-buffer: of the surfaces themselves, or of those seen in them.
-    color : (H, W, 3) float32
-        Light without albedo.
+    light
+        Estimates of shape (H, W) without albedo, with the variance of their mean luminance.
     where : (H, W) bool
         Pixels that were sampled.
     quality
         Of the denoiser.
+    outlier
+        Limit of the input of the correction, in units of the denoised value.
 
     Returns
     -------
     (H, W, 3) float32
     """
+    # Denoise.
     white = np.repeat(where[..., None], 3, axis=2).astype(np.float32)
     normal = np.where(where[..., None], geometry.normal, np.float32(0))
-    return denoise(color, white, normal, quality=quality)
-
-
-def denoise_irradiance(geometry: Geometry, light: Shading, where: Mask, quality: str) -> F32:
-    """Denoise irradiance, and keep its mean along surfaces; see :func:`denoise_light`.
-
-    The denoiser loses up to 2 % of the light, most where samples are skewed. The difference from its input,
-    smoothed along surfaces over a range that leaves little noise, is added to its result, as far as it
-    exceeds its own standard error. Outliers are limited, so that no single path tints a surface.
-
-    Parameters
-    ----------
-    geometry, where, quality
-    light
-        Estimates of shape (H, W), with the variance of their mean luminance.
-
-    Returns
-    -------
-    (H, W, 3) float32
-    """
-    clean = denoise_light(geometry, light.color, where, quality)
+    clean = denoise(light.color, white, normal, quality=quality)
 
     # Smooth the difference.
-    limited = np.minimum(light.color, np.float32(OUTLIER) * clean)
+    limited = np.minimum(light.color, np.float32(outlier) * clean)
     guide = guide_of(geometry, np.where(where, geometry.shape_index, np.uint32(0)))
     difference, variance = smooth(
         lanes(limited - clean), lanes(light.variance), guide, levels=LEVELS, deviations=ALL

@@ -9,7 +9,7 @@ import numpy as np
 from enfilade.camera.path import Segment
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
-from enfilade.methods.decoupled.denoising import denoise_irradiance
+from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
@@ -19,6 +19,7 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
 NOISE_SHARE = 0.25  # of the samples' variance: low-discrepancy samples have less noise than it tells
+OUTLIER = 64.0  # times the denoised value: brighter estimates are limited where the mean is kept
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
@@ -76,7 +77,7 @@ def _denoised(geometry: Geometry, image: IrradianceImage, quality: str) -> Irrad
     """A denoised image, whose variance is 0."""
     direct, indirect = (
         Shading(
-            denoise_irradiance(geometry, layer, image.is_known, quality),
+            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=OUTLIER),
             np.zeros_like(layer.variance),
             layer.dropped,
         )

@@ -28,6 +28,7 @@ from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
 from enfilade.records import F32, Geometry, Mask, Shading
 
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
+OUTLIER = 8.0  # times the denoised value: brighter estimates are limited where the mean is kept
 DENOISED_SHARE = 0.25  # of the samples' deviation that the denoiser leaves
 DENOISED_SUPPORT = 5  # pixels, over which that deviation is averaged
 FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
@@ -65,7 +66,10 @@ def filter_spatially(
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
-    color = denoise_light(geometry, aov.color, where, quality)
+    # Ignore the depths of virtual images, as below.
+    is_real = geometry.shape_index < IN_VIRTUAL_IMAGE
+    surfaces = replace(geometry, depth=np.where(is_real, geometry.depth, np.float32(0)))
+    color = denoise_light(surfaces, aov, where, quality=quality, outlier=OUTLIER)
     height, width = where.shape
     softened = soften_edges(
         lanes(color), lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX

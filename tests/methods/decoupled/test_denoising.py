@@ -1,0 +1,53 @@
+"""Denoised irradiance: less noise, the same mean, and no surface tinted by one path."""
+
+import numpy as np
+import pytest
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.records import Shading
+from support.analytic_truth import geometry_of
+from support.example_scenes import wall
+
+SPP, OUTLIER = 8, 64.0
+GEOMETRY = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 160, 120))
+WHERE = np.ones(GEOMETRY.shape_index.shape, bool)
+
+
+def noisy(chance, seed=0):
+    """Means of paths, one of which in `chance` finds a light; the mean is 1."""
+    hits = np.random.default_rng(seed).binomial(SPP, 1.0 / chance, WHERE.shape)
+    light = (hits * (chance / SPP)).astype(np.float32)
+    return Shading(light[..., None].repeat(3, axis=2), np.full(WHERE.shape, chance / SPP, np.float32))
+
+
+def denoised(light, where=WHERE):
+    return denoise_light(GEOMETRY, light, where, quality="balanced", outlier=OUTLIER)
+
+
+@pytest.mark.parametrize("chance", [2, 20, 100])
+def test_the_mean_of_skewed_samples_is_kept(chance):
+    light = noisy(chance)
+    found = denoised(light)
+    assert found.std() < 0.15 * light.color.std()
+    assert found.mean() == pytest.approx(light.color.mean(), rel=0.01)
+
+
+def test_one_outlier_does_not_tint_the_surface():
+    light = noisy(2)
+    light.color[60, 80] = 1e5
+    light.variance[60, 80] = 1e10
+    found, expected = (denoised(one) for one in (light, noisy(2)))
+    around = np.abs(found - expected)[40:80, 60:100]
+    assert around.max() < 0.5
+    assert around.mean() < 0.1
+
+
+def test_pixels_without_irradiance_stay_black():
+    where = WHERE.copy()
+    where[:, :80] = False
+    light = noisy(2)
+    known = Shading(light.color * where[..., None], light.variance * where)
+    found = denoised(known, where)
+    assert found[where].mean() == pytest.approx(1.0, rel=0.03)
+    assert found[:, :70].max() < 0.05
