@@ -76,12 +76,12 @@ def test_both_filters_are_those_of_the_renderer(job, held, kind):
         assert abs((found - wanted).mean()) < 4.0 * np.sqrt(noise / wanted[..., 0].size)
 
 
-def test_halves_are_independent_and_both_filters_have_the_same_noise(held):
+def test_halves_are_independent_and_the_smoother_noise_is_weaker(held):
     """Of light, in the interior of surfaces; at edges the box filter samples less contrast."""
     first, second = held.read(0).halves[SampleFilter.BOX]
     assert (first != second).any()
     noise = [np.median(np.square(np.subtract(*held.read(0).halves[kind]))) for kind in FILTERS]
-    assert noise[1] / noise[0] == pytest.approx(1.0, abs=0.25)  # medians of 1536 values; 1.02 in theory
+    assert 0.3 < noise[1] / noise[0] < 0.7  # medians of 1536 values; 1.02 * 5 / 12 in theory
 
 
 def test_references_grow_are_shared_and_are_the_same_however_they_grew(job, held, tmp_path):
