@@ -170,13 +170,15 @@ class Method(ABC):
         return []
 
     def cost_ratios(
-        self, settings: Settings, excerpt: Mapping[str, int], whole: Mapping[str, int]
+        self, settings: Settings, pixels: int, excerpt: Mapping[str, int], whole: Mapping[str, int]
     ) -> Mapping[str, float]:
-        """Cost of a task in a walkthrough over that of one in an excerpt, for forecasts.
+        """Cost a pixel of a task in a walkthrough over that of one in a small excerpt, for forecasts.
 
         Parameters
         ----------
         settings
+        pixels
+            Of a frame of the walkthrough.
         excerpt, whole
             Number of tasks of each pass.
 
@@ -185,7 +187,7 @@ class Method(ABC):
         mapping of str to float
             By pass; 1 where left out.
         """
-        del settings, excerpt, whole
+        del settings, pixels, excerpt, whole
         return {}
 
     @abstractmethod

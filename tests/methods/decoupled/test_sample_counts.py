@@ -5,6 +5,7 @@ import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled import Decoupled
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.sample_counts import (
     displayed_deviation,
     edge_spp,
@@ -83,11 +84,25 @@ def test_occluded_emitters_and_the_interior_of_large_ones_are_left_out():
 
 def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
     excerpt, whole = {"irradiance": 2, "pilot": 1}, {"irradiance": 60, "pilot": 2}
-    ratios = Decoupled().cost_ratios(Settings(), excerpt, whole)
+    ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole)
     expected = irradiance_spp(112.0, 10.0, 30) / irradiance_spp(112.0, 10.0, 2)
-    assert ratios == pytest.approx({"irradiance": expected, "disocclusion": expected}, rel=0.05)
+    same = dict.fromkeys(("prepass", "hash_grid", "pilot"), 1.0)
+    assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected}, rel=0.05)
     fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)
-    assert Decoupled().cost_ratios(fixed, excerpt, whole) == {}
+    assert set(Decoupled().cost_ratios(fixed, 320 * 180, excerpt, whole).values()) == {1.0}
+
+
+def test_light_of_large_frames_has_fewer_pixels():
+    def size(width, height):
+        camera = light_camera(Camera(np.eye(4), 60.0, width, height))
+        return camera.width, camera.height
+
+    assert size(320, 180) == (320, 180)
+    assert size(1280, 720) == size(1920, 1080) == size(3840, 2160) == (640, 360)
+    assert size(2, 1_000_000) == (1, 333_333)  # never without pixels
+    excerpt = {"irradiance": 2, "pilot": 1}
+    ratios = Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt)
+    assert set(ratios.values()) == {1.0 / 36.0}
 
 
 def test_outlines_are_pixels_beside_another_shape():

@@ -13,6 +13,7 @@ from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
 from enfilade.methods.decoupled.sample_counts import (
@@ -121,7 +122,7 @@ class Frames:
             camera,
             np.flatnonzero(where).astype(np.uint32),
             lambda rays, rng, qmc_point: shot.integrator.specular_radiance(
-                cache, rays, rng, qmc_point, pixel_angle=camera.pixel_angle
+                cache, rays, rng, qmc_point, pixel_angle=light_camera(camera).pixel_angle
             ),
             chunk=walk.settings[LimitSettings].paths_in_flight,
             pixel_filter=PixelFilter.GAUSSIAN,
@@ -159,7 +160,7 @@ def _shade_diffuse(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
         lambda rays, rng: shot.integrator.diffuse_radiance(
-            reprojected, cache, rays, rng, pixel_angle=camera.pixel_angle
+            reprojected, cache, rays, rng, pixel_angle=light_camera(camera).pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.GAUSSIAN,

@@ -8,6 +8,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
@@ -20,7 +21,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
-    camera, geometry = walk.path.cameras[frame], shot.prepass_geometry(frame)
+    camera, geometry = light_camera(walk.path.cameras[frame]), shot.prepass_geometry(frame)
     chunk = walk.settings[LimitSettings].paths_in_flight
 
     # Follow specular lobes from all pixels of the frame.

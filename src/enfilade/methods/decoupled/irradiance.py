@@ -11,6 +11,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import upload
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext, either_side
@@ -26,7 +27,7 @@ MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are est
 def gather(
     shot: ShotContext, frame: int, where: Mask, spp: int, purpose: Purpose
 ) -> tuple[IrradianceImage, int]:
-    """Gather the irradiance of some pixels of a frame, at their centres.
+    """Gather the irradiance of some pixels of a frame, at their centres and at the resolution of light.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ def gather(
     paths : int
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
-    camera = walk.path.cameras[frame]
+    camera = light_camera(walk.path.cameras[frame])
     estimate = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
@@ -66,7 +67,7 @@ def gather(
 
 def gather_keyframe(shot: ShotContext, frame: int, spp: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
-    geometry = shot.walk.view(frame).geometry
+    geometry = shot.light_geometry(frame)
     image, paths = gather(shot, frame, geometry.has_diffuse, spp, Purpose.IRRADIANCE)
     if shot.settings.denoiser != "none":
         image = _denoised(geometry, image, shot.settings.denoiser)
@@ -110,7 +111,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment, spp: int) -> Output:
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
         image, count = gather(shot, middle, shot.uncovered(middle, {}), spp, Purpose.IRRADIANCE)
-        images[middle], uploaded[middle] = image, upload(shot.walk.view(middle).geometry, image)
+        images[middle], uploaded[middle] = image, upload(shot.light_geometry(middle), image)
         paths += count
         pending += [(middle, last), (first, middle)]
     numbers = [shot.walk.path.numbers[frame] for frame in sorted(images)]

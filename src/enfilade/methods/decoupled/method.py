@@ -12,6 +12,7 @@ from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
+from enfilade.methods.decoupled.light_camera import light_reduction
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import averaged_images, run_pilot
@@ -74,13 +75,16 @@ class Decoupled(Method):
         return [frame for segments in analysis.segments(SPACING) for frame in keyframes_of(segments)]
 
     def cost_ratios(
-        self, settings: Settings, excerpt: Mapping[str, int], whole: Mapping[str, int]
+        self, settings: Settings, pixels: int, excerpt: Mapping[str, int], whole: Mapping[str, int]
     ) -> Mapping[str, float]:
-        """Shots with fewer keyframes accumulate fewer irradiance images, which need more paths."""
-        if settings[DecoupledSettings].irradiance_spp:
-            return {}
-        ratio = averaged_images(excerpt["irradiance"]) / averaged_images(whole["irradiance"] / whole["pilot"])
-        return dict.fromkeys(("irradiance", "disocclusion"), ratio)
+        """Light of large frames has fewer pixels; that of shots with few keyframes needs more paths."""
+        share = 1.0 / light_reduction(pixels) ** 2
+        ratios = dict.fromkeys(("prepass", "hash_grid", "pilot", "irradiance", "disocclusion"), share)
+        if not settings[DecoupledSettings].irradiance_spp:
+            keyframes = whole["irradiance"] / whole["pilot"]
+            more = averaged_images(excerpt["irradiance"]) / averaged_images(keyframes)
+            ratios |= dict.fromkeys(("irradiance", "disocclusion"), share * more)
+        return ratios
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""

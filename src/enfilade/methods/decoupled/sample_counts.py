@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,7 @@ def run_pilot(shot: ShotContext) -> Output:
     """Choose the paths a pixel of irradiance images by the visible difference of two rough ones."""
     settings = shot.settings
     frame = _pilot_frame(shot)
-    where = shot.walk.view(frame).geometry.has_diffuse
+    where = shot.light_geometry(frame).has_diffuse
     jnd = _pilot_jnd(shot, frame, where) if where.any() else 0.0
     spp = irradiance_spp(jnd, settings.quality, len(shot.keyframes))
     rays = 2 * PILOT_SPP * int(where.sum())
@@ -179,12 +180,14 @@ def _pilot_jnd(shot: ShotContext, frame: int, where: Mask) -> float:
     on the number of paths that they decide.
     """
     walk = shot.walk
-    geometry = walk.view(frame).geometry
+    geometry = shot.light_geometry(frame)
     shown = []
     for purpose in (Purpose.PILOT, Purpose.SECOND_PILOT):
         image, _ = gather(shot, frame, where, PILOT_SPP, purpose)
         accumulated = accumulate(geometry, where, [upload(geometry, image)])
         irradiance = total_irradiance(accumulated, *where.shape)
         shown.append(walk.display_luminance(geometry.albedo * irradiance))
-    metric = Aqm.modern(walk.viewing, workers=FFT_THREADS)
+    height, width = where.shape
+    viewing = replace(walk.viewing, width_px=width, height_px=height)
+    metric = Aqm.modern(viewing, workers=FFT_THREADS)
     return metric.compare(shown[0], shown[1], valid=where).score

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
+from enfilade.gbuffer import find_geometry
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
@@ -18,6 +19,7 @@ from enfilade.methods.decoupled.irradiance_cache import (
     reproject_to,
     upload,
 )
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.prepass import prepass_geometry
 from enfilade.methods.decoupled.virtual_images import VirtualImages
@@ -71,6 +73,7 @@ class ShotContext:
         self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
         self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
+        self._light_geometry: LruCache[int, Geometry] = LruCache(2)
         self._irradiance: LruCache[int, UploadedImage] = LruCache(2 * (2 * ACCUMULATED + 1))
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
@@ -129,8 +132,11 @@ class ShotContext:
         return [*images, *self._blank[:missing]], [*weights, *[0.0] * missing]
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
-        """Diffuse pixels of a frame that neither the nearest keyframes nor other images show, (H, W)."""
-        geometry = self.walk.view(frame).geometry
+        """Diffuse pixels of a frame that neither the nearest keyframes nor other images show.
+
+        Of shape (H, W), at the resolution of light.
+        """
+        geometry = self.light_geometry(frame)
         near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)
         return geometry.has_diffuse & ~is_covered(geometry, [*map(self.image, near), *others.values()])
 
@@ -138,8 +144,16 @@ class ShotContext:
         """The irradiance image of a keyframe, or a disocclusion image."""
         pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
         return self._irradiance.get(
-            frame, lambda: upload(self.walk.view(frame).geometry, self.inputs.record(pass_name, frame))
+            frame, lambda: upload(self.light_geometry(frame), self.inputs.record(pass_name, frame))
         )
+
+    def light_geometry(self, frame: int) -> Geometry:
+        """G-buffer of an irradiance image."""
+        whole = self.walk.path.cameras[frame]
+        camera = light_camera(whole)
+        if camera is whole:
+            return self.walk.view(frame).geometry
+        return self._light_geometry.get(frame, lambda: find_geometry(self.renderer, camera))
 
     def prepass_geometry(self, frame: int) -> Geometry:
         """G-buffer of a prepass image."""
@@ -169,7 +183,7 @@ class ShotContext:
             images = [self.image(f) for f in sorted({*around, frame})]
             pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
             is_known = self.inputs.record(pass_name, frame).is_known
-            return accumulate(self.walk.view(frame).geometry, is_known, images)
+            return accumulate(self.light_geometry(frame), is_known, images)
 
         return self._accumulated.get(frame, make)
 
