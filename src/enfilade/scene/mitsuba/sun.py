@@ -18,16 +18,16 @@ from enfilade.records import F32
 
 __all__ = ["Sun", "find_sun"]
 
-SEARCH_WIDTH = 1024  # of the latitude-longitude map in which the sun is searched: cells of 0.35 degrees
+SEARCH_WIDTH = 1024  # of the latitude-longitude map in which the sun is searched: texels of 0.35 degrees
 MAX_RADIUS = math.radians(2.5)  # the disc seen from the Earth has 0.27 degrees; many photographs blur it
 MIN_SHARE = 0.05  # of the sky's flux
 CONTAINED = 0.99  # of the flux within that radius, to be on the map
-CELLS = 64  # of the map along each axis
+TEXELS = 64  # of the map along each axis
 
 
 @dataclass(frozen=True)
 class Sun:
-    """A map of the sun in square cells, on the plane that touches the sphere of directions at its centre.
+    """A map of the sun in square texels, on the plane that touches the sphere of directions at its centre.
 
     Attributes
     ----------
@@ -36,19 +36,19 @@ class Sun:
         Its normal points to the centre.
     extent : Float
         Of the map from the centre to each side: a tangent.
-    cells : Discrete
-        Flux of each cell, row by row.
+    texels : Discrete
+        Flux of each texel, row by row.
     """
 
     environment: Any
     frame: Any
     extent: Any
-    cells: Any
+    texels: Any
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self.frame, self.extent, self.cells
+        return self.frame, self.extent, self.texels
 
     def contains(self, direction: Any) -> Any:
         """Whether directions (Vector3f, unit length) are on the map; Bool."""
@@ -58,14 +58,14 @@ class Sun:
 
     def sample(self, rng: Any) -> tuple[Any, Any]:
         """A direction on the map (Vector3f), and its radiance over its density (Color3f)."""
-        cell, across, pmf = self.cells.sample(rng.next_float32())
-        row = cell // CELLS
-        x = (Float(cell - row * CELLS) + across) * (2.0 / CELLS) - 1.0
-        y = (Float(row) + rng.next_float32()) * (2.0 / CELLS) - 1.0
+        texel, across, pmf = self.texels.sample(rng.next_float32())
+        row = texel // TEXELS
+        x = (Float(texel - row * TEXELS) + across) * (2.0 / TEXELS) - 1.0
+        y = (Float(row) + rng.next_float32()) * (2.0 / TEXELS) - 1.0
         direction = mi.Vector3f(x * self.extent, y * self.extent, 1.0)
         cosine = dr.rsqrt(dr.squared_norm(direction))
         direction = self.frame.to_world(direction * cosine)
-        solid_angle = dr.square(self.extent * (2.0 / CELLS)) * cosine**3  # of a cell
+        solid_angle = dr.square(self.extent * (2.0 / TEXELS)) * cosine**3  # of a texel
         return direction, _radiance(self.environment, direction) * (solid_angle / pmf)
 
 
@@ -95,7 +95,7 @@ def find_sun(environment: Any) -> Sun | None:
     limit = math.tan(MAX_RADIUS)
     x, y, luminance = _map(environment, frame, limit)
     excess = np.where(np.hypot(x, y) < limit, luminance - luminance.min(), 0.0)
-    flux = float(excess.sum()) * (2.0 * limit / CELLS) ** 2
+    flux = float(excess.sum()) * (2.0 * limit / TEXELS) ** 2
     if flux <= MIN_SHARE * float(np.dot(sky, sine)) * step**2:
         return None
 
@@ -104,19 +104,19 @@ def find_sun(environment: Any) -> Sun | None:
     distance = np.hypot(x - x_centre, y - y_centre)
     order = np.argsort(distance)
     contained = np.cumsum(excess[order]) / excess.sum()
-    radius = distance[order][np.searchsorted(contained, CONTAINED)] + 2.0 * limit / CELLS
+    radius = distance[order][np.searchsorted(contained, CONTAINED)] + 2.0 * limit / TEXELS
     frame = _facing(np.array(frame.to_world(mi.Vector3f(x_centre, y_centre, 1.0))).ravel())
     _, _, luminance = _map(environment, frame, float(radius))
-    # Cells at the outline may be brighter elsewhere than at their centres.
-    weights = scipy.ndimage.maximum_filter(luminance.reshape(CELLS, CELLS), 3)
-    cells = Discrete.of(np.maximum(weights, 1e-6 * weights.max()).ravel().astype(np.float64))
-    return Sun(environment, frame, opaque(float(radius)), cells)
+    # Texels at the outline may be brighter elsewhere than at their centres.
+    weights = scipy.ndimage.maximum_filter(luminance.reshape(TEXELS, TEXELS), 3)
+    texels = Discrete.of(np.maximum(weights, 1e-6 * weights.max()).ravel().astype(np.float64))
+    return Sun(environment, frame, opaque(float(radius)), texels)
 
 
 def _map(environment: Any, frame: Any, extent: float) -> tuple[F32, F32, F32]:
-    """Coordinates of the cells of a map, and the luminance at their centres, (N,) each."""
-    along = (((np.arange(CELLS) + 0.5) * (2.0 / CELLS) - 1.0) * extent).astype(np.float32)
-    x, y = np.tile(along, CELLS), np.repeat(along, CELLS)
+    """Coordinates of the texels of a map, and the luminance at their centres, (N,) each."""
+    along = (((np.arange(TEXELS) + 0.5) * (2.0 / TEXELS) - 1.0) * extent).astype(np.float32)
+    x, y = np.tile(along, TEXELS), np.repeat(along, TEXELS)
     directions = mi.Vector3f(lanes(x), lanes(y), 1.0)
     return x, y, _luminance(environment, frame.to_world(dr.normalize(directions)))
 
