@@ -352,7 +352,7 @@ class LobeRenderer(Renderer, Protocol):
         Returns
         -------
         Array3f
-            Reflected radiance divided by the albedo, with one shadow ray.
+            Reflected radiance divided by the albedo.
         """
         ...
 

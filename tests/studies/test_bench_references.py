@@ -81,7 +81,7 @@ def test_halves_are_independent_and_the_smoother_noise_is_weaker(held):
     first, second = held.read(0).halves[SampleFilter.BOX]
     assert (first != second).any()
     noise = [np.median(np.square(np.subtract(*held.read(0).halves[kind]))) for kind in FILTERS]
-    assert 0.3 < noise[1] / noise[0] < 0.7  # medians of 1536 values; 1.02 * 5 / 12 in theory
+    assert 0.3 < noise[1] / noise[0] < 0.7  # medians of 1536; 1.02 * 5 / 12 for variances
 
 
 def test_references_grow_are_shared_and_are_the_same_however_they_grew(job, held, tmp_path):

@@ -18,6 +18,7 @@ from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import padded, recorded
+from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
 from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.paths import Path, compact, scatter_add, spawn
@@ -35,38 +36,8 @@ ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
-STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
 
 OnMiss = Callable[[Entries], None]
-
-
-@dataclass(frozen=True)
-class CacheQuery:
-    """A point whose irradiance is looked up, as lanes.
-
-    Attributes
-    ----------
-    position, normal : Array3f
-    shape_index : UInt
-    width : Float
-        Of the path there, scene units.
-    weight : Array3f
-        Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
-    sharp : tuple of Array3f
-        Irradiance over pi by emitters with sharp shadows, where the images of the cache are without it.
-    """
-
-    position: Any
-    normal: Any
-    shape_index: Any
-    width: Any
-    weight: Any
-    sharp: Any
-
-    @property
-    def is_needed(self) -> Any:
-        """Whether irradiance contributes at all; Bool."""
-        return dr.max(dr.abs(self.weight)) > 0.0
 
 
 @dataclass(frozen=True)
@@ -108,7 +79,7 @@ class Integrator:
             return renderer.state
 
         self._see = recorded(self._see_kernel, state)
-        self._query_further = recorded(_query_kernel, lambda: None)
+        self._query_further = recorded(query_further, lambda: None)
         self._extend = {
             Branch.REFLECTED: recorded(lambda *path: self._extend_kernel(Branch.REFLECTED, *path), state),
             Branch.TRANSMITTED: recorded(lambda *path: self._extend_kernel(Branch.TRANSMITTED, *path), state),
@@ -352,7 +323,7 @@ class Integrator:
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
             sharp=sharp,
         )
-        reflected, is_miss = _query(cache, query)
+        reflected, is_miss = query_images(cache, query)
         vertex = _Vertex(reflected, is_miss, Bool(point.has_specular), path, query)
         # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
         emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)
@@ -468,29 +439,3 @@ def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_a
     is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
     is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
     return path.lane - dr.select(is_back, transmitted_at, 0)
-
-
-def _query(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
-    """Diffuse reflection of cached irradiance, and where the images of the cache miss."""
-    found, is_known = cache.lookup(query.position, query.normal, query.shape_index)
-    reflected = dr.select(is_known, query.weight * sum(query.sharp, found), 0.0)
-    return Array3f(reflected), Bool(~is_known & query.is_needed)
-
-
-def _query_kernel(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:
-    """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
-    reflected, is_miss = _query(cache, query)
-    if cache.hash_grid:
-        # Jitter the position by up to half an entry, so that many lookups interpolate.
-        rng = PCG32(rng)
-        rng.state ^= STREAM_SALT
-        offset = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
-        offset = 0.5 + jitter * (offset - 0.5)
-
-        # Look up where the images miss.
-        irradiance, is_found = cache.hash_grid.lookup(
-            query.position, query.normal, query.shape_index, query.width, offset
-        )
-        reflected = dr.select(is_miss & is_found, query.weight * irradiance, reflected)
-        is_miss &= ~is_found
-    return reflected, is_miss

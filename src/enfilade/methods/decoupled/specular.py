@@ -55,46 +55,40 @@ def filter_spatially(
     -------
     list of SpecularAov
     """
+    # Ignore the depths of virtual images: their normals are not those of the planes that they appear to form.
+    surfaces = [
+        replace(g, depth=np.where(g.shape_index < IN_VIRTUAL_IMAGE, g.depth, np.float32(0))) for g in virtual
+    ]
     if denoiser != "none":
-        return [_denoised(g, aov, where, denoiser) for g, aov in zip(virtual, aovs, strict=True)]
+        return [_denoised(g, aov, where, denoiser) for g, aov in zip(surfaces, aovs, strict=True)]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
     weights = firefly_weights(total, width=width, height=height, times=FIREFLY)
-    return [_filtered(g, aov, where, weights) for g, aov in zip(virtual, aovs, strict=True)]
+    return [_filtered(g, aov, where, weights) for g, aov in zip(surfaces, aovs, strict=True)]
 
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
-    # Ignore the depths of virtual images, as below.
-    is_real = geometry.shape_index < IN_VIRTUAL_IMAGE
-    surfaces = replace(geometry, depth=np.where(is_real, geometry.depth, np.float32(0)))
-    color = denoise_light(surfaces, aov, where, quality=quality, outlier=OUTLIER)
-    height, width = where.shape
-    softened = soften_edges(
-        lanes(color), lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
-    )
+    color = denoise_light(geometry, aov, where, quality=quality, outlier=OUTLIER)
     deviation = DENOISED_SHARE * scipy.ndimage.uniform_filter(np.sqrt(aov.variance), DENOISED_SUPPORT)
-    return SpecularAov(to_half(image(softened, height, width)), to_half(deviation.astype(np.float32)))
+    return _antialiased(geometry, lanes(color), deviation.astype(np.float32))
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
-    """Clamp the fireflies of an AOV by their weights, smooth it, and antialias its edges."""
-    # Ignore the depths of virtual images: their normals are not those of the planes that they appear to form.
-    is_real = geometry.shape_index < IN_VIRTUAL_IMAGE
-    geometry = replace(geometry, depth=np.where(is_real, geometry.depth, np.float32(0)))
-
-    # Smooth along surfaces.
+    """Clamp the fireflies of an AOV by their weights, smooth it along surfaces, and antialias its edges."""
     noise = NOISE_SHARE * lanes(aov.variance)
     groups = np.where(where, geometry.shape_index, np.uint32(0))
     color, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
+    return _antialiased(geometry, color, np.sqrt(image(variance, *where.shape)))
 
-    # Antialias edges.
-    height, width = aov.variance.shape
+
+def _antialiased(geometry: Geometry, color: Any, deviation: F32) -> SpecularAov:
+    """An AOV with soft edges, from its colours (Array3f) and their standard deviation, (H, W)."""
+    height, width = deviation.shape
     color = soften_edges(
         color, lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
     )
-    deviation = np.sqrt(image(variance, height, width))
     return SpecularAov(to_half(image(color, height, width)), to_half(deviation))
 
 

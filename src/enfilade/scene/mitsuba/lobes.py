@@ -93,7 +93,7 @@ class Lobes:
         """Diffuse lobe times cosine, and the density of :meth:`sample_diffuse`."""
         is_whole = _of(self._whole, si, bsdf)
         value, pdf = bsdf.eval_pdf(self._diffuse, si, wo, active & ~is_whole)
-        lambert, lambert_pdf = self._lambert(si, bsdf, wo, active & is_whole)
+        lambert, lambert_pdf = _lambert(si, wo, self.albedo(si, bsdf, active & is_whole))
         return dr.select(is_whole, lambert, value), dr.select(is_whole, lambert_pdf, pdf)
 
     def sample_diffuse(self, si: Any, bsdf: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
@@ -111,7 +111,8 @@ class Lobes:
         """Specular lobes times cosine, and the density of :meth:`sample_specular`."""
         is_whole = _of(self._whole, si, bsdf)
         value, pdf = bsdf.eval_pdf(self._specular, si, wo, active & ~is_whole)
-        difference, mixture_pdf = self._difference(si, bsdf, wo, active & is_whole)
+        albedo = self.albedo(si, bsdf, active & is_whole)
+        difference, mixture_pdf = self._difference(si, bsdf, wo, albedo, active & is_whole)
         return dr.select(is_whole, difference, value), dr.select(is_whole, mixture_pdf, pdf)
 
     def is_clear(self, si: Any, bsdf: Any) -> Any:
@@ -125,15 +126,15 @@ class Lobes:
 
         The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
         of its albedo as probability, so that the weight stays bounded where only one of them is large. A
-        masked Lambertian BSDF is sampled
-        by itself: only its null interaction counts. A given `choice` of the lobe, 0..1, yields a direction
-        of that lobe, and a weight without meaning. A branch of a clear interface has its own weight: what is
-        reflected, or transmitted.
+        masked Lambertian BSDF is sampled by itself: only its null interaction counts. A given `choice` of the
+        lobe, 0..1, yields a direction of that lobe, and a weight without meaning. A branch of a clear
+        interface has its own weight: what is reflected, or transmitted.
         """
         is_whole = _of(self._whole, si, bsdf)
         first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
         is_masked = is_whole & _of(self._lambertian, si, bsdf)
-        share = self._bsdf_share(si, bsdf, is_whole)
+        albedo = self.albedo(si, bsdf, is_whole)
+        share = _bsdf_share(albedo)
         by_bsdf = is_masked | (rng.next_float32() < share)
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
@@ -148,7 +149,7 @@ class Lobes:
 
         # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
-        difference, pdf = self._difference(si, bsdf, wo, is_whole & ~is_delta)
+        difference, pdf = self._difference(si, bsdf, wo, albedo, is_whole & ~is_delta)
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
         difference = dr.select(is_delta, dr.select(is_masked, 1.0, dr.rcp(share)) * whole_weight, difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
@@ -158,20 +159,23 @@ class Lobes:
         wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
         return wo, pdf, dr.select(is_whole, difference, weight), is_delta
 
-    def _difference(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+    def _difference(self, si: Any, bsdf: Any, wo: Any, albedo: Any, active: Any) -> tuple[Any, Any]:
         """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""
         whole, whole_pdf = bsdf.eval_pdf(self._all, si, wo, active)
-        lambert, lambert_pdf = self._lambert(si, bsdf, wo, active)
-        return whole - lambert, dr.lerp(lambert_pdf, whole_pdf, self._bsdf_share(si, bsdf, active))
+        lambert, lambert_pdf = _lambert(si, wo, albedo)
+        pdf = dr.lerp(lambert_pdf, whole_pdf, _bsdf_share(albedo))
+        return dr.select(active, whole - lambert, 0.0), dr.select(active, pdf, 0.0)
 
-    def _bsdf_share(self, si: Any, bsdf: Any, active: Any) -> Any:
-        """Probability with which the difference is sampled by the BSDF."""
-        return 1.0 - 0.5 * dr.max(self.albedo(si, bsdf, active))
 
-    def _lambert(self, si: Any, bsdf: Any, wo: Any, active: Any) -> tuple[Any, Any]:
-        is_reflected = wo.z * si.wi.z > 0.0
-        pdf = dr.select(is_reflected, dr.abs(wo.z) / dr.pi, 0.0)
-        return self.albedo(si, bsdf, active) * pdf, pdf
+def _bsdf_share(albedo: Any) -> Any:
+    """Probability with which the difference from a Lambertian lobe is sampled by the BSDF."""
+    return 1.0 - 0.5 * dr.max(albedo)
+
+
+def _lambert(si: Any, wo: Any, albedo: Any) -> tuple[Any, Any]:
+    """A Lambertian lobe times cosine, and its density."""
+    pdf = dr.select(wo.z * si.wi.z > 0.0, dr.abs(wo.z) / dr.pi, 0.0)
+    return albedo * pdf, pdf
 
 
 def _of(table: Any, si: Any, bsdf: Any) -> Any:

@@ -1,0 +1,70 @@
+"""Queries of the irradiance cache at the vertices of paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from enfilade.arrays import PCG32, Array3f, Bool
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+
+__all__ = ["CacheQuery", "query_further", "query_images"]
+
+STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
+
+
+@dataclass(frozen=True)
+class CacheQuery:
+    """A point whose irradiance is looked up, as lanes.
+
+    Attributes
+    ----------
+    position, normal : Array3f
+    shape_index : UInt
+    width : Float
+        Of the path there, scene units.
+    weight : Array3f
+        Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
+    sharp : tuple of Array3f
+        Irradiance over pi by emitters with sharp shadows, where the images of the cache are without it.
+    """
+
+    position: Any
+    normal: Any
+    shape_index: Any
+    width: Any
+    weight: Any
+    sharp: Any
+
+    @property
+    def is_needed(self) -> Any:
+        """Whether irradiance contributes at all; Bool."""
+        return dr.max(dr.abs(self.weight)) > 0.0
+
+
+def query_images(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
+    """Diffuse reflection of cached irradiance, and where the images of the cache miss."""
+    found, is_known = cache.lookup(query.position, query.normal, query.shape_index)
+    reflected = dr.select(is_known, query.weight * sum(query.sharp, found), 0.0)
+    return Array3f(reflected), Bool(~is_known & query.is_needed)
+
+
+def query_further(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:
+    """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
+    reflected, is_miss = query_images(cache, query)
+    if cache.hash_grid:
+        # Jitter the position by up to half an entry, so that many lookups interpolate.
+        rng = PCG32(rng)
+        rng.state ^= STREAM_SALT
+        offset = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+        offset = 0.5 + jitter * (offset - 0.5)
+
+        # Look up where the images miss.
+        irradiance, is_found = cache.hash_grid.lookup(
+            query.position, query.normal, query.shape_index, query.width, offset
+        )
+        reflected = dr.select(is_miss & is_found, query.weight * irradiance, reflected)
+        is_miss &= ~is_found
+    return reflected, is_miss
