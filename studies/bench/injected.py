@@ -84,7 +84,7 @@ def main() -> None:
     def source(error: str) -> Any:
         def images(frame: int) -> Sequence[F32]:
             shown = frame - 1 if error == "repeated" and frame == middle else frame
-            clean = traced.read(shown).halves[SampleFilter.GAUSSIAN].mean(axis=0)
+            clean = traced.read(shown).denoised[SampleFilter.GAUSSIAN][2]
             geometry = walk.view(shown).geometry
             if error == "brighter":
                 pairs = zip(clean, windows, strict=True)

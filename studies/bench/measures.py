@@ -1,8 +1,8 @@
 """Measures of the bench, each of one window over all frames.
 
 Measures of squared errors are products of the errors against both halves of the reference, (F - A)(F - B).
-The noise of the halves is independent, so its mean is 0. The other measures compare with the mean of both
-halves, and contain its noise.
+The noise of the halves is independent, so its mean is 0. The other measures compare with the denoised mean of
+both halves, and contain what the denoiser leaves.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def measure(
     Parameters
     ----------
     source
-        The windows of each frame; None for the first half of the references, against the second alone.
+        The windows of each frame; None for the first half of the references, denoised, against the second.
     pixel_filter
         Of the references.
     references, windows
@@ -119,16 +119,16 @@ def _pairs(
     exposure_ev: float,
 ) -> Iterator[WindowPair]:
     """The windows of a frame, each with its reference."""
-    for index, (first, second) in enumerate(zip(*reference.halves[pixel_filter], strict=True)):
-        halves = (first, second) if tests is not None else (second, second)
-        test = first if tests is None else tests[index]
-        wanted = np.float32(0.5) * (halves[0] + halves[1])
+    halves, denoised = reference.halves[pixel_filter], reference.denoised[pixel_filter]
+    for index, flow in enumerate(reference.flows):
+        test, wanted = denoised[:2, index] if tests is None else (tests[index], denoised[2, index])
         pair = display_pair(test, wanted, viewing, exposure_ev=exposure_ev)
-        shown = display_pair(*halves, viewing, exposure_ev=exposure_ev)
+        first, second = halves[:, index]
+        shown = display_pair(first, second, viewing, exposure_ev=exposure_ev)
         yield WindowPair(
             **vars(pair),
             linear=test,
-            linear_halves=halves,
+            linear_halves=(first, second),
             halves=(shown.test, shown.reference),
-            flow=reference.flows[index],
+            flow=flow,
         )

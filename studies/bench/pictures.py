@@ -61,7 +61,7 @@ def plot_crops(found: Mapping[str, Any], references: References, folder: Path, f
         ax.set_axis_off()
     for index, window in enumerate(windows):
         above, below = axes[2 * index], axes[2 * index + 1]
-        means = {kind: displayed(halves[:, index].mean(axis=0)) for kind, halves in reference.halves.items()}
+        means = {kind: displayed(of[2, index]) for kind, of in reference.denoised.items()}
         above[0].imshow(means[SampleFilter.GAUSSIAN], interpolation="nearest")
         text = f"↑ {window.kind}\n{AMPLIFICATION:g} × difference →"
         below[0].text(0.5, 0.5, text, fontsize=8, color=INK, ha="center", va="center")

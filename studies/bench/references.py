@@ -2,12 +2,12 @@
 
 A reference is traced at :data:`SUBPIXELS` x :data:`SUBPIXELS` subpixels of a pixel. The mean over a pixel's
 subpixels is the box filter's value; a weighted sum over those within the Gaussian filter's radius is the
-Gaussian filter's. So the same paths serve both filters. A Gaussian pixel shares subpixels with its
-neighbours, and would have the noise of 3.1 times as many paths, which is smoother and so easier to see. With
-three quarters of the paths ColorVideoVDP gives the noise of both filters the same score: on grey with
-simulated noise 6.6 and 6.7 JOD, 2.5 and 2.5 where it is stronger; with as many paths as make the variances
-equal, 5 of 16, the Gaussian's would have 5.1 and 0.9. The Gaussian's weights are constant over a subpixel,
+Gaussian filter's. So the same paths serve both filters. The Gaussian's weights are constant over a subpixel,
 which changes the response to an edge by 0.7 % of its contrast at most.
+
+Measures of visible differences compare with denoised references. Their subpixels are denoised before they are
+filtered: neighbouring pixels of the Gaussian filter share subpixels, and their noise, which is correlated,
+would pass the denoiser.
 
 ::
 
@@ -28,13 +28,17 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
+import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.arrays import image, lanes, to_float, to_half
 from enfilade.camera.pinhole import Camera
 from enfilade.errors import InputError
 from enfilade.files import write_json
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
+from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.methods.denoise import denoise, denoiser_name
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
 from enfilade.records import F32, Flow
@@ -45,7 +49,6 @@ from studies.bench.windows import Window
 
 SUBPIXELS = 4  # along each axis
 BATCH = 256  # paths a pixel of a half that are traced together, with random numbers of their own
-SHARED_SPP = 12  # paths a subpixel in a batch, of 16, that the Gaussian filter uses
 SEED = 0x9E3779B9  # of the first batch; the next ones follow
 REACH = int(GAUSSIAN_RADIUS_PX * SUBPIXELS) - SUBPIXELS // 2  # subpixels of the filter beyond the pixel
 FILTERS = (SampleFilter.BOX, SampleFilter.GAUSSIAN)
@@ -61,12 +64,15 @@ class ReferenceFrame:
         Paths a pixel of both halves together.
     halves : mapping of SampleFilter to (2, K, S, S, 3) float32
         Linear radiance of each half in K windows of S x S pixels.
+    denoised : mapping of SampleFilter to (3, K, S, S, 3) float32
+        The same of both halves and of their mean, denoised.
     flows : list of Flow
         Motion vectors of each window.
     """
 
     spp: int
     halves: dict[SampleFilter, F32]
+    denoised: dict[SampleFilter, F32]
     flows: list[Flow]
 
 
@@ -93,7 +99,7 @@ class References:
             "max_depth": depth,
             "subpixels": SUBPIXELS,
             "batch": BATCH,
-            "shared_spp": SHARED_SPP,
+            "denoiser": denoiser_name(),
         }
         self._identity |= {} if seed == SEED else {"seed": seed}
         self._job, self._windows, self._seed = job, windows, seed
@@ -122,17 +128,13 @@ class References:
         missing = self.missing(spp)
         for done, frame in enumerate(missing):
             monitor.progress("references", done, len(missing))
-            before = self.read(frame) if self._file(frame).is_file() else None
-            batches = range((before.spp if before else 0) // (2 * BATCH), math.ceil(spp / (2 * BATCH)))
-            halves = {kind: 0.0 if before is None else before.halves[kind] for kind in FILTERS}
+            fine, before = self._fine(frame)
+            batches = range(before // (2 * BATCH), math.ceil(spp / (2 * BATCH)))
             for batch in batches:
-                fresh = [self._traced(walk, frame, 2 * batch + half) for half in (0, 1)]
-                for kind in FILTERS:
-                    more = np.stack([images[kind] for images in fresh])
-                    mean = halves[kind] + (more - halves[kind]) / np.float32(batch + 1)
-                    halves[kind] = mean.astype(np.float32)
+                fresh = np.stack([self._traced(walk, frame, 2 * batch + half) for half in (0, 1)])
+                fine = to_half(to_float(fine) + (fresh - to_float(fine)) / np.float32(batch + 1))
             if self.spp(frame) < 2 * BATCH * batches.stop:  # another bench may have grown it further
-                self._write(walk, frame, 2 * BATCH * batches.stop, halves)
+                self._write(walk, frame, 2 * BATCH * batches.stop, fine)
         monitor.progress("references", len(missing), len(missing))
 
     def read(self, frame: int) -> ReferenceFrame:
@@ -149,6 +151,7 @@ class References:
             return ReferenceFrame(
                 spp=int(arrays["spp"]),
                 halves={kind: arrays[kind.value] for kind in FILTERS},
+                denoised={kind: arrays[f"denoised_{kind.value}"] for kind in FILTERS},
                 flows=[Flow(backward, forward, *has) for backward, forward in pairs],
             )
 
@@ -161,57 +164,67 @@ class References:
         }
         return self.folder / f"{_digest(key)}.npz"
 
-    def _traced(self, walk: Walkthrough, frame: int, batch: int) -> dict[SampleFilter, F32]:
-        """One batch of a frame's windows by both filters, (K, S, S, 3)."""
-        camera = walk.path.cameras[frame]
-        fine = replace(camera, width=camera.width * SUBPIXELS, height=camera.height * SUBPIXELS)
+    def _fine(self, frame: int) -> tuple[npt.NDArray[np.float16], int]:
+        """Means of the subpixels of both halves, (2, K, F, F, 3), and the paths a pixel so far."""
+        file = self._file(frame)
+        if file.is_file():
+            with _opened(file) as arrays:
+                return arrays["fine"], int(arrays["spp"])
         side = self._windows[0].side * SUBPIXELS + 2 * REACH
-        within = np.arange(side)
-        pixels = np.concatenate(
-            [
-                (within[:, None] + w.top * SUBPIXELS - REACH) * fine.width
-                + within
-                + w.left * SUBPIXELS
-                - REACH
-                for w in self._windows
-            ]
-        )
-        counts = SHARED_SPP, BATCH // SUBPIXELS**2 - SHARED_SPP
-        shared, rest = (
-            walk.renderer.trace(
-                fine,
-                pixels.ravel().astype(np.uint32),
-                RandomKey(
-                    (self._seed + 2 * batch + part) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE
-                ),
-                spp=spp,
-                pixel_filter=PixelFilter.BOX,
-            ).color.reshape(len(self._windows), side, side, 3)
-            for part, spp in enumerate(counts)
-        )
-        whole = (counts[0] * shared + counts[1] * rest) / np.float32(sum(counts))
-        found = {}
-        for kind, samples in ((SampleFilter.BOX, whole), (SampleFilter.GAUSSIAN, shared)):
-            weights = _weights(kind, self._windows[0].side)
-            image = np.einsum("ia,kabc,jb->kijc", weights, samples, weights, optimize=True)
-            found[kind] = image.astype(np.float32)
+        return np.zeros((2, len(self._windows), side, side, 3), np.float16), 0
+
+    def _subpixels(self, camera: Camera) -> tuple[Camera, npt.NDArray[np.uint32]]:
+        """A camera of subpixels, and those of the windows with the filter's reach around, (K, F, F)."""
+        fine = replace(camera, width=camera.width * SUBPIXELS, height=camera.height * SUBPIXELS)
+        within = np.arange(self._windows[0].side * SUBPIXELS + 2 * REACH) - REACH
+        rows = np.array([w.top * SUBPIXELS for w in self._windows])[:, None] + within
+        columns = np.array([w.left * SUBPIXELS for w in self._windows])[:, None] + within
+        return fine, (rows[:, :, None] * fine.width + columns[:, None, :]).astype(np.uint32)
+
+    def _traced(self, walk: Walkthrough, frame: int, batch: int) -> F32:
+        """One batch of the subpixels of a frame's windows, (K, F, F, 3)."""
+        camera, pixels = self._subpixels(walk.path.cameras[frame])
+        key = RandomKey((self._seed + batch) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE)
+        spp = BATCH // SUBPIXELS**2
+        traced = walk.renderer.trace(camera, pixels.ravel(), key, spp=spp, pixel_filter=PixelFilter.BOX)
+        return traced.color.reshape(*pixels.shape, 3)
+
+    def _denoised(self, walk: Walkthrough, frame: int, fine: F32) -> F32:
+        """The subpixels of both halves and of their mean, denoised, (3, K, F, F, 3)."""
+        camera, pixels = self._subpixels(walk.path.cameras[frame])
+        found = np.empty((3, *fine.shape[1:]), np.float32)
+        for index, window in enumerate(pixels):
+            hit = walk.renderer.surfaces(camera_rays(camera, pixel_centres(camera, lanes(window.ravel()))))
+            guides = [dr.select(hit.is_hit, of, 0) for of in (hit.albedo, hit.normal)]
+            albedo, normal = (image(of, *window.shape) for of in guides)
+            for half, noisy in enumerate((*fine[:, index], fine[:, index].mean(axis=0))):
+                found[half, index] = denoise(noisy, albedo, normal)
         return found
 
-    def _write(self, walk: Walkthrough, frame: int, spp: int, halves: dict[SampleFilter, Any]) -> None:
-        flow = walk.view(frame).flow
-        arrays = {
+    def _write(self, walk: Walkthrough, frame: int, spp: int, fine: npt.NDArray[np.float16]) -> None:
+        flow, halves = walk.view(frame).flow, to_float(fine)
+        denoised = self._denoised(walk, frame, halves)
+        arrays: dict[str, Any] = {
             "spp": np.int64(spp),
             "has_backward": np.bool_(flow.has_backward),
             "has_forward": np.bool_(flow.has_forward),
             "backward": np.stack([w.crop(flow.backward) for w in self._windows]),
             "forward": np.stack([w.crop(flow.forward) for w in self._windows]),
-            **{kind.value: image for kind, image in halves.items()},
+            "fine": fine,
+            **{kind.value: self._filtered(kind, halves) for kind in FILTERS},
+            **{f"denoised_{kind.value}": self._filtered(kind, denoised) for kind in FILTERS},
         }
         file = self._file(frame)
         beside = file.with_suffix(f".{os.getpid()}.partial")
         with beside.open("wb") as stream:
             np.savez(stream, **arrays)
         beside.replace(file)
+
+    def _filtered(self, kind: SampleFilter, fine: F32) -> F32:
+        """Pixels from subpixels, (N, K, S, S, 3)."""
+        weights = _weights(kind, self._windows[0].side)
+        found = np.einsum("ia,nkabc,jb->nkijc", weights, fine, weights, optimize=True)
+        return np.asarray(found, np.float32)
 
 
 def _weights(kind: SampleFilter, side: int) -> npt.NDArray[np.float64]:
