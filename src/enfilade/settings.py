@@ -280,9 +280,7 @@ class DecoupledSettings(Section):
     )
     lookup_keyframes: int = option(4, "Nearest keyframes that are looked up.", least=1, most=16)
     min_spp: int = option(4, "Camera rays of every pixel.", least=2, most=4096)
-    edge_spp: int = option(
-        0, "Camera rays of a pixel at an edge; 0: derived from the quality.", least=0, most=4096
-    )
+    edge_spp: int = option(128, "Most camera rays of a pixel at an edge.", least=2, most=4096)
     specular_spp: int = option(
         0, "Rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.", least=0, most=4096
     )
@@ -300,11 +298,6 @@ class DecoupledSettings(Section):
                     f"[{self.table}] {name} = 1: the noise of a single sample can't be estimated; give 2 or "
                     "more, or 0 to derive it from the quality"
                 )
-        if 0 < self.edge_spp < self.min_spp:
-            raise SettingsError(
-                f"[{self.table}] edge_spp = {self.edge_spp}: every pixel has {self.min_spp} (min_spp); "
-                "give as many or more, or 0 to derive it from the quality"
-            )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,15 @@ import pytest
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled.irradiance_cache import upload_layers
-from enfilade.methods.decoupled.lookup import MIN_TAP_WEIGHT, UploadedImage, footprint, lookup, packed
+from enfilade.methods.decoupled.lookup import (
+    MIN_TAP_WEIGHT,
+    MIN_TAPER,
+    TAPER,
+    UploadedImage,
+    footprint,
+    lookup,
+    packed,
+)
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
@@ -145,3 +153,17 @@ def kernels_of_lookup(height, width):
 def test_one_kernel_serves_images_of_all_sizes():
     """A size that were compiled into kernels would cost seconds at every new size of the frames."""
     assert kernels_of_lookup(12, 16) == kernels_of_lookup(30, 40) != []
+
+
+def test_the_weight_of_an_image_falls_towards_its_borders(wall):
+    """Points behind the pixels of the middle row: full weight in the interior, little at the border."""
+    pixels = np.stack([np.arange(WIDTH) + 0.5, np.full(WIDTH, 6.5), np.ones(WIDTH)])
+    direction = CAMERA.direction_from_pixel @ pixels
+    points = (CAMERA.eye[:, None] - direction * CAMERA.eye[2] / direction[2]).T
+    taper = np.array(found(wall, points, 1).taper)
+    reach = TAPER * WIDTH
+    expected = np.clip(
+        (np.minimum(np.arange(WIDTH), WIDTH - 1 - np.arange(WIDTH)) + 0.5) / reach, MIN_TAPER, 1
+    )
+    np.testing.assert_allclose(taper, expected, atol=1e-3)
+    assert taper.min() < 0.3

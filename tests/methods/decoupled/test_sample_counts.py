@@ -8,7 +8,7 @@ from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.sample_counts import (
     displayed_deviation,
-    edge_spp,
+    displayed_tolerance,
     irradiance_spp,
     is_outline,
     small_emitter_pixels,
@@ -39,10 +39,10 @@ def emitters(pixels, depth, shape_index):
 @pytest.mark.parametrize(
     ("jnd", "quality", "keyframes", "spp"),
     [
-        (10.0, 1.0, 2, 200),  # 4 (10 / 1)^2 / 2
-        (10.0, 1.0, 20, 44),  # over 9 accumulated images, of which half are counted: 44.4, to the next 4
-        (10.0, 5.0, 2, 8),
-        (0.0, 1.0, 2, 4),  # the fewest
+        (5.0, 1.0, 2, 100),  # 4 (5 / 1)^2
+        (10.0, 1.0, 20, 88),  # over 9 accumulated images, of which half are counted: 88.9, to the next 4
+        (10.0, 5.0, 2, 16),
+        (0.0, 1.0, 2, 8),  # the fewest
         (100.0, 1.0, 2, 256),  # the most
     ],
 )
@@ -50,13 +50,12 @@ def test_irradiance_spp_falls_with_the_square_of_the_quality(jnd, quality, keyfr
     assert irradiance_spp(jnd, quality, keyframes) == pytest.approx(spp, abs=4)
 
 
-def test_camera_and_specular_rays_follow_the_quality_or_the_settings():
-    counts = [
-        (edge_spp(s), specular_spp(s)) for s in (DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64))
-    ]
-    assert counts == [(64, 17), (64, 8), (16, 4), (8, 2)]
-    given = DecoupledSettings(edge_spp=5, specular_spp=3)
-    assert (edge_spp(given), specular_spp(given)) == (5, 3)
+def test_specular_rays_and_the_tolerance_of_edges_follow_the_quality_or_the_settings():
+    of = [DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64)]
+    assert [specular_spp(s) for s in of] == [17, 8, 4, 2]
+    assert specular_spp(DecoupledSettings(specular_spp=3)) == 3
+    tolerances = [displayed_tolerance(s.quality) for s in of]
+    np.testing.assert_allclose(tolerances, [0.006, 0.012, 0.024, 0.048])
 
 
 def test_small_emitters_are_found_between_camera_rays():
@@ -85,7 +84,7 @@ def test_occluded_emitters_and_the_interior_of_large_ones_are_left_out():
 def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
     excerpt, whole = {"irradiance": 2, "pilot": 1}, {"irradiance": 60, "pilot": 2}
     ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole)
-    expected = irradiance_spp(112.0, 10.0, 30) / irradiance_spp(112.0, 10.0, 2)
+    expected = irradiance_spp(56.0, 10.0, 30) / irradiance_spp(56.0, 10.0, 2)
     same = dict.fromkeys(("prepass", "hash_grid", "pilot"), 1.0)
     assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected}, rel=0.05)
     fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)

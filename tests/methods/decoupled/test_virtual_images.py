@@ -14,7 +14,7 @@ def test_virtual_images_of_a_mirror_lie_behind_it(tmp_path):
     )
     renderer, camera = opened_scene(tmp_path, {"ball": mirror}), front_camera()
     seen = find_geometry(renderer, camera)
-    shown = VirtualImages(renderer).reflected(seen)
+    shown, _ = VirtualImages(renderer).find(seen)
     names = renderer.describe().shapes
     is_floor = shown.shape_index == IN_VIRTUAL_IMAGE + names.index("floor") + 1
     assert is_floor.sum() > 20
@@ -33,7 +33,7 @@ def test_rough_glass_has_no_virtual_image(tmp_path):
     balls = {"rough": MATERIALS["roughdielectric"], "glass": MATERIALS["thindielectric"]}
     renderer, camera = opened_scene(tmp_path, balls), front_camera()
     seen = find_geometry(renderer, camera)
-    shown = VirtualImages(renderer).reflected(seen)
+    shown, _ = VirtualImages(renderer).find(seen)
     rough, glass = (seen.shape_index == renderer.describe().shapes.index(name) + 1 for name in balls)
     assert rough.sum() > 20
     np.testing.assert_array_equal(shown.shape_index[rough], seen.shape_index[rough])
@@ -48,7 +48,7 @@ def test_surfaces_behind_a_pane_keep_their_positions(tmp_path):
     seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
     where = seen.shape_index == renderer.describe().shapes.index("front") + 1
     assert where.sum() > 50
-    through, mirrored = images.transmitted(seen), images.reflected(seen)
+    mirrored, through = images.find(seen)
     np.testing.assert_allclose(positions(through)[where], positions(behind)[where], atol=2e-3)
     names = renderer.describe().shapes
     assert set(through.shape_index[where]) == {

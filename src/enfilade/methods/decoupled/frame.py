@@ -9,7 +9,6 @@ from enfilade.arrays import to_float, to_half
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
-from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
@@ -17,10 +16,9 @@ from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
 from enfilade.methods.decoupled.sample_counts import (
-    EDGE_CONTRAST,
-    UNCERTAIN_FACTORS,
+    EDGE_SPP,
     displayed_deviation,
-    edge_spp,
+    displayed_tolerance,
     is_outline,
     small_emitter_pixels,
     specular_spp,
@@ -140,13 +138,7 @@ class Frames:
 
     def _virtual_geometry(self, shot: ShotContext, frame: int, count: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its first AOVs."""
-
-        def make() -> list[Geometry]:
-            geometry = shot.walk.view(frame).geometry
-            images = shot.virtual_images
-            return [image(geometry) for image in (images.reflected, images.transmitted)[:count]]
-
-        found = self._virtual.get(frame, make)
+        found = self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
         return found[:count]
 
 
@@ -168,22 +160,22 @@ def _shade_diffuse(
     )
     estimate.add(settings.min_spp)
 
-    # Add camera rays where the first ones differ, or may have missed an outline or a small emitter.
-    more = edge_spp(settings) - settings.min_spp
-    if more > 0:
-        geometry, shading = walk.view(frame).geometry, estimate.shading
-        contrast = EDGE_CONTRAST * settings.quality
-        is_edge = np.sqrt(shading.variance) > contrast * luminance(shading.color)
-        is_edge = is_edge.reshape(camera.height, camera.width)
-        is_edge |= small_emitter_pixels(shot.renderer.emitters, geometry)
-        estimate.add(more, (_dilated(is_edge) | is_outline(geometry)).ravel())
+    # Add camera rays at edges, and in turn where the displayed value is uncertain still: there, and beside
+    # it, since rays easily miss a bright surface that is a small part of a pixel.
+    geometry, exposure_ev = walk.view(frame).geometry, walk.settings[ViewingSettings].exposure_ev
+    tolerance = displayed_tolerance(settings.quality)
 
-        # Add more where the displayed value is uncertain still: a bar before a bright sky.
-        exposure_ev = walk.settings[ViewingSettings].exposure_ev
-        for factor in UNCERTAIN_FACTORS:
-            is_uncertain = displayed_deviation(estimate.shading, exposure_ev) > contrast
-            if is_uncertain.any():
-                estimate.add(factor * edge_spp(settings), is_uncertain)
+    def is_uncertain() -> Mask:
+        deviation = displayed_deviation(estimate.shading, exposure_ev)
+        return deviation.reshape(geometry.shape_index.shape) > tolerance
+
+    emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
+    where, count = is_outline(geometry) | _dilated(is_uncertain() | emitters), settings.min_spp
+    while count < settings.edge_spp and where.any():
+        more = min(max(count, EDGE_SPP - count), settings.edge_spp - count)
+        estimate.add(more, where.ravel())
+        count += more
+        where = _dilated(where & is_uncertain())
     return estimate
 
 

@@ -8,20 +8,20 @@ With an empty cache, diffuse plus specular radiance converges to that of a path 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Array4f, Bool, UInt, opaque, rows
+from enfilade.arrays import PCG32, Array3f, Array4f, Bool, Float, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import padded, recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
 from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.paths import Path, compact, scatter_add, spawn
+from enfilade.methods.decoupled.paths import Path, compact, joined, scatter_add, spawn
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, Rays, ShadingPoint
 
@@ -36,6 +36,7 @@ ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
+ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
 
 OnMiss = Callable[[Entries], None]
 
@@ -62,6 +63,46 @@ class _Vertex:
     has_specular: Any
     path: Path
     query: CacheQuery
+
+
+@dataclass(frozen=True)
+class _Missed:
+    """Vertices whose irradiance the first lookup did not find, as lanes; padding needs none.
+
+    Attributes
+    ----------
+    path
+        That ends at the vertex.
+    query
+    jitter : Float
+        Of lookups in the hash grid, in widths of an entry.
+    """
+
+    path: Path
+    query: CacheQuery
+    jitter: Any
+
+
+@dataclass(frozen=True)
+class _Deferred:
+    """What is left to estimate when all paths are extended: all together, in few launches.
+
+    Each list has parts in which a lane occurs at most once.
+    """
+
+    missed: list[_Missed] = field(default_factory=list)
+    ends: list[Path] = field(default_factory=list)
+
+    def add_missed(self, vertex: _Vertex, jitter: float = 0.0) -> None:
+        """Add the vertices that miss the cache."""
+        missing: Any = dr.compress(vertex.is_miss)
+        if dr.width(missing):
+            lanes, is_real = padded(missing)
+            query = dr.gather(CacheQuery, vertex.query, lanes)
+            query = replace(query, weight=dr.select(is_real, query.weight, 0.0))
+            missed = _Missed(compact(vertex.path, missing), query, dr.full(Float, jitter, dr.width(lanes)))
+            dr.eval(missed)
+            self.missed.append(missed)
 
 
 class Integrator:
@@ -118,8 +159,9 @@ class Integrator:
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
         vertex = self._see(reprojected, spawn(rays, rng, ENTRY_PX * pixel_angle))
-        radiance = Array3f(vertex.radiance)
-        self._add_missed(radiance, cache, vertex, jitter=1.0, is_queried=False)
+        radiance, deferred = Array3f(vertex.radiance), _Deferred()
+        deferred.add_missed(vertex, jitter=1.0)
+        self._add_missed(radiance, cache, deferred)
         return Samples((radiance,), vertex.has_specular)
 
     def specular_radiance(
@@ -156,8 +198,9 @@ class Integrator:
         """
         count = dr.width(rng.state)
         radiance = dr.zeros(Array3f, SPECULAR_AOVS * count)  # one AOV after the other
-        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
-        self._trace_specular(radiance, cache, path, 0, on_miss, qmc_point, transmitted_at=count)
+        path, deferred = spawn(rays, rng, ENTRY_PX * pixel_angle), _Deferred()
+        self._trace_specular(radiance, cache, path, 0, deferred, qmc_point, transmitted_at=count)
+        self._finish(radiance, cache, deferred, on_miss)
         lane = dr.arange(UInt, count)
         return Samples(
             tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
@@ -192,9 +235,11 @@ class Integrator:
         direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), qmc_point)
         # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
         indirect = Array3f(vertex.radiance) if cache.images else dr.zeros(Array3f, dr.width(rng.state))
-        self._add_missed(indirect, cache, vertex, on_miss=on_miss)
+        deferred = _Deferred()
+        deferred.add_missed(vertex)
         onward = compact(vertex.path, dr.compress(vertex.has_specular))
-        self._trace_specular(indirect, cache, onward, 1, on_miss)
+        self._trace_specular(indirect, cache, onward, 1, deferred)
+        self._finish(indirect, cache, deferred, on_miss)
         return Samples((direct, indirect))
 
     def _trace_specular(
@@ -203,7 +248,7 @@ class Integrator:
         cache: IrradianceCache,
         path: Path,
         bounces: int,
-        on_miss: OnMiss | None,
+        deferred: _Deferred,
         qmc_point: Any = None,
         transmitted_at: int = 0,
     ) -> None:
@@ -216,7 +261,8 @@ class Integrator:
         path
         bounces
             Made so far.
-        on_miss
+        deferred
+            Receives what is left to estimate.
         qmc_point
             Of the first bounce, by lane; None: pseudorandom.
         transmitted_at
@@ -225,7 +271,7 @@ class Integrator:
         if not dr.width(path.lane):
             return
         if bounces == MAX_BOUNCES:
-            scatter_add(radiance, self._terminate(path), path.lane)
+            deferred.ends.append(path)
             return
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
         # The first bounce off the visible surface always survives; Russian roulette begins with the second.
@@ -239,64 +285,61 @@ class Integrator:
             direct, is_split, vertex = extend(cache, path, opaque(survival), first, opaque(transmitted_at))
             scatter_add(radiance, direct, path.lane)
             scatter_add(radiance, vertex.radiance, vertex.path.lane)
-            self._add_missed(radiance, cache, vertex, jitter=jitter, on_miss=on_miss)
+            deferred.add_missed(vertex, jitter)
 
             # Follow the paths that meet another specular lobe, then the other branch of clear interfaces.
             onward = compact(vertex.path, dr.compress(vertex.has_specular & vertex.path.is_active))
-            self._trace_specular(radiance, cache, onward, bounces + 1, on_miss, None, transmitted_at)
+            self._trace_specular(radiance, cache, onward, bounces + 1, deferred, None, transmitted_at)
             path = compact(path, dr.compress(is_split))
             if not dr.width(path.lane):
                 break
 
-    def _add_missed(
-        self,
-        radiance: Any,
-        cache: IrradianceCache,
-        vertex: _Vertex,
-        *,
-        jitter: float = 0.0,
-        is_queried: bool = True,
-        on_miss: OnMiss | None = None,
+    def _finish(
+        self, radiance: Any, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None
     ) -> None:
-        """Add the diffuse reflection at vertices whose irradiance was not found: query further, or estimate.
+        """Add what was deferred, after a lookup in the images of the cache."""
+        self._add_missed(radiance, IrradianceCache(hash_grid=cache.hash_grid), deferred, on_miss)
+        if deferred.ends:
+            ends = joined(deferred.ends)
+            dr.eval(ends)
+            _add_parts(radiance, self._terminate(ends), ends.lane, [dr.width(p.lane) for p in deferred.ends])
+
+    def _add_missed(
+        self, radiance: Any, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
+    ) -> None:
+        """Add the diffuse reflection where no irradiance was found: from the rest of the cache, or estimated.
 
         Parameters
         ----------
         radiance
         cache
-        vertex
-        jitter
-            Of lookups in the hash grid, in widths of an entry.
-        is_queried
-            Whether the images of the cache were queried already.
+            What was not queried yet.
+        deferred
         on_miss
         """
-        path = vertex.path
-        missing: Any = dr.compress(vertex.is_miss)
-
-        # Query the rest of the cache.
-        further = IrradianceCache(hash_grid=cache.hash_grid) if is_queried else cache
-        if (further.images or further.hash_grid) and dr.width(missing):
-            lanes, is_real = padded(missing)
-            query, rng = dr.gather(CacheQuery, vertex.query, lanes), dr.gather(PCG32, path.rng, lanes)
-            dr.eval(query, rng)
-            found, is_miss = self._query_further(further, query, rng, opaque(jitter))
-            scatter_add(radiance, dr.select(is_real, found, 0.0), dr.gather(UInt, path.lane, lanes))
-            still: Any = dr.compress(is_miss & is_real)
-            missing = dr.gather(UInt, lanes, still)
-        if not dr.width(missing):
+        if not deferred.missed:
             return
+        missed = joined(deferred.missed)
+        dr.eval(missed)
+        widths = [dr.width(part.jitter) for part in deferred.missed]
+        is_miss = missed.query.is_needed
+
+        # Query the cache.
+        if cache.images or cache.hash_grid:
+            found, is_miss = self._query_further(cache, missed.query, missed.path.rng, missed.jitter)
+            _add_parts(radiance, found, missed.path.lane, widths)
 
         # Path trace what is still missing.
-        unknown = compact(path, missing)
-        weight, irradiance, keys, rng = self._estimate(unknown)
-        scatter_add(radiance, weight * irradiance, unknown.lane)
+        missing: Any = dr.compress(is_miss)
+        if not dr.width(missing):
+            return
+        unknown = compact(missed.path, missing)
+        weight, irradiance, keys = self._estimate(unknown)
+        bounds = np.searchsorted(np.array(missing), np.cumsum(widths)[:-1])
+        widths = np.diff(bounds, prepend=0, append=dr.width(unknown.lane)).tolist()
+        _add_parts(radiance, weight * irradiance, unknown.lane, widths)
         if on_miss:
             _report(on_miss, keys, irradiance, dr.width(missing))
-
-        # Advance the generators of these paths, whose numbers the estimates have used.
-        lanes, is_real = padded(missing)
-        dr.scatter(path.rng.state, rng.state, lanes, is_real)
 
     def _see_kernel(self, cache: IrradianceCache, path: Path) -> _Vertex:
         """Camera rays: intersect, and query the cache."""
@@ -397,20 +440,21 @@ class Integrator:
         emitted, vertex = self._intersect(cache, extended, soft_only=True)
         return Array3f(sample.direct + emitted), vertex
 
-    def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...], Any]:
+    def _estimate_kernel(self, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
         Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
         a finite ``--max-depth`` does not cut it shorter behind several mirrors.
         """
         rng = PCG32(path.rng)
+        rng.state ^= ESTIMATE_SALT
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         width = path.width_at(point)
         direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
         irradiance = Array3f(direct + indirect)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
         keys = tuple(entry_key(*at, level) for level in range(LEVELS))
-        return Array3f(path.throughput * point.surfaces.albedo), irradiance, keys, rng
+        return Array3f(path.throughput * point.surfaces.albedo), irradiance, keys
 
     def _terminate_kernel(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
@@ -418,6 +462,15 @@ class Integrator:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
+
+
+def _add_parts(radiance: Any, contribution: Any, lane: Any, widths: list[int]) -> None:
+    """Add contributions to lanes; within each of the consecutive parts a lane occurs at most once."""
+    start = 0
+    for width in filter(None, widths):
+        part = dr.arange(UInt, width) + opaque(start)
+        scatter_add(radiance, dr.gather(Array3f, contribution, part), dr.gather(UInt, lane, part))
+        start += width
 
 
 def _report(on_miss: OnMiss, keys: tuple[Any, ...], irradiance: Any, count: int) -> None:

@@ -270,10 +270,10 @@ def _averaged(
     weight, valid = Float(0), Float(0)
     dr.eval(position, own)
     for one, given in zip(images, weights, strict=True):
-        # Look up the image; coarser ones weigh less.
+        # Look up the image; coarser ones weigh less, as do all at their borders.
         found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
         its = footprint(position, normal, one.eye, one.direction_from_pixel)
-        image_weight = opaque(float(given)) * dr.minimum(own / its, 1.0)
+        image_weight = opaque(float(given)) * found.taper * dr.minimum(own / its, 1.0)
 
         # Accumulate its layers.
         for layer in layers:

@@ -12,6 +12,8 @@ from enfilade.kernels.bilinear import taps_around
 
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
+TAPER = 0.125  # of an image's width or height, over which its weight falls towards its borders
+MIN_TAPER = 0.02  # of an image's weight at its borders, where it may be the only one that shows a surface
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,15 @@ class Found:
         Weighted sums of the variances.
     weight : Float
         Sum of the weights; 0 where the surface is not in the image, at most about one.
+    taper : Float
+        Falls from 1 to nearly 0 towards the borders of the image: where images are averaged with this
+        weight, there is no seam at the border of one.
     """
 
     totals: tuple[Any, ...]
     variances: tuple[Any, ...]
     weight: Any
+    taper: Any
 
 
 def lookup(
@@ -94,6 +100,9 @@ def lookup(
     x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
     right, bottom = Float(image.width) - 0.5, Float(image.height) - 0.5
     is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < right) & (y < bottom)
+    across = dr.minimum(x + 0.5, right - x) / (TAPER * Float(image.width))
+    down = dr.minimum(y + 0.5, bottom - y) / (TAPER * Float(image.height))
+    taper = dr.clip(dr.minimum(across, down), MIN_TAPER, 1.0)
 
     # Prepare the distance of a pixel's point from the tangent plane: offset + depth * (slope . pixel).
     scale = dr.rcp(dr.norm(normal))
@@ -122,7 +131,7 @@ def lookup(
             totals[layer] += of_tap * dr.gather(Array3f, value, tap.lane, is_same)
             variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)
         weight += of_tap
-    return Found(tuple(totals), tuple(variances), weight)
+    return Found(tuple(totals), tuple(variances), weight, taper)
 
 
 def packed(normal: Any) -> Any:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import PCG32, Array3f, Float, UInt
+from enfilade.arrays import PCG32, Array3f, Float, UInt, opaque
 from enfilade.kernels.replay import padded
 from enfilade.renderer import Bounce, Rays, ShadingPoint
 
-__all__ = ["Path", "compact", "scatter_add", "spawn"]
+__all__ = ["Path", "compact", "joined", "scatter_add", "spawn"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,28 @@ def compact(path: Path, lanes: Any) -> Path:
     )
     dr.eval(taken)
     return taken
+
+
+def joined(parts: Sequence[Any]) -> Any:
+    """The lanes of several trees of arrays, one after the other."""
+    first: Any = parts[0]
+    if len(parts) == 1 or first is None:
+        return first
+    if isinstance(first, tuple):
+        return tuple(joined(of) for of in zip(*parts, strict=True))
+    if isinstance(first, PCG32):
+        found = PCG32(first)
+        found.state, found.inc = joined([p.state for p in parts]), joined([p.inc for p in parts])
+        return found
+    if is_dataclass(first):
+        kind: Any = type(first)
+        return kind(*(joined([getattr(p, f.name) for p in parts]) for f in fields(first)))
+    # `drjit.concat` does not take masks.
+    whole, start = dr.empty(type(first), sum(map(dr.width, parts))), 0
+    for part in parts:
+        dr.scatter(whole, part, dr.arange(UInt, dr.width(part)) + opaque(start))
+        start += dr.width(part)
+    return whole
 
 
 def scatter_add(radiance: Any, contribution: Any, lane: Any) -> None:

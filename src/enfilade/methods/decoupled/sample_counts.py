@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,31 +18,14 @@ from enfilade.renderer import Emitters, Purpose
 from enfilade.settings import DecoupledSettings
 
 PILOT_SPP = 4  # of each of the two images that the pilot compares
-IRRADIANCE_SPP = 4, 256  # fewest and most
+IRRADIANCE_SPP = 8, 256  # fewest and most
+IRRADIANCE_SHARE = 0.5  # of the squared quality that the noise of irradiance may take
 MIN_DIFFUSE = 0.5  # of the largest number of diffuse pixels of a keyframe: the pilot uses none with fewer
-EDGE_CONTRAST = 0.003  # per JND of quality: relative deviation above which a pixel has more camera rays
-UNCERTAIN_FACTORS = (
-    1,
-    2,
-)  # times the camera rays of an edge, added in turn while a displayed value is uncertain
+EDGE_SPP = 16  # camera rays of a pixel at an edge; their number doubles while its value is uncertain
+DISPLAYED_DEVIATION = 0.006  # above which a displayed value is uncertain, by the root of the quality
+SPECULAR_SPP = 17.0, 2, 34  # of a pixel with specular lobes, by the root of the quality; fewest and most
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 FFT_THREADS = 2
-
-
-class SppRange(NamedTuple):
-    """Samples per pixel as a function of the quality, between bounds."""
-
-    at_one_jnd: float
-    least: int
-    most: int
-
-    def at(self, quality: float) -> int:
-        """Samples per pixel, in inverse proportion to the quality, JND."""
-        return min(max(round(self.at_one_jnd / quality), self.least), self.most)
-
-
-EDGE_SPP = SppRange(256.0, least=8, most=64)  # of a pixel at an edge
-SPECULAR_SPP = SppRange(17.0, least=2, most=34)  # of a pixel with specular lobes, by the root of the quality
 
 
 def run_pilot(shot: ShotContext) -> Output:
@@ -70,7 +52,7 @@ def irradiance_spp(jnd: float, quality: float, keyframes: int) -> int:
         Of the shot.
     """
     # Each image has half of the squared difference. Accumulation divides it by the number of images.
-    spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * averaged_images(keyframes))
+    spp = PILOT_SPP * (jnd / quality) ** 2 / (2.0 * averaged_images(keyframes) * IRRADIANCE_SHARE)
     return int(np.clip(4 * math.ceil(spp / 4), *IRRADIANCE_SPP))
 
 
@@ -87,14 +69,15 @@ def averaged_images(keyframes: float) -> float:
     return max(min(keyframes, 2 * ACCUMULATED + 1) / 2.0, 1.0)
 
 
-def edge_spp(settings: DecoupledSettings) -> int:
-    """Camera rays of a pixel at an edge."""
-    return settings.edge_spp or EDGE_SPP.at(settings.quality)
-
-
 def specular_spp(settings: DecoupledSettings) -> int:
     """Rays of a pixel with specular lobes."""
-    return settings.specular_spp or SPECULAR_SPP.at(math.sqrt(settings.quality))
+    at_one, least, most = SPECULAR_SPP
+    return settings.specular_spp or min(max(round(at_one / math.sqrt(settings.quality)), least), most)
+
+
+def displayed_tolerance(quality: float) -> float:
+    """Standard deviation of a displayed value, 0..1, above which its pixel has more camera rays."""
+    return DISPLAYED_DEVIATION * math.sqrt(quality)
 
 
 def is_outline(geometry: Geometry) -> Mask:

@@ -5,7 +5,6 @@ Reprojecting them gives motion vectors of reflections and transmissions (Zimmer 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +12,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, lanes, opaque, rows
+from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, lanes, rows
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.replay import recorded
@@ -24,8 +23,8 @@ from enfilade.renderer import LobeRenderer
 __all__ = ["IN_VIRTUAL_IMAGE", "VirtualImages"]
 
 IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mirrors or through glass
-CLEAR = (SurfaceClass.TRANSPARENT,)
-SHARP = (SurfaceClass.MIRROR, *CLEAR)
+CLEAR = SurfaceClass.TRANSPARENT
+SHARP = (SurfaceClass.MIRROR, CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
 REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the reflecting or transmitting lobe
 MAX_INTERFACES = 8  # mirrors and panes along a path
@@ -43,56 +42,62 @@ class VirtualImages:
         self._renderer = renderer
         self._extend = recorded(self._extend_kernel, lambda: renderer.state)
 
-    def reflected(self, geometry: Geometry) -> Geometry:
-        """The G-buffer of a frame with the virtual images of reflections in mirrors and panes.
+    def find(self, geometry: Geometry) -> list[Geometry]:
+        """G-buffers of a frame with its virtual images: of reflections, and of what is seen through panes.
 
-        Pixels of mirrors and panes have the shape index (plus :data:`IN_VIRTUAL_IMAGE`) and normal of the
-        surface at the end of the path, and the depth of its virtual image: the length of the whole path,
-        which is exact for plane mirrors. All other pixels stay.
+        In the first, pixels of mirrors and panes have the shape index (plus :data:`IN_VIRTUAL_IMAGE`) and
+        normal of the surface at the end of the path, and the depth of its virtual image: the length of the
+        whole path, which is exact for plane mirrors. In the second these are of panes alone, and of the
+        surfaces behind them. All other pixels stay.
         """
-        return self._image(geometry, SHARP, REFLECT)
-
-    def transmitted(self, geometry: Geometry) -> Geometry:
-        """The G-buffer of a frame with the virtual images of surfaces behind panes; see :meth:`reflected`."""
-        return self._image(geometry, CLEAR, TRANSMIT)
-
-    def _image(self, geometry: Geometry, kinds: Sequence[SurfaceClass], choice: float) -> Geometry:
-        # Spawn a path at each mirror and pane.
-        pixels = np.flatnonzero(np.isin(geometry.surface, kinds)).astype(np.uint32)
-        if not len(pixels):
-            return geometry
-        shape_index, normal = geometry.shape_index.ravel().copy(), geometry.normal.reshape(-1, 3).copy()
-        rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
-        path = spawn(rays, PCG32(len(pixels)), spread=0.0)
+        # Spawn a path at each mirror and pane, and another one at each pane: lanes of the second image.
+        count = geometry.shape_index.size
+        surface = geometry.surface.ravel()
+        lane = np.flatnonzero(np.concatenate([np.isin(surface, SHARP), surface == CLEAR])).astype(np.uint32)
+        if not len(lane):
+            return [geometry, geometry]
+        shape_index = np.tile(geometry.shape_index.ravel(), 2)
+        normal = np.tile(geometry.normal.reshape(-1, 3), (2, 1))
+        rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(lane % count)))
+        path = spawn(rays, PCG32(len(lane)), spread=0.0)
         path = compact(path, path.lane)
-        length = np.ones(len(shape_index), np.float32)  # of the path, in distances of the first surface
-        first = geometry.depth.ravel() * _lengths(geometry.camera)
-        count = len(pixels)  # of paths, without the padding at the end
+        choice = Float(dr.select(dr.gather(UInt, lanes(lane), path.lane) < count, REFLECT, TRANSMIT))
+        length = np.ones(2 * count, np.float32)  # of the path, in distances of the first surface
+        first = np.tile(geometry.depth.ravel() * _lengths(geometry.camera), 2)
+        paths = len(lane)  # without the padding at the end
         for _ in range(MAX_INTERFACES):
-            path, next_shape, next_normal, distance, is_image, is_sharp = self._extend(path, opaque(choice))
-            choice = TRANSMIT  # a pane seen in a mirror shows the surface behind it
+            dr.eval(choice)
+            path, next_shape, next_normal, distance, is_image, is_sharp = self._extend(path, choice)
 
             # Replace the surface by the next one where the interface forms an image; rough glass forms none.
-            shown = np.array(is_image)[:count]
-            lane = pixels[np.array(path.lane)[:count][shown]]
-            shape_index[lane] = np.array(next_shape)[:count][shown] + IN_VIRTUAL_IMAGE
-            normal[lane] = rows(next_normal)[:count][shown]
-            added = np.array(distance)[:count][shown] / first[lane]
-            length[lane] = np.minimum(length[lane] + added, SKY_DISTANCE)
+            shown = np.array(is_image)[:paths]
+            at = lane[np.array(path.lane)[:paths][shown]]
+            shape_index[at] = np.array(next_shape)[:paths][shown] + IN_VIRTUAL_IMAGE
+            normal[at] = rows(next_normal)[:paths][shown]
+            added = np.array(distance)[:paths][shown] / first[at]
+            length[at] = np.minimum(length[at] + added, SKY_DISTANCE)
 
             # Keep the paths whose next surface is another interface.
             onward: Any = dr.compress(is_sharp)
-            count = dr.width(onward)
-            if not count:
+            paths = dr.width(onward)
+            if not paths:
                 break
             path = compact(path, onward)
+            # A pane seen in a mirror shows the surface behind it.
+            choice = dr.full(Float, TRANSMIT, dr.width(path.lane))
         size = geometry.shape_index.shape
-        return replace(
-            geometry,
-            depth=geometry.depth * length.reshape(size),
-            shape_index=shape_index.reshape(size),
-            normal=np.ascontiguousarray(normal.reshape(*size, 3)),
+        images = zip(
+            length.reshape(2, *size), shape_index.reshape(2, *size), normal.reshape(2, *size, 3), strict=True
         )
+        return [
+            replace(
+                geometry,
+                depth=geometry.depth * lengths,
+                shape_index=indices,
+                normal=np.ascontiguousarray(normals),
+            )
+            for lengths, indices, normals in images
+        ]
 
     def _extend_kernel(self, path: Path, choice: Any) -> tuple[Path, Any, Any, Any, Any, Any]:
         """Reflect or transmit paths at the next surface, and intersect the following one.
