@@ -145,6 +145,7 @@ def test_a_worker_that_can_not_be_started(tmp_path, opened, monkeypatch):
 
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGINT])
 def test_workers_end_with_their_command(tmp_path, whole, blow):
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs inherit SIG_IGN
     order(tmp_path, light_3="hang")
     with subprocess.Popen(command(tmp_path, "processes", 1), env=environment()) as process:  # noqa: S603
         wait_for((tmp_path / "attempts" / "light-3").exists)
