@@ -2,10 +2,19 @@
 
 import numpy as np
 import pytest
+from scipy.stats import sem
 
 from enfilade.arrays import Array3f, Float, UInt
+from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import hash_grid as module
-from enfilade.methods.decoupled.hash_grid import LEVELS, MIN_SAMPLES, Entries, entry_key
+from enfilade.methods.decoupled.hash_grid import (
+    LEVELS,
+    MIN_SAMPLES,
+    RELIABLE_ERROR,
+    RELIABLE_SAMPLES,
+    Entries,
+    entry_key,
+)
 
 UP = np.float32([[0.0, 0.0, 1.0]])
 
@@ -93,23 +102,31 @@ def test_keys_are_spread_evenly():
     assert np.abs(np.corrcoef(bits.T) - np.eye(64)).max() < limit
 
 
-def test_lookup_finds_the_mean_of_the_smallest_entry():
-    points, normals = random_points(2000)
-    light = np.abs(points)
-    parts = [Entries.of(keys(points, normals, 0.7, level), light) for level in range(LEVELS)]
+def test_lookup_finds_the_mean_of_the_smallest_reliable_entry_or_of_the_largest():
+    points, normals = random_points(4000)
+    points[:3500] *= 0.25  # dense
+    points[3900:] *= 10.0  # with few samples at every level
+    light = np.abs(points) + 3.0 * (np.random.default_rng(1).random((4000, 1)) < 0.1)
+    parts = [Entries.of(keys(points, normals, 1.2, level), light) for level in range(LEVELS)]
     whole = Entries.joined([*parts, *parts])  # twice, in any order
     mean = whole.sums / whole.counts[:, None]
-    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(0.7)
+    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(1.2)
     found, is_hit = (np.array(v) for v in whole.upload().lookup(*at, Array3f(0.5)))
-    enough = dict(zip(whole.keys, whole.counts >= MIN_SAMPLES, strict=True))
-    place = {key: i for i, key in enumerate(whole.keys)}
-    by_level = [keys(points, normals, 0.7, level) for level in range(LEVELS)]
+    by_level = [keys(points, normals, 1.2, level) for level in range(LEVELS)]
+    used = []
     for i in range(len(points)):
-        first = next((k[i] for k in by_level if enough[k[i]]), None)
-        assert is_hit[i] == (first is not None)
-        if first is not None:
-            np.testing.assert_allclose(found[:, i], mean[place[first]], rtol=1e-5)
-    assert 0.1 < is_hit.mean() < 1.0
+        best = None
+        for level, key in enumerate(k[i] for k in by_level):
+            twice = np.tile(light[by_level[level] == key] @ REC709_LUMINANCE, 2)
+            if len(twice) >= MIN_SAMPLES:
+                best = level, key
+                if len(twice) >= RELIABLE_SAMPLES and sem(twice) <= RELIABLE_ERROR * twice.mean():
+                    break
+        assert is_hit[i] == (best is not None)
+        if best is not None:
+            np.testing.assert_allclose(found[:, i], mean[whole.keys == best[1]][0], rtol=1e-5)
+        used.append(-1 if best is None else best[0])
+    assert np.bincount(np.array(used) + 1, minlength=LEVELS + 1).min() > 20
 
 
 def test_lookup_of_points_without_an_entry_misses():

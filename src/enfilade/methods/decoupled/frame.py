@@ -10,24 +10,30 @@ from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.edges import (
+    SPECULAR_DEVIATION,
+    EdgeRays,
+    dilated,
+    is_outline,
+    small_emitter_pixels,
+)
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
-from enfilade.methods.decoupled.sample_counts import (
-    EDGE_SPP,
-    displayed_deviation,
-    displayed_tolerance,
-    is_outline,
-    small_emitter_pixels,
-    specular_spp,
-)
+from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.specular import accumulate_temporally, filter_spatially, upload_aov
+from enfilade.methods.decoupled.specular import (
+    accumulate_temporally,
+    filter_spatially,
+    upload_aov,
+    with_unfiltered,
+)
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings, ViewingSettings
+from enfilade.settings import LimitSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 
@@ -50,7 +56,7 @@ class Frames:
         # Trace camera rays, then specular rays where they meet specular lobes.
         reprojected, cache = shot.shading_caches(frame)
         diffuse = _shade_diffuse(shot, frame, reprojected, cache)
-        where = _dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
+        where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         aovs, specular = self._shade_specular(shot, frame, cache, where)
 
         # Store the AOVs, and count the rays.
@@ -90,9 +96,9 @@ class Frames:
 
         def make() -> list[UploadedImage]:
             shaded = self._record(shot, frame)
-            where = _dilated(shaded.provenance == Provenance.SPECULAR)
-            virtual = self._virtual_geometry(shot, frame, len(shaded.specular))
-            return [upload_aov(g, aov, where) for g, aov in zip(virtual, shaded.specular, strict=True)]
+            where = dilated(shaded.provenance == Provenance.SPECULAR)
+            aovs = zip(self._virtual_geometry(shot, frame), shaded.specular, strict=False)
+            return [upload_aov(geometry, aov, where) for geometry, aov in aovs]
 
         return self._uploaded.get(frame, make)
 
@@ -106,8 +112,9 @@ class Frames:
     ) -> tuple[list[SpecularAov], Estimate | None]:
         """Specular AOVs, filtered spatially, without an empty transmission; and their estimate, if any.
 
-        All pixels have the same number of rays: a second pass for those with remaining noise would cost as
-        much as half as many more for all.
+        Edges that are seen in mirrors and panes have more rays, and are not filtered. All other pixels have
+        the same number: a second pass for those with remaining noise would cost as much as half as many more
+        for all.
         """
         if not where.any():
             black = np.zeros((*where.shape, 3), np.float16)
@@ -128,18 +135,27 @@ class Frames:
             layers=SPECULAR_AOVS,
             is_stratified=True,
         )
-        estimate.add(specular_spp(shot.settings))
+        spp = specular_spp(shot.settings)
+        estimate.add(spp)
+        coarse = [shading.to_image(where) for shading in estimate.shadings]
 
-        # Filter the AOVs along the surfaces that are seen in them.
-        reflection, *more = (shading.to_image(where) for shading in estimate.shadings)
-        aovs = [reflection, *(aov for aov in more if aov.color.any())]
-        virtual = self._virtual_geometry(shot, frame, len(aovs))
-        return filter_spatially(virtual, aovs, where, shot.settings.denoiser), estimate
+        # Add rays at edges that are seen in mirrors and panes.
+        virtual = self._virtual_geometry(shot, frame)
+        is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
+        edges = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
+        rays = EdgeRays.of(walk, times=SPECULAR_DEVIATION)
+        refined = rays.refine(estimate, where, edges, is_seen_in, spp)
+        fine = [shading.to_image(where) for shading in estimate.shadings]
 
-    def _virtual_geometry(self, shot: ShotContext, frame: int, count: int) -> list[Geometry]:
-        """G-buffers of a frame with the virtual images of its first AOVs."""
-        found = self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
-        return found[:count]
+        # Filter the AOVs along the surfaces that are seen in them, with equal noise everywhere: a denoiser
+        # would keep more of the noise beside pixels that have none.
+        count = 1 + max((k for k, aov in enumerate(fine) if aov.color.any()), default=0)
+        filtered = filter_spatially(virtual[:count], coarse[:count], where, shot.settings.denoiser)
+        return [with_unfiltered(*aovs, refined) for aovs in zip(filtered, fine, strict=False)], estimate
+
+    def _virtual_geometry(self, shot: ShotContext, frame: int) -> list[Geometry]:
+        """G-buffers of a frame with the virtual images of its AOVs."""
+        return self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
 
 
 def _shade_diffuse(
@@ -160,22 +176,12 @@ def _shade_diffuse(
     )
     estimate.add(settings.min_spp)
 
-    # Add camera rays at edges, and in turn where the displayed value is uncertain still: there, and beside
-    # it, since rays easily miss a bright surface that is a small part of a pixel.
-    geometry, exposure_ev = walk.view(frame).geometry, walk.settings[ViewingSettings].exposure_ev
-    tolerance = displayed_tolerance(settings.quality)
-
-    def is_uncertain() -> Mask:
-        deviation = displayed_deviation(estimate.shading, exposure_ev)
-        return deviation.reshape(geometry.shape_index.shape) > tolerance
-
+    # Add rays at edges.
+    geometry, rays = walk.view(frame).geometry, EdgeRays.of(walk)
+    everywhere = np.ones(geometry.shape_index.shape, np.bool_)
     emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
-    where, count = is_outline(geometry) | _dilated(is_uncertain() | emitters), settings.min_spp
-    while count < settings.edge_spp and where.any():
-        more = min(max(count, EDGE_SPP - count), settings.edge_spp - count)
-        estimate.add(more, where.ravel())
-        count += more
-        where = _dilated(where & is_uncertain())
+    edges = is_outline(geometry) | dilated(rays.uncertain(estimate, everywhere) | emitters)
+    rays.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
     return estimate
 
 
@@ -195,11 +201,3 @@ def window(path: CameraPath, shot: range, frame: int) -> list[int]:
     """Distinct frames of a shot over which the AOVs of a frame are accumulated, itself among them."""
     first, here, last = (path.distance(f) for f in (shot.start, frame, shot.stop - 1))
     return list(path.distinct_frames[max(here - REACH, first) : min(here + REACH, last) + 1])
-
-
-def _dilated(mask: Mask) -> Mask:
-    """A mask grown by one pixel in all eight directions."""
-    padded = np.pad(mask, 1)
-    rows = padded[:-2] | padded[1:-1] | padded[2:]
-    grown: Mask = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
-    return grown

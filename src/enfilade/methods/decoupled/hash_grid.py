@@ -16,9 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaque
+from enfilade.kernels.tone import REC709_LUMINANCE
 
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 MIN_SAMPLES = 4  # of an entry that is used
+RELIABLE_SAMPLES, RELIABLE_ERROR = 16, 0.1  # fewest, and largest relative standard error, of a reliable one
 SEARCH_STEPS = 22
 MAX_ENTRIES = 1 << SEARCH_STEPS  # that are uploaded; of more, those with the most samples
 QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
@@ -34,18 +36,21 @@ class HashGrid:
         Rising.
     irradiance : Array3f
         Irradiance over pi.
+    is_reliable : Bool
+        Whether the entry is preferred to larger ones.
     last : UInt
         Lane of the last key.
     """
 
     keys: Any
     irradiance: Any
+    is_reliable: Any
     last: Any
 
     def lookup(
         self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any
     ) -> tuple[Any, Any]:
-        """Irradiance over pi at points, from the smallest entry that there is.
+        """Irradiance over pi at points, from the smallest reliable entry, or else the largest.
 
         Parameters
         ----------
@@ -54,24 +59,25 @@ class HashGrid:
         width : Float
             Of the path there, scene units.
         offset : Array3f
-            In [0, 1): moves the point by up to half an entry, so that many lookups interpolate. Moved points
-            without an entry use that of the point itself.
+            Moves the point by the difference from 0.5, in widths of an entry, so that many lookups
+            interpolate. Moved points without an entry use that of the point itself.
 
         Returns
         -------
         irradiance : Array3f
         is_found : Bool
         """
-        irradiance, is_found = Array3f(0), Bool(False)
+        irradiance, is_found, is_final = Array3f(0), Bool(False), Bool(False)
         for level in range(LEVELS):
+            is_open = ~is_final
             for moved in (offset, 0.5):
                 key = entry_key(position, normal, shape_index, width, level, moved)
                 lane = self._search(key)
-                is_here = dr.gather(UInt64, self.keys, lane) == key
-                irradiance = dr.select(
-                    is_here & ~is_found, dr.gather(Array3f, self.irradiance, lane), irradiance
-                )
+                is_here = is_open & (dr.gather(UInt64, self.keys, lane) == key)
+                irradiance = dr.select(is_here, dr.gather(Array3f, self.irradiance, lane), irradiance)
+                is_final |= is_here & dr.gather(Bool, self.is_reliable, lane)
                 is_found |= is_here
+                is_open &= ~is_here
         return irradiance, is_found
 
     def _search(self, key: Any) -> Any:
@@ -101,7 +107,7 @@ def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: i
     level
         Doublings of that width.
     offset : Array3f
-        In [0, 1): see :meth:`HashGrid.lookup`.
+        See :meth:`HashGrid.lookup`.
     """
     # Quantize the position.
     exponent = Int(dr.floor(dr.log2(dr.maximum(width, 1e-9)))) + level
@@ -146,11 +152,14 @@ class Entries:
     keys : (N,) uint64
         Rising, each once.
     sums : (N, 3) float64
+    squares : (N,) float64
+        Sums of squared luminance.
     counts : (N,) int64
     """
 
     keys: npt.NDArray[np.uint64]
     sums: npt.NDArray[np.float64]
+    squares: npt.NDArray[np.float64]
     counts: npt.NDArray[np.int64]
 
     @staticmethod
@@ -160,24 +169,31 @@ class Entries:
         They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
         """
         is_finite = np.isfinite(irradiance).all(axis=1)
-        rounded = np.rint(irradiance[is_finite].astype(np.float64) / QUANTUM) * QUANTUM
-        return Entries._summed(keys[is_finite], rounded, np.ones(int(is_finite.sum()), np.int64))
+        light = irradiance[is_finite].astype(np.float64)
+        light, squares = (
+            np.rint(v / QUANTUM) * QUANTUM for v in (light, np.square(light @ REC709_LUMINANCE))
+        )
+        return Entries._summed(keys[is_finite], light, squares, np.ones(len(light), np.int64))
 
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""
-        parts = [Entries(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros(0, np.int64)), *parts]
+        parts = [
+            Entries(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64)),
+            *parts,
+        ]
         return Entries._summed(
             np.concatenate([part.keys for part in parts]),
             np.concatenate([part.sums for part in parts]),
+            np.concatenate([part.squares for part in parts]),
             np.concatenate([part.counts for part in parts]),
         )
 
     @staticmethod
-    def _summed(keys: Any, sums: Any, counts: Any) -> Entries:
+    def _summed(keys: Any, sums: Any, squares: Any, counts: Any) -> Entries:
         unique, place = np.unique(keys, return_inverse=True)
-        total: Any = np.stack([np.bincount(place, s, len(unique)) for s in sums.T], axis=1)
-        return Entries(unique, total, np.bincount(place, counts, len(unique)).astype(np.int64))
+        totals: Any = [np.bincount(place, v, len(unique)) for v in (*sums.T, squares, counts)]
+        return Entries(unique, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(np.int64))
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""
@@ -186,7 +202,18 @@ class Entries:
             return None
         if len(chosen) > MAX_ENTRIES:
             chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
-        irradiance = (self.sums[chosen] / self.counts[chosen, None]).astype(np.float32)
-        grid = HashGrid(lanes(self.keys[chosen]), lanes(irradiance[None]), opaque(len(chosen) - 1, UInt))
+        count = self.counts[chosen]
+        irradiance = self.sums[chosen] / count[:, None]
+
+        # Compute standard errors.
+        mean = irradiance @ REC709_LUMINANCE
+        variance = np.maximum(self.squares[chosen] / count - np.square(mean), 0.0) / (count - 1)
+        is_reliable = (count >= RELIABLE_SAMPLES) & (variance <= np.square(RELIABLE_ERROR * mean))
+        grid = HashGrid(
+            lanes(self.keys[chosen]),
+            lanes(irradiance.astype(np.float32)[None]),
+            lanes(is_reliable),
+            opaque(len(chosen) - 1, UInt),
+        )
         dr.eval(grid)
         return grid

@@ -38,6 +38,8 @@ BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers 
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
 ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
 
+JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
+
 OnMiss = Callable[[Entries], None]
 
 
@@ -160,7 +162,7 @@ class Integrator:
         """
         vertex = self._see(reprojected, spawn(rays, rng, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
-        deferred.add_missed(vertex, jitter=1.0)
+        deferred.add_missed(vertex, JITTER)
         self._add_missed(radiance, cache, deferred)
         return Samples((radiance,), vertex.has_specular)
 
@@ -275,7 +277,7 @@ class Integrator:
             return
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
         # The first bounce off the visible surface always survives; Russian roulette begins with the second.
-        jitter, survival = (1.0, 1.0) if qmc_point is not None else (0.0, MIN_SURVIVAL)
+        jitter, survival = (JITTER, 1.0) if qmc_point is not None else (0.0, MIN_SURVIVAL)
         for branch in (Branch.REFLECTED, Branch.TRANSMITTED):
             first = None if qmc_point is None else dr.gather(Array4f, qmc_point, path.lane)
             dr.eval(first)

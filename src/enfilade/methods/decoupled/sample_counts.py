@@ -1,4 +1,4 @@
-"""Numbers of samples as functions of the quality: irradiance (by a pilot pass), edges, specular lobes."""
+"""Numbers of samples as functions of the quality: irradiance (by a pilot pass), specular lobes."""
 
 from __future__ import annotations
 
@@ -7,24 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from enfilade.kernels.tone import luminance, srgb_encode
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.irradiance import gather
 from enfilade.methods.decoupled.irradiance_cache import accumulate, total_irradiance, upload
 from enfilade.methods.decoupled.shot import ACCUMULATED, ShotContext
 from enfilade.metric import Aqm
-from enfilade.records import F32, Geometry, Mask, Shading
-from enfilade.renderer import Emitters, Purpose
+from enfilade.records import Mask
+from enfilade.renderer import Purpose
 from enfilade.settings import DecoupledSettings
 
 PILOT_SPP = 4  # of each of the two images that the pilot compares
 IRRADIANCE_SPP = 8, 256  # fewest and most
 IRRADIANCE_SHARE = 0.5  # of the squared quality that the noise of irradiance may take
 MIN_DIFFUSE = 0.5  # of the largest number of diffuse pixels of a keyframe: the pilot uses none with fewer
-EDGE_SPP = 16  # camera rays of a pixel at an edge; their number doubles while its value is uncertain
-DISPLAYED_DEVIATION = 0.006  # above which a displayed value is uncertain, by the root of the quality
 SPECULAR_SPP = 17.0, 2, 34  # of a pixel with specular lobes, by the root of the quality; fewest and most
-OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 FFT_THREADS = 2
 
 
@@ -73,79 +69,6 @@ def specular_spp(settings: DecoupledSettings) -> int:
     """Rays of a pixel with specular lobes."""
     at_one, least, most = SPECULAR_SPP
     return settings.specular_spp or min(max(round(at_one / math.sqrt(settings.quality)), least), most)
-
-
-def displayed_tolerance(quality: float) -> float:
-    """Standard deviation of a displayed value, 0..1, above which its pixel has more camera rays."""
-    return DISPLAYED_DEVIATION * math.sqrt(quality)
-
-
-def is_outline(geometry: Geometry) -> Mask:
-    """Pixels beside which another shape is seen, (H, W)."""
-    index = geometry.shape_index
-    found = np.zeros(index.shape, np.bool_)
-    across, down = index[:, 1:] != index[:, :-1], index[1:] != index[:-1]
-    found[:, 1:] |= across
-    found[:, :-1] |= across
-    found[1:] |= down
-    found[:-1] |= down
-    return found
-
-
-def displayed_deviation(shading: Shading, exposure_ev: float) -> F32:
-    """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (N,).
-
-    What is clipped at white has none: a pixel that is half sky needs no more samples if a quarter is white.
-
-    Parameters
-    ----------
-    shading
-        Estimates of pixels.
-    exposure_ev
-        In stops.
-    """
-    scale = np.float32(2.0**exposure_ev)
-    mean, deviation = luminance(shading.color) * scale, np.sqrt(shading.variance) * scale
-    low, high = (np.clip(value, 0.0, 1.0) for value in (mean - deviation, mean + deviation))
-    found: F32 = np.float32(0.5) * (srgb_encode(high) - srgb_encode(low))
-    return found
-
-
-def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
-    """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
-
-    The first camera rays may miss them, and more rays for the pixels that were hit by chance would lose most
-    of their energy.
-
-    Parameters
-    ----------
-    emitters
-        Points on all emitters.
-    geometry
-        G-buffer of the frame.
-    """
-    import scipy.ndimage
-
-    # Project the points.
-    camera = geometry.camera
-    height, width = geometry.shape_index.shape
-    x, y, depth = camera.pixel_from_direction @ (emitters.position - camera.eye).T
-    is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
-    row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
-    depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
-
-    # Leave out occluded points, and the interior of large emitters.
-    farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
-    farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
-    lowest, highest = (
-        extreme(geometry.shape_index, 3, mode="nearest")
-        for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter)
-    )
-    is_interior = (lowest[row, column] == shape_index) & (highest[row, column] == shape_index)
-    is_visible = (depth < OCCLUDED * farthest[row, column]) & ~is_interior
-    mask = np.zeros((height, width), bool)
-    mask[row[is_visible], column[is_visible]] = True
-    return mask
 
 
 def _pilot_frame(shot: ShotContext) -> int:

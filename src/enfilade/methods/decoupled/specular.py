@@ -68,6 +68,20 @@ def filter_spatially(
     return [_filtered(g, aov, where, weights) for g, aov in zip(surfaces, aovs, strict=True)]
 
 
+def with_unfiltered(filtered: SpecularAov, unfiltered: Shading, where: Mask) -> SpecularAov:
+    """A filtered AOV with the estimates of some pixels, to which other frames do not contribute.
+
+    Parameters
+    ----------
+    filtered
+    unfiltered
+        Of shape (H, W).
+    where : (H, W) bool
+    """
+    color = np.where(where[..., None], to_half(unfiltered.color), filtered.color)
+    return SpecularAov(color, np.where(where, np.float16(0), filtered.deviation))
+
+
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
     color = denoise_light(geometry, aov, where, quality=quality, outlier=OUTLIER)

@@ -1,0 +1,165 @@
+"""More rays at edges: beside outlines, and where the displayed value of a pixel is uncertain."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.ndimage
+
+from enfilade.kernels.estimate import Estimate
+from enfilade.kernels.tone import luminance, srgb_encode
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.renderer import Emitters
+from enfilade.settings import DecoupledSettings, ViewingSettings
+
+EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
+DISPLAYED_DEVIATION = 0.006  # above which a displayed value is uncertain, by the root of the quality
+SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
+OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
+
+
+@dataclass(frozen=True)
+class EdgeRays:
+    """Numbers of rays at edges.
+
+    Attributes
+    ----------
+    most : int
+        Of a pixel.
+    tolerance : float
+        Standard deviation of a displayed value, 0..1.
+    exposure_ev : float
+        In stops.
+    """
+
+    most: int
+    tolerance: float
+    exposure_ev: float
+
+    @staticmethod
+    def of(walk: Walkthrough, *, times: float = 1.0) -> EdgeRays:
+        """As the settings say, with a multiple of their tolerance."""
+        settings = walk.settings[DecoupledSettings]
+        exposure_ev = walk.settings[ViewingSettings].exposure_ev
+        return EdgeRays(settings.edge_spp, times * displayed_tolerance(settings.quality), exposure_ev)
+
+    def uncertain(self, estimate: Estimate, sampled: Mask, spp: int | None = None) -> Mask:
+        """Pixels whose displayed value is uncertain, (H, W); see :func:`displayed_deviation`."""
+        layers = [shading.to_image(sampled) for shading in estimate.shadings]
+        color, variance = (sum(getattr(of, name) for of in layers) for name in ("color", "variance"))
+        return displayed_deviation(Shading(color, variance), self.exposure_ev, spp) > self.tolerance
+
+    def refine(self, estimate: Estimate, sampled: Mask, edges: Mask, within: Mask, spp: int) -> Mask:
+        """Trace more rays at edges, and double them at uncertain pixels and beside them.
+
+        Parameters
+        ----------
+        estimate
+            Of the pixels of `sampled`, row by row.
+        sampled : (H, W) bool
+        edges, within : (H, W) bool
+            Pixels of `sampled` that have more rays, and that may have more.
+        spp
+            Rays of a pixel so far.
+
+        Returns
+        -------
+        (H, W) bool
+            Pixels that have more rays now.
+        """
+        refined = np.zeros_like(edges)
+        while spp < self.most and edges.any():
+            more = min(max(spp, EDGE_SPP - spp), self.most - spp)
+            estimate.add(more, edges[sampled])
+            spp += more
+            refined |= edges
+            edges = within & dilated(edges & self.uncertain(estimate, sampled, spp))
+        return refined
+
+
+def displayed_tolerance(quality: float) -> float:
+    """Standard deviation of a displayed value, 0..1, above which its pixel has more camera rays."""
+    return DISPLAYED_DEVIATION * math.sqrt(quality)
+
+
+def displayed_deviation(shading: Shading, exposure_ev: float, spp: int | None = None) -> F32:
+    """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (H, W).
+
+    What is clipped at white has none: a pixel that is half sky needs no more samples if a quarter is white.
+
+    Parameters
+    ----------
+    shading
+        Estimates of pixels, (H, W).
+    exposure_ev
+        In stops.
+    spp
+        Rays of a pixel, which may all have missed a brighter surface that is seen beside it: by the rule of
+        succession, its share is up to 1 / (spp + 1). None: leave this out.
+    """
+    scale = np.float32(2.0**exposure_ev)
+    mean, deviation = luminance(shading.color) * scale, np.sqrt(shading.variance) * scale
+    if spp is not None:
+        unseen = (scipy.ndimage.maximum_filter(mean, 3) - mean) / np.float32(spp + 1)
+        deviation = np.maximum(deviation, unseen)
+    low, high = (np.clip(value, 0.0, 1.0) for value in (mean - deviation, mean + deviation))
+    found: F32 = np.float32(0.5) * (srgb_encode(high) - srgb_encode(low))
+    return found
+
+
+def is_outline(geometry: Geometry) -> Mask:
+    """Pixels beside which another shape is seen, (H, W)."""
+    index = geometry.shape_index
+    found = np.zeros(index.shape, np.bool_)
+    across, down = index[:, 1:] != index[:, :-1], index[1:] != index[:-1]
+    found[:, 1:] |= across
+    found[:, :-1] |= across
+    found[1:] |= down
+    found[:-1] |= down
+    return found
+
+
+def dilated(mask: Mask) -> Mask:
+    """A mask grown by one pixel in all eight directions."""
+    padded = np.pad(mask, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    grown: Mask = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+    return grown
+
+
+def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
+    """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
+
+    The first camera rays may miss them, and more rays for the pixels that were hit by chance would lose most
+    of their energy.
+
+    Parameters
+    ----------
+    emitters
+        Points on all emitters.
+    geometry
+        G-buffer of the frame.
+    """
+    # Project the points.
+    camera = geometry.camera
+    height, width = geometry.shape_index.shape
+    x, y, depth = camera.pixel_from_direction @ (emitters.position - camera.eye).T
+    is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
+    row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
+    depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
+
+    # Leave out occluded points, and the interior of large emitters.
+    farthest = np.where(geometry.is_hit, geometry.depth, np.inf)
+    farthest = scipy.ndimage.maximum_filter(farthest, 3, mode="nearest")
+    lowest, highest = (
+        extreme(geometry.shape_index, 3, mode="nearest")
+        for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter)
+    )
+    is_interior = (lowest[row, column] == shape_index) & (highest[row, column] == shape_index)
+    is_visible = (depth < OCCLUDED * farthest[row, column]) & ~is_interior
+    mask = np.zeros((height, width), bool)
+    mask[row[is_visible], column[is_visible]] = True
+    return mask
