@@ -16,7 +16,7 @@ from enfilade.renderer import Emitters
 from enfilade.settings import DecoupledSettings, ViewingSettings
 
 EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
-DISPLAYED_DEVIATION = 0.006  # above which a displayed value is uncertain, by the root of the quality
+DISPLAYED_DEVIATION = 0.006  # times the square root of the quality: above it a displayed value is uncertain
 SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 
@@ -61,7 +61,7 @@ class EdgeRays:
             Of the pixels of `sampled`, row by row.
         sampled : (H, W) bool
         edges, within : (H, W) bool
-            Pixels of `sampled` that have more rays, and that may have more.
+            Pixels that are refined first, and those to which it may spread; both are among `sampled`.
         spp
             Rays of a pixel so far.
 
@@ -88,7 +88,8 @@ def displayed_tolerance(quality: float) -> float:
 def displayed_deviation(shading: Shading, exposure_ev: float, spp: int | None = None) -> F32:
     """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (H, W).
 
-    What is clipped at white has none: a pixel that is half sky needs no more samples if a quarter is white.
+    Values above white count as white: where a quarter of sky makes a pixel white, its share of sky may be
+    uncertain.
 
     Parameters
     ----------
@@ -97,8 +98,8 @@ def displayed_deviation(shading: Shading, exposure_ev: float, spp: int | None = 
     exposure_ev
         In stops.
     spp
-        Rays of a pixel, which may all have missed a brighter surface that is seen beside it: by the rule of
-        succession, its share is up to 1 / (spp + 1). None: leave this out.
+        Rays of a pixel, which may all have missed what makes the brightest pixel beside it bright. Its share
+        is taken to be 1 / (spp + 1), in the manner of the rule of succession. None: leave this out.
     """
     scale = np.float32(2.0**exposure_ev)
     mean, deviation = luminance(shading.color) * scale, np.sqrt(shading.variance) * scale
@@ -133,8 +134,8 @@ def dilated(mask: Mask) -> Mask:
 def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
 
-    The first camera rays may miss them, and more rays for the pixels that were hit by chance would lose most
-    of their energy.
+    The first camera rays miss most of their pixels. If only those that were hit had more rays, these would
+    fall to their true values, the others would stay dark, and the emitter would lose most of its light.
 
     Parameters
     ----------
@@ -148,7 +149,10 @@ def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     height, width = geometry.shape_index.shape
     x, y, depth = camera.pixel_from_direction @ (emitters.position - camera.eye).T
     is_inside = (depth > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width * depth) & (y < height * depth)
-    row, column = (np.floor(v[is_inside] / depth[is_inside]).astype(int) for v in (y, x))
+    row, column = (
+        np.minimum(np.floor(v[is_inside] / depth[is_inside]), last).astype(int)
+        for v, last in ((y, height - 1), (x, width - 1))
+    )
     depth, shape_index = depth[is_inside], emitters.shape_index[is_inside]
 
     # Leave out occluded points, and the interior of large emitters.

@@ -113,8 +113,8 @@ class Frames:
         """Specular AOVs, filtered spatially, without an empty transmission; and their estimate, if any.
 
         Edges that are seen in mirrors and panes have more rays, and are not filtered. All other pixels have
-        the same number: a second pass for those with remaining noise would cost as much as half as many more
-        for all.
+        the same number: a second pass for those with remaining noise would cost as much as 50 % more rays in
+        every pixel.
         """
         if not where.any():
             black = np.zeros((*where.shape, 3), np.float16)

@@ -59,8 +59,8 @@ class HashGrid:
         width : Float
             Of the path there, scene units.
         offset : Array3f
-            Moves the point by the difference from 0.5, in widths of an entry, so that many lookups
-            interpolate. Moved points without an entry use that of the point itself.
+            Shift of the point in widths of an entry, plus 0.5, so that many lookups interpolate. Moved points
+            without an entry use that of the point itself.
 
         Returns
         -------
