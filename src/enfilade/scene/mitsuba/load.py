@@ -33,7 +33,7 @@ def load_scene(file: Path) -> Any:
     if threads == 1:  # Mitsuba waits for the tasks that read an OpenEXR file without running any of them
         dr.set_thread_count(2)
     try:
-        scene = mi.load_file(str(file.resolve()), optimize=False)
+        scene = mi.load_file(str(file.resolve()), parallel=False, optimize=False)
     except (RuntimeError, UnicodeDecodeError) as error:
         if any(words in str(error).lower() for words in OUT_OF_MEMORY):
             raise MemoryError(f"too little memory to load {file}") from error
