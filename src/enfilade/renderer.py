@@ -58,7 +58,6 @@ class RandomKey:
 class Branch(IntEnum):
     """The branch of a path at a clear interface, such as a smooth pane of glass."""
 
-    RANDOM = 0
     REFLECTED = 1
     TRANSMITTED = 2
 
@@ -369,7 +368,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """Sample a direction of the specular lobes.
 
@@ -379,9 +378,9 @@ class LobeRenderer(Renderer, Protocol):
         rng : PCG32
         choice : Float
             Selects the lobe, in [0, 1), transmission last; random by default.
-        branch
-            At clear interfaces. A sum over both branches has no noise of their choice. Other lobes are
-            sampled as usual.
+        branch : UInt
+            :class:`Branch` of each lane at clear interfaces; random by default. A sum over both branches has
+            no noise of their choice. Other lobes are sampled as usual.
         """
         ...
 

@@ -14,14 +14,22 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Array4f, Bool, Float, UInt, opaque, rows
+from enfilade.arrays import PCG32, Array3f, Array4f, Bool, Float, UInt, UInt64, opaque, rows
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import padded, recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
 from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.paths import Path, compact, joined, scatter_add, spawn
+from enfilade.methods.decoupled.paths import (
+    Contributions,
+    Path,
+    compact,
+    joined,
+    merged,
+    scatter_add,
+    spawn,
+)
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, Rays, ShadingPoint
 
@@ -87,10 +95,7 @@ class _Missed:
 
 @dataclass(frozen=True)
 class _Deferred:
-    """What is left to estimate when all paths are extended: all together, in few launches.
-
-    Each list has parts in which a lane occurs at most once.
-    """
+    """What is left to estimate when all paths are extended: all together, in few launches."""
 
     missed: list[_Missed] = field(default_factory=list)
     ends: list[Path] = field(default_factory=list)
@@ -123,10 +128,7 @@ class Integrator:
 
         self._see = recorded(self._see_kernel, state)
         self._query_further = recorded(query_further, lambda: None)
-        self._extend = {
-            Branch.REFLECTED: recorded(lambda *path: self._extend_kernel(Branch.REFLECTED, *path), state),
-            Branch.TRANSMITTED: recorded(lambda *path: self._extend_kernel(Branch.TRANSMITTED, *path), state),
-        }
+        self._extend = recorded(self._extend_kernel, state)
         self._gather = recorded(self._gather_kernel, state)
         self._estimate = recorded(self._estimate_kernel, state)
         self._terminate = recorded(self._terminate_kernel, state)
@@ -163,7 +165,8 @@ class Integrator:
         vertex = self._see(reprojected, spawn(rays, rng, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
-        self._add_missed(radiance, cache, deferred)
+        for found, lane in self._missed_light(cache, deferred):
+            scatter_add(radiance, found, lane)
         return Samples((radiance,), vertex.has_specular)
 
     def specular_radiance(
@@ -199,10 +202,20 @@ class Integrator:
             surfaces), and transmission straight through clear surfaces.
         """
         count = dr.width(rng.state)
-        radiance = dr.zeros(Array3f, SPECULAR_AOVS * count)  # one AOV after the other
-        path, deferred = spawn(rays, rng, ENTRY_PX * pixel_angle), _Deferred()
-        self._trace_specular(radiance, cache, path, 0, deferred, qmc_point, transmitted_at=count)
-        self._finish(radiance, cache, deferred, on_miss)
+        light, deferred = Contributions(), _Deferred()
+
+        # Bounce off the visible surface: all paths, then the other branch at clear interfaces.
+        path, onward = spawn(rays, rng, ENTRY_PX * pixel_angle), []
+        while dr.width(path.lane):
+            ahead, path = self._bounce(
+                light, cache, path, deferred, dr.gather(Array4f, qmc_point, path.lane), transmitted_at=count
+            )
+            onward.append(ahead)
+
+        # Follow the paths that meet another specular lobe.
+        self._trace_specular(light, cache, merged(onward), deferred, transmitted_at=count)
+        self._finish(light, cache, deferred, on_miss)
+        radiance = light.summed(SPECULAR_AOVS * count)  # one AOV after the other
         lane = dr.arange(UInt, count)
         return Samples(
             tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
@@ -235,113 +248,136 @@ class Integrator:
         """
         dr.eval(qmc_point)  # see `spawn`
         direct, vertex = self._gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), qmc_point)
-        # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
-        indirect = Array3f(vertex.radiance) if cache.images else dr.zeros(Array3f, dr.width(rng.state))
-        deferred = _Deferred()
+        light, deferred = Contributions(), _Deferred()
+        if cache.images:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
+            light.add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex)
         onward = compact(vertex.path, dr.compress(vertex.has_specular))
-        self._trace_specular(indirect, cache, onward, 1, deferred)
-        self._finish(indirect, cache, deferred, on_miss)
-        return Samples((direct, indirect))
+        self._trace_specular(light, cache, onward, deferred)
+        self._finish(light, cache, deferred, on_miss)
+        return Samples((direct, light.summed(dr.width(rng.state))))
 
     def _trace_specular(
         self,
-        radiance: Any,
+        light: Contributions,
         cache: IrradianceCache,
         path: Path,
-        bounces: int,
         deferred: _Deferred,
-        qmc_point: Any = None,
         transmitted_at: int = 0,
     ) -> None:
-        """Add the contributions of paths from specular lobe to specular lobe.
+        """Follow paths from specular lobe to specular lobe: those of all bounces and branches together.
 
         Parameters
         ----------
-        radiance
+        light
+            Receives their contributions.
         cache
         path
-        bounces
-            Made so far.
+            That have bounced at least once.
         deferred
             Receives what is left to estimate.
-        qmc_point
-            Of the first bounce, by lane; None: pseudorandom.
         transmitted_at
             Offset of the lanes that receive transmission through clear surfaces.
         """
-        if not dr.width(path.lane):
-            return
-        if bounces == MAX_BOUNCES:
-            deferred.ends.append(path)
-            return
-        # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
-        # The first bounce off the visible surface always survives; Russian roulette begins with the second.
-        jitter, survival = (JITTER, 1.0) if qmc_point is not None else (0.0, MIN_SURVIVAL)
-        for branch in (Branch.REFLECTED, Branch.TRANSMITTED):
-            first = None if qmc_point is None else dr.gather(Array4f, qmc_point, path.lane)
-            dr.eval(first)
+        while dr.width(path.lane):
+            path = merged(self._bounce(light, cache, path, deferred, None, transmitted_at))
 
-            # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-            extend = self._extend[branch]
-            direct, is_split, vertex = extend(cache, path, opaque(survival), first, opaque(transmitted_at))
-            scatter_add(radiance, direct, path.lane)
-            scatter_add(radiance, vertex.radiance, vertex.path.lane)
-            deferred.add_missed(vertex, jitter)
-
-            # Follow the paths that meet another specular lobe, then the other branch of clear interfaces.
-            onward = compact(vertex.path, dr.compress(vertex.has_specular & vertex.path.is_active))
-            self._trace_specular(radiance, cache, onward, bounces + 1, deferred, None, transmitted_at)
-            path = compact(path, dr.compress(is_split))
-            if not dr.width(path.lane):
-                break
-
-    def _finish(
-        self, radiance: Any, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None
-    ) -> None:
-        """Add what was deferred, after a lookup in the images of the cache."""
-        self._add_missed(radiance, IrradianceCache(hash_grid=cache.hash_grid), deferred, on_miss)
-        if deferred.ends:
-            ends = joined(deferred.ends)
-            dr.eval(ends)
-            _add_parts(radiance, self._terminate(ends), ends.lane, [dr.width(p.lane) for p in deferred.ends])
-
-    def _add_missed(
-        self, radiance: Any, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
-    ) -> None:
-        """Add the diffuse reflection where no irradiance was found: from the rest of the cache, or estimated.
+    def _bounce(
+        self,
+        light: Contributions,
+        cache: IrradianceCache,
+        path: Path,
+        deferred: _Deferred,
+        qmc_point: Any,
+        transmitted_at: int,
+    ) -> tuple[Path, Path]:
+        """Extend all paths by one bounce off a specular lobe.
 
         Parameters
         ----------
-        radiance
+        light, cache, path, deferred, transmitted_at
+            As of :meth:`_trace_specular`.
+        qmc_point : Array4f or None
+            Of the first bounce, by path: chooses the lobe and its direction. None: pseudorandom.
+
+        Returns
+        -------
+        onward : Path
+            Paths that meet another specular lobe.
+        other : Path
+            Paths at clear interfaces, whose other branch is left to follow.
+        """
+        # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
+        # The first bounce off the visible surface always survives; Russian roulette begins with the second.
+        jitter, survival = (0.0, MIN_SURVIVAL) if qmc_point is None else (JITTER, 1.0)
+        dr.eval(qmc_point)
+
+        # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
+        direct, is_split, is_end, vertex = self._extend(
+            cache, path, opaque(survival), qmc_point, opaque(transmitted_at)
+        )
+        light.add(direct, path.lane)
+        light.add(vertex.radiance, vertex.path.lane)
+        deferred.add_missed(vertex, jitter)
+
+        # Divide the paths that go on.
+        is_onward = vertex.has_specular & vertex.path.is_active
+        ends = compact(vertex.path, dr.compress(is_onward & is_end))
+        if dr.width(ends.lane):
+            deferred.ends.append(ends)
+        onward = compact(vertex.path, dr.compress(is_onward & ~is_end))
+        other = compact(path, dr.compress(is_split))
+        return onward.on_branch(Branch.REFLECTED), other.on_branch(Branch.TRANSMITTED)
+
+    def _finish(
+        self, light: Contributions, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None
+    ) -> None:
+        """Add what was deferred, after a lookup in the images of the cache."""
+        for found, lane in self._missed_light(IrradianceCache(hash_grid=cache.hash_grid), deferred, on_miss):
+            light.add(found, lane)
+        if deferred.ends:
+            ends = joined(deferred.ends)
+            dr.eval(ends)
+            light.add(self._terminate(ends), ends.lane)
+
+    def _missed_light(
+        self, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
+    ) -> list[tuple[Any, Any]]:
+        """Diffuse reflection where no irradiance was found: from the rest of the cache, or estimated.
+
+        Parameters
+        ----------
         cache
             What was not queried yet.
         deferred
         on_miss
+
+        Returns
+        -------
+        list of (Array3f, UInt)
+            Contributions and their lanes.
         """
         if not deferred.missed:
-            return
+            return []
         missed = joined(deferred.missed)
         dr.eval(missed)
-        widths = [dr.width(part.jitter) for part in deferred.missed]
+        contributions = []
         is_miss = missed.query.is_needed
 
         # Query the cache.
         if cache.images or cache.hash_grid:
             found, is_miss = self._query_further(cache, missed.query, missed.path.rng, missed.jitter)
-            _add_parts(radiance, found, missed.path.lane, widths)
+            contributions.append((found, missed.path.lane))
 
         # Path trace what is still missing.
         missing: Any = dr.compress(is_miss)
-        if not dr.width(missing):
-            return
-        unknown = compact(missed.path, missing)
-        weight, irradiance, keys = self._estimate(unknown)
-        bounds = np.searchsorted(np.array(missing), np.cumsum(widths)[:-1])
-        widths = np.diff(bounds, prepend=0, append=dr.width(unknown.lane)).tolist()
-        _add_parts(radiance, weight * irradiance, unknown.lane, widths)
-        if on_miss:
-            _report(on_miss, keys, irradiance, dr.width(missing))
+        if dr.width(missing):
+            unknown = compact(missed.path, missing)
+            weight, irradiance, keys = self._estimate(unknown)
+            contributions.append((weight * irradiance, unknown.lane))
+            if on_miss:
+                _report(on_miss, keys, irradiance, dr.width(missing))
+        return contributions
 
     def _see_kernel(self, cache: IrradianceCache, path: Path) -> _Vertex:
         """Camera rays: intersect, and query the cache."""
@@ -376,24 +412,24 @@ class Integrator:
 
     def _extend_kernel(
         self,
-        branch: Branch,
         cache: IrradianceCache,
         path: Path,
         min_survival: Any,
         qmc_point: Any,
         transmitted_at: Any,
-    ) -> tuple[Any, Any, _Vertex]:
+    ) -> tuple[Any, Any, Any, _Vertex]:
         """Scatter off a specular lobe at the next surface, and intersect the one after.
 
-        Returns the radiance of next-event estimates, and whether the path has another branch, too.
+        Returns the radiance of next-event estimates, whether the path has another branch, and whether it has
+        as many bounces as are followed.
         """
         rng = PCG32(path.rng)
-        rng.state ^= BRANCH_SALT * int(branch)
+        rng.state ^= BRANCH_SALT * UInt64(path.branch)
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         sample = self._renderer.sample_specular(
-            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=branch
+            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=path.branch
         )
 
         # Play Russian roulette.
@@ -411,13 +447,16 @@ class Integrator:
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
             rng=rng,
+            bounces=path.bounces + 1,
+            branch=path.branch,
         )
 
         # Query the cache at the next vertex.
         emitted, vertex = self._intersect(cache, extended)
-        is_split = Bool(sample.is_split & path.is_active)
         vertex = replace(vertex, radiance=emitted + vertex.radiance)
-        return Array3f(path.throughput * sample.direct), is_split, vertex
+        is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
+        is_end = extended.bounces >= MAX_BOUNCES
+        return Array3f(path.throughput * sample.direct), Bool(is_split), Bool(is_end), vertex
 
     def _gather_kernel(self, cache: IrradianceCache, path: Path, qmc_point: Any) -> tuple[Any, _Vertex]:
         """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""
@@ -436,6 +475,8 @@ class Integrator:
             width=path.width_at(point),
             spread=dr.maximum(path.spread, ENTRY_GATHER_WIDTH),
             rng=rng,
+            bounces=path.bounces + 1,
+            branch=path.branch,
         )
 
         # Query the cache at the next vertex.
@@ -464,15 +505,6 @@ class Integrator:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
-
-
-def _add_parts(radiance: Any, contribution: Any, lane: Any, widths: list[int]) -> None:
-    """Add contributions to lanes; within each of the consecutive parts a lane occurs at most once."""
-    start = 0
-    for width in filter(None, widths):
-        part = dr.arange(UInt, width) + opaque(start)
-        scatter_add(radiance, dr.gather(Array3f, contribution, part), dr.gather(UInt, lane, part))
-        start += width
 
 
 def _report(on_miss: OnMiss, keys: tuple[Any, ...], irradiance: Any, count: int) -> None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Float, UInt, opaque
+from enfilade.arrays import PCG32, Array3f, Float, UInt, lanes, opaque
 from enfilade.kernels.replay import padded
-from enfilade.renderer import Bounce, Rays, ShadingPoint
+from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint
 
-__all__ = ["Path", "compact", "joined", "scatter_add", "spawn"]
+__all__ = ["Contributions", "Path", "compact", "joined", "merged", "scatter_add", "spawn"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,10 @@ class Path:
     width, spread : Float
         Width of the path at the ray's origin, scene units, and its growth by unit of length.
     rng : PCG32
+    bounces : UInt
+        Made so far.
+    branch : UInt
+        :class:`Branch` that it follows at the next clear interface.
     """
 
     lane: Any
@@ -39,6 +44,8 @@ class Path:
     width: Any
     spread: Any
     rng: Any
+    bounces: Any
+    branch: Any
 
     @property
     def is_active(self) -> Any:
@@ -48,6 +55,11 @@ class Path:
     def width_at(self, point: ShadingPoint) -> Any:
         """Width of the path where it meets a surface, scene units; Float."""
         return self.width + self.spread * point.surfaces.distance * dr.norm(self.rays.direction)
+
+    def on_branch(self, branch: Branch) -> Path:
+        """The same paths on a branch."""
+        count = dr.width(self.lane)
+        return replace(self, branch=dr.opaque(UInt, int(branch), count)) if count else self
 
 
 def spawn(rays: Rays, rng: Any, spread: float) -> Path:
@@ -61,50 +73,101 @@ def spawn(rays: Rays, rng: Any, spread: float) -> Path:
         width=dr.opaque(Float, 0.0, count),
         spread=dr.opaque(Float, spread, count),
         rng=rng,
+        bounces=dr.opaque(UInt, 0, count),
+        branch=dr.opaque(UInt, int(Branch.REFLECTED), count),
     )
     # Evaluate now: memory shared with NumPy can't be freed while a kernel is recorded.
     dr.eval(path)
     return path
 
 
-def compact(path: Path, lanes: Any) -> Path:
-    """Gather the paths of a list of lanes; paths added as padding are not active."""
-    if not dr.width(lanes):
-        return Path(UInt(), path.rays, path.bounce, path.throughput, path.width, path.spread, path.rng)
-    lanes, is_real = padded(lanes)
+def compact(path: Path, chosen: Any) -> Path:
+    """Gather the paths of a list of lanes (UInt); paths added as padding are not active."""
+    if not dr.width(chosen):
+        return replace(path, lane=UInt())
+    index, is_real = padded(chosen)
     taken = Path(
-        lane=dr.gather(UInt, path.lane, lanes),
-        rays=dr.gather(Rays, path.rays, lanes),
-        bounce=dr.gather(Bounce, path.bounce, lanes) if path.bounce else None,
-        throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, lanes), 0.0),
-        width=dr.gather(Float, path.width, lanes),
-        spread=dr.gather(Float, path.spread, lanes),
-        rng=dr.gather(PCG32, path.rng, lanes),
+        lane=dr.gather(UInt, path.lane, index),
+        rays=dr.gather(Rays, path.rays, index),
+        bounce=dr.gather(Bounce, path.bounce, index) if path.bounce else None,
+        throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, index), 0.0),
+        width=dr.gather(Float, path.width, index),
+        spread=dr.gather(Float, path.spread, index),
+        rng=dr.gather(PCG32, path.rng, index),
+        bounces=dr.gather(UInt, path.bounces, index),
+        branch=dr.gather(UInt, path.branch, index),
     )
     dr.eval(taken)
     return taken
 
 
+def merged(parts: Sequence[Path]) -> Path:
+    """All paths of several lists, one list after the other."""
+    filled = [part for part in parts if dr.width(part.lane)]
+    if not filled:
+        return parts[0]
+    whole: Path = joined(filled)
+    dr.eval(whole)
+    return whole
+
+
 def joined(parts: Sequence[Any]) -> Any:
-    """The lanes of several trees of arrays, one after the other."""
+    """The lanes of several trees of arrays, one after the other; all arrays of a tree have as many."""
+    if len(parts) == 1:
+        return parts[0]
+    counts = [dr.width(part) for part in parts]
+    starts = np.cumsum(counts) - counts
+    targets = [dr.arange(UInt, n) + opaque(int(at)) for n, at in zip(counts, starts, strict=True)]
+    return _joined(parts, targets, sum(counts))
+
+
+def _joined(parts: Sequence[Any], targets: Sequence[Any], count: int) -> Any:
     first: Any = parts[0]
-    if len(parts) == 1 or first is None:
-        return first
+    if first is None:
+        return None
     if isinstance(first, tuple):
-        return tuple(joined(of) for of in zip(*parts, strict=True))
+        return tuple(_joined(of, targets, count) for of in zip(*parts, strict=True))
     if isinstance(first, PCG32):
         found = PCG32(first)
-        found.state, found.inc = joined([p.state for p in parts]), joined([p.inc for p in parts])
+        found.state = _joined([p.state for p in parts], targets, count)
+        found.inc = _joined([p.inc for p in parts], targets, count)
         return found
     if is_dataclass(first):
         kind: Any = type(first)
-        return kind(*(joined([getattr(p, f.name) for p in parts]) for f in fields(first)))
+        return kind(*(_joined([getattr(p, f.name) for p in parts], targets, count) for f in fields(first)))
     # `drjit.concat` does not take masks.
-    whole, start = dr.empty(type(first), sum(map(dr.width, parts))), 0
-    for part in parts:
-        dr.scatter(whole, part, dr.arange(UInt, dr.width(part)) + opaque(start))
-        start += dr.width(part)
+    whole = dr.empty(type(first), count)
+    for part, target in zip(parts, targets, strict=True):
+        dr.scatter(whole, part, target)
     return whole
+
+
+class Contributions:
+    """Radiance that paths contribute to lanes, of which a lane may receive any number.
+
+    NumPy adds them in the order in which they came: sums of atomic additions depend on threads.
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[Any, Any]] = []
+
+    def add(self, radiance: Any, lane: Any) -> None:
+        """Add radiance (Array3f) to lanes (UInt)."""
+        self._parts.append((radiance, lane))
+
+    def summed(self, count: int) -> Any:
+        """Sums of `count` lanes; Array3f."""
+        if not self._parts:
+            return dr.zeros(Array3f, count)
+        dr.eval(self._parts)
+        lane = np.concatenate([np.array(lane) for _, lane in self._parts])
+        axes = (
+            np.bincount(
+                lane, np.concatenate([np.array(radiance[axis]) for radiance, _ in self._parts]), count
+            )
+            for axis in range(3)
+        )
+        return Array3f(*(lanes(axis.astype(np.float32)) for axis in axes))
 
 
 def scatter_add(radiance: Any, contribution: Any, lane: Any) -> None:

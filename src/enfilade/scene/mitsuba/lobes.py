@@ -120,7 +120,7 @@ class Lobes:
         return _of(self._clear, si, bsdf)
 
     def sample_specular(
-        self, si: Any, bsdf: Any, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+        self, si: Any, bsdf: Any, rng: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight of a sample, and whether it is of a delta lobe.
 
@@ -138,9 +138,10 @@ class Lobes:
         by_bsdf = is_masked | (rng.next_float32() < share)
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
-        if branch is not Branch.RANDOM:
+        if branch is not None:
             is_clear = self.is_clear(si, bsdf)
-            first = dr.select(is_clear, 0.0 if branch is Branch.REFLECTED else ALMOST_ONE, first)
+            of_branch = dr.select(branch == int(Branch.REFLECTED), 0.0, ALMOST_ONE)
+            first = dr.select(is_clear, of_branch, first)
         sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
         whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
@@ -153,7 +154,7 @@ class Lobes:
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
         difference = dr.select(is_delta, dr.select(is_masked, 1.0, dr.rcp(share)) * whole_weight, difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
-        if branch is not Branch.RANDOM:
+        if branch is not None:
             weight = dr.select(is_clear, weight * sample.pdf, weight)
 
         wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)

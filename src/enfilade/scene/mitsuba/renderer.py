@@ -24,7 +24,6 @@ from enfilade.records import Shading
 from enfilade.renderer import (
     MAX_PATH_DEPTH,
     Bounce,
-    Branch,
     BsdfSample,
     Emitters,
     PixelFilter,
@@ -175,7 +174,7 @@ class MitsubaRenderer:
         return self._transport.sample_diffuse(point, rng, soft_only=soft_only)
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         return self._transport.sample_specular(point, rng, choice, branch)

@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool
 from enfilade.records import MIN_DIFFUSE_ALBEDO
-from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
+from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
 
@@ -93,7 +93,7 @@ class LightTransport:
         )
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Branch = Branch.RANDOM
+        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         si = point.native
@@ -111,7 +111,7 @@ class LightTransport:
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
-            is_split=Bool(is_split & (branch is not Branch.RANDOM)),
+            is_split=Bool(is_split & (branch is not None)),
         )
 
     def _next_event(
