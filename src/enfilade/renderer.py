@@ -34,6 +34,7 @@ class Purpose(IntEnum):
     PREPASS = 9
     PREPASS_HASH_GRID = 10
     SECOND_PILOT = 11
+    SPECULAR_EDGES = 12
 
 
 @dataclass(frozen=True)

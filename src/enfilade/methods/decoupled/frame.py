@@ -9,29 +9,25 @@ from enfilade.arrays import to_float, to_half
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
+from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.edges import (
-    SPECULAR_DEVIATION,
     EdgeRays,
     dilated,
     is_outline,
     small_emitter_pixels,
 )
-from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
-from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
-from enfilade.methods.decoupled.sample_counts import specular_spp
+from enfilade.methods.decoupled.records import ShadedFrame
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import (
     accumulate_temporally,
-    filter_spatially,
     upload_aov,
-    with_unfiltered,
 )
-from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.records import U8, Frame, Geometry, Mask, Provenance
+from enfilade.methods.decoupled.specular_rays import shade_specular
+from enfilade.records import U8, Frame, Geometry, Provenance
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
@@ -57,16 +53,17 @@ class Frames:
         reprojected, cache = shot.shading_caches(frame)
         diffuse = _shade_diffuse(shot, frame, reprojected, cache)
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
-        aovs, specular = self._shade_specular(shot, frame, cache, where)
+        color = diffuse.shading.color.reshape(*where.shape, 3)
+        virtual = self._virtual_geometry(shot, frame) if where.any() else []
+        aovs, specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
         provenance = _provenance(geometry, reprojected, diffuse.is_marked, is_keyframe=is_keyframe)
-        color = diffuse.shading.color.reshape(*where.shape, 3)
         transmission = aovs[1] if len(aovs) > 1 else None
         shaded = ShadedFrame(to_half(color), aovs[0], transmission, provenance)
-        rays = {"camera": diffuse.paths, "specular": 0 if specular is None else specular.paths}
-        dropped = diffuse.shading.dropped + (0 if specular is None else specular.shading.dropped)
+        rays = {"camera": diffuse.paths, "specular": sum(one.paths for one in specular)}
+        dropped = diffuse.shading.dropped + sum(one.shading.dropped for one in specular)
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
 
     def finish(self, shot: ShotContext, frame: int) -> Output:
@@ -106,52 +103,6 @@ class Frames:
     def _record(shot: ShotContext, frame: int) -> ShadedFrame:
         record: ShadedFrame = shot.inputs.record("shading", frame)
         return record
-
-    def _shade_specular(
-        self, shot: ShotContext, frame: int, cache: IrradianceCache, where: Mask
-    ) -> tuple[list[SpecularAov], Estimate | None]:
-        """Specular AOVs, filtered spatially, without an empty transmission; and their estimate, if any.
-
-        Edges that are seen in mirrors and panes have more rays, and are not filtered. All other pixels have
-        the same number: a second pass for those with remaining noise would cost as much as 50 % more rays in
-        every pixel.
-        """
-        if not where.any():
-            black = np.zeros((*where.shape, 3), np.float16)
-            return [SpecularAov(black, np.zeros(where.shape, np.float16))], None
-
-        # Trace specular rays.
-        walk = shot.walk
-        camera = walk.path.cameras[frame]
-        estimate = Estimate(
-            camera,
-            np.flatnonzero(where).astype(np.uint32),
-            lambda rays, rng, qmc_point: shot.integrator.specular_radiance(
-                cache, rays, rng, qmc_point, pixel_angle=light_camera(camera).pixel_angle
-            ),
-            chunk=walk.settings[LimitSettings].paths_in_flight,
-            pixel_filter=PixelFilter.GAUSSIAN,
-            random=walk.random(frame, Purpose.SPECULAR),
-            layers=SPECULAR_AOVS,
-            is_stratified=True,
-        )
-        spp = specular_spp(shot.settings)
-        estimate.add(spp)
-        coarse = [shading.to_image(where) for shading in estimate.shadings]
-
-        # Add rays at edges that are seen in mirrors and panes.
-        virtual = self._virtual_geometry(shot, frame)
-        is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
-        edges = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
-        rays = EdgeRays.of(walk, times=SPECULAR_DEVIATION)
-        refined = rays.refine(estimate, where, edges, is_seen_in, spp)
-        fine = [shading.to_image(where) for shading in estimate.shadings]
-
-        # Filter the AOVs along the surfaces that are seen in them, with equal noise everywhere: a denoiser
-        # would keep more of the noise beside pixels that have none.
-        count = 1 + max((k for k, aov in enumerate(fine) if aov.color.any()), default=0)
-        filtered = filter_spatially(virtual[:count], coarse[:count], where, shot.settings.denoiser)
-        return [with_unfiltered(*aovs, refined) for aovs in zip(filtered, fine, strict=False)], estimate
 
     def _virtual_geometry(self, shot: ShotContext, frame: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its AOVs."""

@@ -20,7 +20,8 @@ from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import padded, recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
 from enfilade.methods.decoupled.hash_grid import LEVELS, Entries, entry_key
-from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
+from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.paths import (
     Contributions,
     Path,
@@ -42,6 +43,7 @@ MIN_SURVIVAL = 0.05  # least probability of survival
 ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
+AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
 ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
@@ -127,6 +129,7 @@ class Integrator:
             return renderer.state
 
         self._see = recorded(self._see_kernel, state)
+        self._see_aovs = recorded(self._see_aovs_kernel, state)
         self._query_further = recorded(query_further, lambda: None)
         self._extend = recorded(self._extend_kernel, state)
         self._gather = recorded(self._gather_kernel, state)
@@ -201,11 +204,54 @@ class Integrator:
             Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
             surfaces), and transmission straight through clear surfaces.
         """
-        count = dr.width(rng.state)
+        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
+        return Samples(self._reflected(cache, path, qmc_point, on_miss))
+
+    def specular_radiance_at_edges(
+        self,
+        aovs: UploadedImage,
+        cache: IrradianceCache,
+        rays: Rays,
+        rng: Any,
+        qmc_point: Any,
+        *,
+        pixel_angle: float,
+    ) -> Samples:
+        """The same from filtered AOVs of the pixels' centres; traced where these do not show the surface.
+
+        Parameters
+        ----------
+        aovs
+            Both AOVs of the surfaces at pixel centres, without the pixels whose values are to be traced.
+        cache, rays, rng, qmc_point, pixel_angle
+            As of :meth:`specular_radiance`.
+
+        Returns
+        -------
+        Samples
+        """
+        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
+        *found, is_missing = self._see_aovs(aovs, path)
+        missing = compact(path, dr.compress(is_missing))
+        if not dr.width(missing.lane):
+            return Samples(tuple(found))
+        traced = self._reflected(cache, missing, qmc_point, count=dr.width(path.lane))
+        return Samples(tuple(have + more for have, more in zip(found, traced, strict=True)))
+
+    def _reflected(
+        self,
+        cache: IrradianceCache,
+        path: Path,
+        qmc_point: Any,
+        on_miss: OnMiss | None = None,
+        count: int | None = None,
+    ) -> tuple[Any, ...]:
+        """Radiance of both specular AOVs by lane, of `count` lanes, from camera paths."""
+        count = count or dr.width(path.lane)
         light, deferred = Contributions(), _Deferred()
 
         # Bounce off the visible surface: all paths, then the other branch at clear interfaces.
-        path, onward = spawn(rays, rng, ENTRY_PX * pixel_angle), []
+        onward = []
         while dr.width(path.lane):
             ahead, path = self._bounce(
                 light, cache, path, deferred, dr.gather(Array4f, qmc_point, path.lane), transmitted_at=count
@@ -217,9 +263,7 @@ class Integrator:
         self._finish(light, cache, deferred, on_miss)
         radiance = light.summed(SPECULAR_AOVS * count)  # one AOV after the other
         lane = dr.arange(UInt, count)
-        return Samples(
-            tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
-        )
+        return tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
 
     def final_gather(
         self,
@@ -383,6 +427,15 @@ class Integrator:
         """Camera rays: intersect, and query the cache."""
         emitted, vertex = self._intersect(cache, path)
         return replace(vertex, radiance=emitted + vertex.radiance)
+
+    def _see_aovs_kernel(self, aovs: UploadedImage, path: Path) -> tuple[Any, ...]:
+        """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index
+        found = lookup(*at, aovs, plane_tolerance=PLANE_TOLERANCE, min_cosine=AOV_COSINE)
+        is_found = found.weight > 0.0
+        scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
+        return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)
 
     def _intersect(
         self, cache: IrradianceCache, path: Path, *, soft_only: bool = False

@@ -73,7 +73,13 @@ class Found:
 
 
 def lookup(
-    position: Any, normal: Any, shape_index: Any, image: UploadedImage, *, plane_tolerance: float
+    position: Any,
+    normal: Any,
+    shape_index: Any,
+    image: UploadedImage,
+    *,
+    plane_tolerance: float,
+    min_cosine: float = 0.0,
 ) -> Found:
     """Interpolate an image at points in the world.
 
@@ -89,6 +95,8 @@ def lookup(
     image
     plane_tolerance
         Largest distance from the tangent plane on the same surface, as a part of the depth.
+    min_cosine
+        Least cosine between the normals.
 
     Returns
     -------
@@ -126,7 +134,8 @@ def lookup(
         of_tap = dr.select(is_same, tap.weight + MIN_TAP_WEIGHT, 0.0)
         if image.normals is not None:
             other = _unpacked(dr.gather(UInt, image.normals, tap.lane, is_inside))
-            of_tap *= dr.maximum(dr.dot(normal, other) * scale, 0.0)
+            cosine = dr.dot(normal, other) * scale
+            of_tap *= dr.select(cosine > min_cosine, cosine, 0.0)
         for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
             totals[layer] += of_tap * dr.gather(Array3f, value, tap.lane, is_same)
             variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)

@@ -11,7 +11,6 @@ import numpy as np
 import scipy.ndimage
 
 from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
-from enfilade.kernels.estimate import GAUSSIAN_SIGMA_PX
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -24,7 +23,7 @@ from enfilade.methods.decoupled.irradiance_cache import (
 from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.methods.decoupled.wavelet import firefly_weights, soften_edges
+from enfilade.methods.decoupled.wavelet import firefly_weights
 from enfilade.records import F32, Geometry, Mask, Shading
 
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
@@ -68,42 +67,52 @@ def filter_spatially(
     return [_filtered(g, aov, where, weights) for g, aov in zip(surfaces, aovs, strict=True)]
 
 
-def with_unfiltered(filtered: SpecularAov, unfiltered: Shading, where: Mask) -> SpecularAov:
-    """A filtered AOV with the estimates of some pixels, to which other frames do not contribute.
+def with_edges(aov: SpecularAov, edges: Shading, where: Mask) -> SpecularAov:
+    """An AOV with other values at its edges, to which other frames do not contribute.
 
     Parameters
     ----------
-    filtered
-    unfiltered
+    aov
+    edges
         Of shape (H, W).
     where : (H, W) bool
     """
-    color = np.where(where[..., None], to_half(unfiltered.color), filtered.color)
-    return SpecularAov(color, np.where(where, np.float16(0), filtered.deviation))
+    color = np.where(where[..., None], to_half(edges.color), aov.color)
+    return SpecularAov(color, np.where(where, np.float16(0), aov.deviation))
+
+
+def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, where: Mask) -> UploadedImage:
+    """Upload filtered AOVs for lookups at the surfaces that have them, not at their virtual images.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the frame.
+    aovs
+    count
+        Number of layers; those beyond the AOVs are black, so that one kernel serves all frames.
+    where : (H, W) bool
+        Pixels that are looked up.
+    """
+    layers = [(lanes(to_float(aov.color)), Float(0)) for aov in aovs]
+    black = (dr.zeros(Array3f, where.size), Float(0))
+    return upload_layers(geometry, lanes(where), [*layers, *[black] * (count - len(layers))])
 
 
 def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
-    """Denoise an AOV, guided by the surfaces that are seen in it, and antialias its edges."""
+    """Denoise an AOV, guided by the surfaces that are seen in it."""
     color = denoise_light(geometry, aov, where, quality=quality, outlier=OUTLIER)
     deviation = DENOISED_SHARE * scipy.ndimage.uniform_filter(np.sqrt(aov.variance), DENOISED_SUPPORT)
-    return _antialiased(geometry, lanes(color), deviation.astype(np.float32))
+    return SpecularAov(to_half(color), to_half(deviation.astype(np.float32)))
 
 
 def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> SpecularAov:
-    """Clamp the fireflies of an AOV by their weights, smooth it along surfaces, and antialias its edges."""
+    """Clamp the fireflies of an AOV by their weights, and smooth it along surfaces."""
     noise = NOISE_SHARE * lanes(aov.variance)
     groups = np.where(where, geometry.shape_index, np.uint32(0))
     color, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
-    return _antialiased(geometry, color, np.sqrt(image(variance, *where.shape)))
-
-
-def _antialiased(geometry: Geometry, color: Any, deviation: F32) -> SpecularAov:
-    """An AOV with soft edges, from its colours (Array3f) and their standard deviation, (H, W)."""
-    height, width = deviation.shape
-    color = soften_edges(
-        color, lanes(geometry.shape_index), width=width, height=height, sigma=GAUSSIAN_SIGMA_PX
-    )
-    return SpecularAov(to_half(image(color, height, width)), to_half(deviation))
+    deviation = np.sqrt(image(variance, *where.shape))
+    return SpecularAov(to_half(image(color, *where.shape)), to_half(deviation))
 
 
 def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:

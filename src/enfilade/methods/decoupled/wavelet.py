@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Bool, Float, Int, UInt, opaque, pixel_grid
+from enfilade.arrays import Array3f, Float, Int, UInt, opaque, pixel_grid
 from enfilade.kernels.tone import REC709_LUMINANCE
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
@@ -205,36 +204,6 @@ def firefly_weights(color: Any, *, width: int, height: int, times: float, rank: 
     # Clamp.
     limit = times * brightest[-1]
     return dr.select(luminance > limit, limit / dr.maximum(luminance, TINY), 1.0)
-
-
-def soften_edges(color: Any, shape_indices: Any, *, width: int, height: int, sigma: float) -> Any:
-    """Antialias the edges between shapes as a Gaussian pixel filter does; Array3f.
-
-    The wavelet filter treats each pixel as the shape at its centre, which leaves aliased edges.
-
-    Parameters
-    ----------
-    color : Array3f
-        Image, width * height lanes.
-    shape_indices : UInt
-        Likewise.
-    width, height
-    sigma
-        Standard deviation of the filter, pixels; its support is 3x3 pixels.
-    """
-    _, column, row = pixel_grid(height, width)
-    columns, rows = opaque(width, Int), opaque(height, Int)
-    total, weight, is_edge = Array3f(0), 0.0, Bool(False)
-    for down in (-1, 0, 1):
-        for across in (-1, 0, 1):
-            i = dr.clip(Int(column) + across, 0, columns - 1)
-            j = dr.clip(Int(row) + down, 0, rows - 1)
-            tap = UInt(j * columns + i)
-            of_tap = math.exp(-(across**2 + down**2) / (2.0 * sigma**2))
-            total += of_tap * dr.gather(Array3f, color, tap)
-            weight += of_tap
-            is_edge |= dr.gather(UInt, shape_indices, tap) != shape_indices
-    return dr.select(is_edge, total / weight, color)
 
 
 def _blurred(variance: Any, column: Any, row: Any, width: Any, height: Any) -> Any:

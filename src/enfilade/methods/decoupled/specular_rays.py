@@ -1,0 +1,148 @@
+"""Specular AOVs of a frame: traced at the centres of pixels, filtered, and antialiased at edges.
+
+A denoiser would blur edges between surfaces, where a pixel's rays meet both. So the rays of a pixel meet the
+surface at its centre alone, and the filtered values are looked up by camera rays over the whole pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from enfilade.arrays import to_float
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.methods.decoupled.edges import SPECULAR_DEVIATION, EdgeRays, dilated, is_outline
+from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.records import SpecularAov
+from enfilade.methods.decoupled.sample_counts import specular_spp
+from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.specular import filter_spatially, upload_aovs, with_edges
+from enfilade.methods.decoupled.surface_edges import surface_edges
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
+from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.renderer import PixelFilter, Purpose, Rays
+from enfilade.settings import LimitSettings
+
+
+def shade_specular(
+    shot: ShotContext,
+    frame: int,
+    cache: IrradianceCache,
+    where: Mask,
+    virtual: Sequence[Geometry],
+    beneath: F32,
+) -> tuple[list[SpecularAov], list[Estimate]]:
+    """Specular AOVs of a frame before temporal accumulation, and the estimates that were made for them.
+
+    Parameters
+    ----------
+    shot
+    frame
+    cache
+        Of the frame.
+    where : (H, W) bool
+        Pixels with specular lobes.
+    virtual
+        G-buffers of the frame with the virtual images of its AOVs; empty where no pixel has specular lobes.
+    beneath : (H, W) float32
+        Luminance of emission and diffuse reflection, which is displayed together with the AOVs.
+
+    Returns
+    -------
+    aovs : list of SpecularAov
+        Reflection, and transmission if there is any.
+    estimates : list of Estimate
+    """
+    if not where.any():
+        return [SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))], []
+    frame_rays = _FrameRays(shot, frame, cache)
+    is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
+
+    # Trace the surfaces at pixel centres; mirrors and panes over the whole pixel, for what is seen in them.
+    parts = ((where & ~is_seen_in, PixelFilter.CENTRE), (is_seen_in, PixelFilter.GAUSSIAN))
+    estimates = [frame_rays.traced(pixels, pixel_filter) for pixels, pixel_filter in parts]
+    images = [[s.to_image(p) for s in e.shadings] for e, (p, _) in zip(estimates, parts, strict=True)]
+    traced = [Shading(a.color + b.color, a.variance + b.variance) for a, b in zip(*images, strict=True)]
+
+    # Filter the AOVs along the surfaces that are seen in them.
+    count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
+    aovs = filter_spatially(virtual[:count], traced[:count], where, shot.settings.denoiser)
+
+    # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
+    rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
+    in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
+    shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
+    is_edge, is_thin = surface_edges(frame_rays.geometry)
+    edges = in_mirrors | (where & (is_edge | is_thin) & rays.matters(shown))
+    if not edges.any():
+        return aovs, estimates
+
+    # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
+    uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
+    fine = frame_rays.looked_up(where, uploaded)
+    refined = rays.refine(fine, where, edges, edges | is_seen_in, 0)
+    pairs = zip(aovs, fine.shadings, strict=False)
+    return [with_edges(aov, of.to_image(where), refined) for aov, of in pairs], [*estimates, fine]
+
+
+@dataclass(frozen=True)
+class _FrameRays:
+    """Specular rays of a frame.
+
+    Attributes
+    ----------
+    shot, frame, cache
+        As of :func:`shade_specular`.
+    """
+
+    shot: ShotContext
+    frame: int
+    cache: IrradianceCache
+
+    @property
+    def geometry(self) -> Geometry:
+        """G-buffer of the frame."""
+        return self.shot.walk.view(self.frame).geometry
+
+    def traced(self, pixels: Mask, pixel_filter: PixelFilter) -> Estimate:
+        """Trace as many rays in each of some pixels, (H, W), as the quality asks for."""
+
+        def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
+            return self.shot.integrator.specular_radiance(
+                self.cache, rays, rng, qmc_point, pixel_angle=self._pixel_angle
+            )
+
+        found = self._estimate(pixels, pixel_filter, Purpose.SPECULAR, radiance)
+        found.add(specular_spp(self.shot.settings))
+        return found
+
+    def looked_up(self, pixels: Mask, aovs: Any) -> Estimate:
+        """An estimate of pixels, (H, W), by lookups of uploaded AOVs, without rays yet."""
+
+        def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
+            return self.shot.integrator.specular_radiance_at_edges(
+                aovs, self.cache, rays, rng, qmc_point, pixel_angle=self._pixel_angle
+            )
+
+        return self._estimate(pixels, PixelFilter.GAUSSIAN, Purpose.SPECULAR_EDGES, radiance)
+
+    @property
+    def _pixel_angle(self) -> float:
+        return light_camera(self.geometry.camera).pixel_angle
+
+    def _estimate(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose, radiance: Any) -> Estimate:
+        return Estimate(
+            self.geometry.camera,
+            np.flatnonzero(pixels).astype(np.uint32),
+            radiance,
+            chunk=self.shot.walk.settings[LimitSettings].paths_in_flight,
+            pixel_filter=pixel_filter,
+            random=self.shot.walk.random(self.frame, purpose),
+            layers=SPECULAR_AOVS,
+            is_stratified=True,
+        )

@@ -1,0 +1,67 @@
+"""Edges between the surfaces of a G-buffer, and surfaces too thin to be filtered."""
+
+from __future__ import annotations
+
+import drjit as dr
+
+from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaque, pixel_grid
+from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, points_of
+from enfilade.records import Geometry, Mask
+
+CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
+REACH = 2  # pixels to each side
+MIN_SUPPORT = (
+    10  # of the 24 pixels around that show the same surface; two-pixel lines have 9, straight edges 14
+)
+
+
+def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
+    """Pixels at the edges of their surface, and those with little of it around them.
+
+    Two pixels show the same surface if shape and normal agree, and each lies in the tangent plane of the
+    other, within a part of the depth.
+
+    Parameters
+    ----------
+    geometry
+        Of shape (H, W).
+
+    Returns
+    -------
+    is_edge : (H, W) bool
+        One of the four neighbours shows another surface.
+    is_thin : (H, W) bool
+        Fewer than :data:`MIN_SUPPORT` of the pixels around show the same one.
+    """
+    height, width = geometry.shape_index.shape
+    _, column, row = pixel_grid(height, width)
+    columns, rows = opaque(width, Int), opaque(height, Int)
+    index, depth, normal = lanes(geometry.shape_index), lanes(geometry.depth), lanes(geometry.normal)
+    position = points_of(geometry, depth)
+    dr.eval(position)
+
+    is_edge, support = Bool(False), UInt(0)
+    for down in range(-REACH, REACH + 1):
+        for across in range(-REACH, REACH + 1):
+            if not (down or across):
+                continue
+            # Pixels beyond the border count as the same surface.
+            i, j = Int(column) + across, Int(row) + down
+            is_inside = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
+            tap = UInt(dr.clip(j, 0, rows - 1) * columns + dr.clip(i, 0, columns - 1))
+
+            # Compare the surfaces.
+            there, bent = dr.gather(Array3f, position, tap) - position, dr.gather(Array3f, normal, tap)
+            tolerance = PLANE_TOLERANCE * dr.minimum(depth, dr.gather(Float, depth, tap))
+            is_same = dr.gather(UInt, index, tap) == index
+            is_flat = (dr.dot(bent, normal) > CREASE_COSINE) & (dr.abs(dr.dot(there, normal)) <= tolerance)
+            is_flat &= dr.abs(dr.dot(there, bent)) <= tolerance
+            is_same &= is_flat | (index == 0)
+
+            # Count.
+            support += dr.select(is_same | ~is_inside, 1, 0)
+            if abs(down) + abs(across) == 1:
+                is_edge |= is_inside & ~is_same
+    is_thin = support < MIN_SUPPORT
+    dr.eval(is_edge, is_thin)
+    return image(is_edge, height, width), image(is_thin, height, width)
