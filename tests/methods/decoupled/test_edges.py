@@ -120,3 +120,25 @@ def test_edges_are_not_refined_beyond_the_largest_number_of_rays():
     everywhere = np.ones((H, W), bool)
     rays = EdgeRays(most=4, tolerance=0.0, exposure_ev=0.0)
     assert not rays.refine(None, everywhere, everywhere, everywhere, 4).any()
+
+
+def test_edges_matter_where_the_display_shows_them():
+    color = np.zeros((H, W, 3), np.float32)
+    color[:, 15:] = 0.05
+    dark, bright, white = (
+        EdgeRays(128, 0.02, 0.0, beneath=np.full((H, W), value, np.float32)).matters(color)
+        for value in (0.0, 0.6, 2.0)
+    )
+    expected = np.zeros((H, W), bool)
+    expected[:, 14:16] = True
+    np.testing.assert_array_equal(dark, expected)
+    assert not bright.any()  # sRGB of 0.60 and 0.65: a difference of 0.03
+    assert not white.any()
+
+
+def test_what_is_displayed_beneath_an_estimate_lowers_its_visible_deviation():
+    shading = Shading(np.full((H, W, 3), 0.02, np.float32), np.full((H, W), 1e-4, np.float32))
+    alone, above = (displayed_deviation(shading, 0.0, beneath=value) for value in (0.0, 0.5))
+    # sRGB of 0.01 and 0.03; of 0.51 and 0.53
+    np.testing.assert_allclose(alone, (0.1901 - 0.0998) / 2.0, atol=1e-3)
+    np.testing.assert_allclose(above, (0.7536 - 0.7411) / 2.0, atol=1e-3)

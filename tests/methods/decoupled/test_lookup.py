@@ -36,7 +36,7 @@ def wall():
     return depth, shape_index, value
 
 
-def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
+def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None, **more):
     depth, shape_indices, value = wall
     uploaded = UploadedImage(
         depths=lanes(depth),
@@ -51,7 +51,7 @@ def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None):
         height=opaque(HEIGHT, Int),
     )
     position = Array3f(np.asarray(points, np.float32).T)
-    return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, plane_tolerance=TOLERANCE)
+    return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, plane_tolerance=TOLERANCE, **more)
 
 
 def by_loops(wall, point, shape_index):
@@ -167,3 +167,18 @@ def test_the_weight_of_an_image_falls_towards_its_borders(wall):
     )
     np.testing.assert_allclose(taper, expected, atol=1e-3)
     assert taper.min() < 0.3
+
+
+def test_normals_that_differ_by_more_than_the_least_cosine_do_not_count(wall):
+    tilted = np.float32([0.0, 0.6, 0.8])
+    normals = np.where(np.arange(HEIGHT)[:, None, None] < 6, tilted, np.float32([0.0, 0.0, 1.0]))
+    normals = np.ascontiguousarray(np.broadcast_to(normals, (HEIGHT, WIDTH, 3)))
+    x, y = np.meshgrid([2.5, 3.2], [2.5, 9.5])
+    direction = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3) @ CAMERA.direction_from_pixel.T
+    points = CAMERA.eye - direction * (CAMERA.eye[2] / direction[:, 2:])
+    loose, strict = (
+        np.array(found(wall, points, [1] * 4, normals=normals, min_cosine=least).weight)
+        for least in (0.7, 0.9)
+    )
+    assert (loose > 0.5).all()
+    assert (strict > 0.5).tolist() == [False, False, True, True]

@@ -1,11 +1,11 @@
-"""Paths as lanes: joined in order."""
+"""Paths as lanes: joined in order, and what they contribute."""
 
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, UInt
-from enfilade.methods.decoupled.paths import joined, spawn
-from enfilade.renderer import Bounce, Rays
+from enfilade.arrays import PCG32, Array3f, UInt, rows
+from enfilade.methods.decoupled.paths import Contributions, compact, joined, merged, spawn
+from enfilade.renderer import Bounce, Branch, Rays
 
 
 def made(count, first):
@@ -29,3 +29,23 @@ def test_trees_are_joined_lane_by_lane():
 def test_a_single_tree_stays_itself():
     only = made(4, 0)
     assert joined([only]) is only
+
+
+def test_lists_without_paths_are_left_out():
+    (first, _), (second, _) = made(3, 1), made(2, 10)
+    nothing = compact(first, UInt())
+    assert dr.width(merged([nothing, nothing]).lane) == 0
+    assert np.array(merged([nothing, first, second]).lane).tolist() == [0, 1, 2, 0, 1]
+    assert dr.width(nothing.on_branch(Branch.TRANSMITTED).lane) == 0
+    branches = merged([first, second.on_branch(Branch.TRANSMITTED)]).branch
+    assert np.array(branches).tolist() == [1, 1, 1, 2, 2]
+
+
+def test_contributions_to_one_lane_are_summed():
+    light = Contributions()
+    assert rows(light.summed(2)).tolist() == [[0, 0, 0], [0, 0, 0]]
+    light.add(Array3f([1, 2, 3], [10, 20, 30], 0), UInt([2, 0, 2]))
+    light.add(Array3f(0.5), UInt([2]))
+    assert rows(light.summed(4)).tolist() == [[2, 20, 0], [0, 0, 0], [4.5, 40.5, 0.5], [0, 0, 0]]
+    light.add(Array3f(np.nan), UInt([0]))  # the estimate leaves such paths out
+    assert np.isnan(rows(light.summed(4))).any(axis=1).tolist() == [True, False, False, False]

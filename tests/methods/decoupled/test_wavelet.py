@@ -12,7 +12,6 @@ from enfilade.methods.decoupled.wavelet import (
     firefly_weights,
     redistribute_fireflies,
     smooth,
-    soften_edges,
 )
 from twins import wavelet as twin
 
@@ -182,18 +181,3 @@ def test_bright_lines_and_spots_are_not_fireflies():
     line, spot = got[10, 5:19], got[15:17, 9:11]
     np.testing.assert_allclose(line, 50.0, rtol=0.02)
     np.testing.assert_allclose(spot, 50.0, rtol=0.02)
-
-
-def test_edges_between_shapes_are_antialiased_by_the_filter():
-    rng = np.random.default_rng(5)
-    color = rng.random((6, 9, 3)).astype(np.float32)
-    shape_indices = np.repeat([[1, 1, 1, 1, 2, 2, 2, 2, 2]], 6, axis=0).astype(np.uint32)
-    got = image(soften_edges(lanes(color), lanes(shape_indices), width=9, height=6, sigma=0.5), 6, 9)
-    padded = np.pad(color, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    weights = np.exp(-np.add.outer(np.array([1, 0, 1]), np.array([1, 0, 1])) / 0.5)
-    expected = color.copy()
-    for y in range(6):
-        for x in (3, 4):
-            window = padded[y : y + 3, x : x + 3]
-            expected[y, x] = (weights[..., None] * window).sum(axis=(0, 1)) / weights.sum()
-    np.testing.assert_allclose(got, expected, rtol=1e-5)

@@ -160,14 +160,15 @@ class Contributions:
         if not self._parts:
             return dr.zeros(Array3f, count)
         dr.eval(self._parts)
-        lane = np.concatenate([np.array(lane) for _, lane in self._parts])
-        axes = (
-            np.bincount(
-                lane, np.concatenate([np.array(radiance[axis]) for radiance, _ in self._parts]), count
+        parts = [(np.array(lane), radiance) for radiance, lane in self._parts]
+        lane = np.concatenate([lane for lane, _ in parts])
+        axes = [
+            np.concatenate(
+                [np.broadcast_to(np.array(radiance[axis]), lane.shape) for lane, radiance in parts]
             )
             for axis in range(3)
-        )
-        return Array3f(*(lanes(axis.astype(np.float32)) for axis in axes))
+        ]
+        return Array3f(*(lanes(np.bincount(lane, axis, count).astype(np.float32)) for axis in axes))
 
 
 def scatter_add(radiance: Any, contribution: Any, lane: Any) -> None:

@@ -10,9 +10,8 @@ from enfilade.records import Geometry, Mask
 
 CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
 REACH = 2  # pixels to each side
-MIN_SUPPORT = (
-    10  # of the 24 pixels around that show the same surface; two-pixel lines have 9, straight edges 14
-)
+# Of the 24 pixels around that show the same surface: a line of two pixels has 9, a straight edge 14.
+MIN_SUPPORT = 10
 
 
 def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:

@@ -1,4 +1,4 @@
-"""Edge-avoiding wavelets (Dammertz et al. 2010; Schied et al. 2017), fireflies, and soft edges."""
+"""Edge-avoiding wavelets (Dammertz et al. 2010; Schied et al. 2017), and fireflies."""
 
 from __future__ import annotations
 

@@ -1,0 +1,65 @@
+"""Edges of glossy surfaces, against path tracing."""
+
+import numpy as np
+import pytest
+
+from enfilade.camera.path import CameraPath
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.kernels.tone import srgb_encode
+from enfilade.methods.decoupled import Decoupled, specular_rays
+from enfilade.methods.decoupled.edges import EdgeRays
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.scene.mitsuba.renderer import MitsubaRenderer
+from support.in_memory import run_passes, walk_of
+
+SIZE = 64, 48
+MIDDLE = 1  # frame
+CAMERAS = tuple(Camera(look_at((x, 0.3, 4), (0, 0, 0)), 40, *SIZE) for x in (0.0, 0.05, 0.1))
+PATH = CameraPath(CAMERAS, (1, 2, 3), 24.0)
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def renderer(tmp_path_factory) -> MitsubaRenderer:
+    # Brushed metal before a black wall: all light is specular.
+    metal = '<bsdf type="roughconductor"><string name="material" value="Al"/><float name="alpha" value="0.2"/></bsdf>'
+    blocks = "".join(
+        f'<shape type="cube"><transform name="to_world"><scale x="{width}" y="0.5" z="0.2"/>'
+        f'<rotate z="1" angle="{angle}"/><rotate y="1" angle="30"/><translate x="{x}"/></transform>{metal}</shape>'
+        for x, width, angle in [(-0.9, 0.3, 10), (0.0, 0.05, 20), (0.8, 0.25, 35)]
+    )
+    wall = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="4"/><translate z="-1"/></transform>'
+        '<bsdf type="diffuse"><rgb name="reflectance" value="0.01"/></bsdf></shape>'
+    )
+    sky = '<emitter type="constant"><rgb name="radiance" value="0.7"/></emitter>'
+    file = tmp_path_factory.mktemp("blocks") / "scene.xml"
+    file.write_text(f'<scene version="3.0.0"><integrator type="path"/>{blocks}{wall}{sky}</scene>')
+    return MitsubaRenderer(file)
+
+
+def displayed(radiance: np.ndarray) -> np.ndarray:
+    return srgb_encode(np.clip(radiance, 0.0, 1.0).astype(np.float32))
+
+
+def edge_error(renderer: MitsubaRenderer) -> float:
+    """RMS error of displayed values of the middle frame, at the edges of the blocks."""
+    walk = walk_of(PATH, renderer)
+    found = displayed(run_passes(Decoupled(), walk).colors[MIDDLE])
+    key = RandomKey(1, MIDDLE, Purpose.REFERENCE)
+    pixels = np.arange(SIZE[0] * SIZE[1], dtype=np.uint32)
+    traced = renderer.trace(CAMERAS[MIDDLE], pixels, key, spp=1024, pixel_filter=PixelFilter.GAUSSIAN)
+    expected = displayed(traced.color.reshape(found.shape))
+    is_edge, is_thin = specular_rays.surface_edges(walk.view(MIDDLE).geometry)
+    where = is_edge | is_thin
+    assert 0.05 < where.mean() < 0.5
+    return float(np.sqrt(np.square(found - expected)[where].mean()))
+
+
+def test_edges_of_glossy_surfaces_are_those_of_path_tracing(renderer, monkeypatch):
+    error = edge_error(renderer)
+    assert error < 0.06
+    # The centres of pixels alone give aliased edges.
+    monkeypatch.setattr(EdgeRays, "matters", lambda self, color: np.zeros(color.shape[:2], bool))
+    assert error < 0.5 * edge_error(renderer)

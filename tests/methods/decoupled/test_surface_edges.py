@@ -1,0 +1,62 @@
+"""Edges between surfaces, and thin surfaces, against loops and on shapes whose edges are known."""
+
+import numpy as np
+
+from enfilade.gbuffer import find_geometry
+from enfilade.methods.decoupled import surface_edges as kernel
+from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE
+from support.material_scene import front_camera, opened_scene
+from twins import surface_edges as twin
+
+
+def block(angle: float, width: float) -> str:
+    """A shape in place of a ball: a block that is turned about its vertical axis."""
+    return (
+        '</shape><shape type="cube" id="block"><transform name="to_world">'
+        f'<scale x="{width}" y="0.5" z="0.5"/><rotate y="1" angle="{angle}"/><translate y="1.5" z="1.5"/>'
+        '</transform><bsdf type="plastic"/>'
+    )
+
+
+def test_the_kernel_finds_the_edges_of_the_loops(materials):
+    geometry = find_geometry(materials[0], front_camera(64, 48))
+    found = kernel.surface_edges(geometry)
+    expected = twin.surface_edges(
+        geometry,
+        crease_cosine=kernel.CREASE_COSINE,
+        plane_tolerance=PLANE_TOLERANCE,
+        reach=kernel.REACH,
+        min_support=kernel.MIN_SUPPORT,
+    )
+    for ours, theirs in zip(found, expected, strict=True):
+        assert 0.02 < theirs.mean() < 0.9
+        # Single precision decides otherwise where a distance is just at the tolerance.
+        assert (ours != theirs).mean() < 2e-3
+
+
+def test_a_crease_within_a_shape_is_an_edge(tmp_path):
+    renderer, camera = opened_scene(tmp_path, {"ball": block(45.0, 0.5)}), front_camera(96, 72)
+    geometry = find_geometry(renderer, camera)
+    where = geometry.shape_index == renderer.describe().shapes.index("block") + 1
+    is_edge, _ = kernel.surface_edges(geometry)
+    rows = where.sum(axis=1) > 12
+    inside = where & rows[:, None]
+    inside[:, 1:] &= where[:, :-1]
+    inside[:, :-1] &= where[:, 1:]
+    # In the middle of every row the two front faces meet: two pixels.
+    crease = (is_edge & inside).sum(axis=1)[rows]
+    assert rows.sum() > 8
+    assert np.median(crease) == 2
+
+
+def test_a_post_narrower_than_three_pixels_is_thin(tmp_path):
+    camera = front_camera(96, 72)
+    shares = []
+    for width in (0.04, 0.5):
+        renderer = opened_scene(tmp_path, {"ball": block(0.0, width)})
+        geometry = find_geometry(renderer, camera)
+        where = geometry.shape_index == renderer.describe().shapes.index("block") + 1
+        assert where.any()
+        shares.append(kernel.surface_edges(geometry)[1][where].mean())
+    assert shares[0] == 1.0
+    assert shares[1] < 0.1
