@@ -23,10 +23,14 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def renderer(tmp_path_factory) -> MitsubaRenderer:
     # Brushed metal before a black wall: all light is specular.
-    metal = '<bsdf type="roughconductor"><string name="material" value="Al"/><float name="alpha" value="0.2"/></bsdf>'
+    metal = (
+        '<bsdf type="roughconductor"><string name="material" value="Al"/>'
+        '<float name="alpha" value="0.2"/></bsdf>'
+    )
     blocks = "".join(
         f'<shape type="cube"><transform name="to_world"><scale x="{width}" y="0.5" z="0.2"/>'
-        f'<rotate z="1" angle="{angle}"/><rotate y="1" angle="30"/><translate x="{x}"/></transform>{metal}</shape>'
+        f'<rotate z="1" angle="{angle}"/><rotate y="1" angle="30"/><translate x="{x}"/></transform>'
+        f"{metal}</shape>"
         for x, width, angle in [(-0.9, 0.3, 10), (0.0, 0.05, 20), (0.8, 0.25, 35)]
     )
     wall = (
@@ -61,5 +65,5 @@ def test_edges_of_glossy_surfaces_are_those_of_path_tracing(renderer, monkeypatc
     error = edge_error(renderer)
     assert error < 0.06
     # The centres of pixels alone give aliased edges.
-    monkeypatch.setattr(EdgeRays, "matters", lambda self, color: np.zeros(color.shape[:2], bool))
+    monkeypatch.setattr(EdgeRays, "matters", lambda *_: np.zeros(SIZE[::-1], bool))
     assert error < 0.5 * edge_error(renderer)

@@ -84,10 +84,11 @@ def shade_specular(
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
     uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
-    fine = frame_rays.looked_up(where, uploaded)
-    refined = rays.refine(fine, where, edges, edges | is_seen_in, 0)
+    within = edges | is_seen_in
+    fine = frame_rays.looked_up(within, uploaded)
+    refined = rays.refine(fine, within, edges, within, 0)
     pairs = zip(aovs, fine.shadings, strict=False)
-    return [with_edges(aov, of.to_image(where), refined) for aov, of in pairs], [*estimates, fine]
+    return [with_edges(aov, of.to_image(within), refined) for aov, of in pairs], [*estimates, fine]
 
 
 @dataclass(frozen=True)
