@@ -64,9 +64,12 @@ def shade_specular(
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
 
     # Trace the surfaces at pixel centres; mirrors and panes over the whole pixel, for what is seen in them.
-    parts = ((where & ~is_seen_in, PixelFilter.CENTRE), (is_seen_in, PixelFilter.GAUSSIAN))
-    estimates = [frame_rays.traced(pixels, pixel_filter) for pixels, pixel_filter in parts]
-    images = [[s.to_image(p) for s in e.shadings] for e, (p, _) in zip(estimates, parts, strict=True)]
+    parts = (
+        (where & ~is_seen_in, PixelFilter.CENTRE, Purpose.SPECULAR),
+        (is_seen_in, PixelFilter.GAUSSIAN, Purpose.VIRTUAL_IMAGE),
+    )
+    estimates = [frame_rays.traced(*part) for part in parts]
+    images = [[s.to_image(p) for s in e.shadings] for e, (p, *_) in zip(estimates, parts, strict=True)]
     traced = [Shading(a.color + b.color, a.variance + b.variance) for a, b in zip(*images, strict=True)]
 
     # Filter the AOVs along the surfaces that are seen in them.
@@ -110,7 +113,7 @@ class _FrameRays:
         """G-buffer of the frame."""
         return self.shot.walk.view(self.frame).geometry
 
-    def traced(self, pixels: Mask, pixel_filter: PixelFilter) -> Estimate:
+    def traced(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose) -> Estimate:
         """Trace as many rays in each of some pixels, (H, W), as the quality asks for."""
 
         def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
@@ -118,7 +121,7 @@ class _FrameRays:
                 self.cache, rays, rng, qmc_point, pixel_angle=self._pixel_angle
             )
 
-        found = self._estimate(pixels, pixel_filter, Purpose.SPECULAR, radiance)
+        found = self._estimate(pixels, pixel_filter, purpose, radiance)
         found.add(specular_spp(self.shot.settings))
         return found
 
