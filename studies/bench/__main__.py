@@ -25,6 +25,7 @@ from studies.bench.suite import (
     QUICK_SCENES,
     found_in,
     generated,
+    is_large_size,
     only_for,
     run_case,
     summary,
@@ -32,7 +33,7 @@ from studies.bench.suite import (
 from studies.bench.tables import ratio_text
 
 HERE = Path(__file__).resolve().parent
-QUICK_FRAMES, FRAMES = 16, 40
+QUICK_FRAMES, FRAMES, LARGE_FRAMES = 16, 40, 8
 QUICK_SPP = "512"
 
 
@@ -45,12 +46,13 @@ def main() -> int:
         "--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones"
     )
     parser.add_argument("--sizes", nargs="+", default=None, help="320x180 1280x720 by default")
-    parser.add_argument("--frames", type=int, default=None, help=f"{FRAMES} by default")
+    parser.add_argument(
+        "--frames", type=int, default=None, help=f"{FRAMES} by default, {LARGE_FRAMES} of large images"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
-    frames = arguments.frames or (QUICK_FRAMES if arguments.quick else FRAMES)
     if arguments.quick and not any(option.startswith("--reference-spp") for option in options):
         options += ["--reference-spp", QUICK_SPP]
     names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
@@ -65,7 +67,12 @@ def main() -> int:
             )
         except EnfiladeError as error:
             parser.error(str(error))
-        only = only_for(size, is_quick=arguments.quick)
+        is_large = is_large_size(size)
+        frames = arguments.frames or (
+            QUICK_FRAMES if arguments.quick else LARGE_FRAMES if is_large else FRAMES
+        )
+        is_chosen = any(option.startswith("--only") for option in options)
+        only = () if is_chosen else only_for(size, is_quick=arguments.quick)
         for case in cases:
             try:
                 benches.append(run_case(case, size, frames, only, arguments.out, options))

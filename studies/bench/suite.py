@@ -19,7 +19,7 @@ from studies.scenes import SCENES
 
 PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
 FIRST_FRAME = 11  # where the path is long enough
-LARGE_PX = 500_000  # from this size on, few configurations
+LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
     *(f"denoised-{spp}" for spp in (2, 4, 8, 16, 32)), "denoised-2-fast", "denoised-4-fast",
     *(f"denoised-{name}" for name in ("4-accumulated", "4-accumulated-after", "8-accumulated-after")),
@@ -113,12 +113,17 @@ def run_case(
     return found | {"scene": case.name, "split": case.split}
 
 
+def is_large_size(size: str) -> bool:
+    """Whether images of a size, such as ``1280x720``, have few frames and configurations."""
+    width, height = map(int, size.split("x"))
+    return width * height >= LARGE_PX
+
+
 def only_for(size: str, *, is_quick: bool) -> tuple[str, ...]:
     """Configurations of a size."""
-    width, height = map(int, size.split("x"))
     if is_quick:
         return QUICK
-    return LARGE if width * height >= LARGE_PX else SMALL
+    return LARGE if is_large_size(size) else SMALL
 
 
 def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
