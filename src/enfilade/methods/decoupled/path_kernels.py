@@ -1,0 +1,248 @@
+"""The kernels of the integrator: each extends or ends paths by one vertex, and is recorded once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+
+from enfilade.arrays import PCG32, Array3f, Bool, UInt64
+from enfilade.kernels.random import PrefixedRng
+from enfilade.kernels.replay import recorded
+from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
+from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
+from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
+from enfilade.methods.decoupled.lookup import UploadedImage, lookup
+from enfilade.methods.decoupled.paths import Path
+from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
+from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
+
+__all__ = ["ENTRY_PX", "PathKernels", "Vertex"]
+
+MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
+ROULETTE_GAIN = 4.0  # Russian roulette: a path survives with this times its throughput, if that is below one
+# Width of a hash grid entry: in pixels where a surface is seen sharply; as a part of the lobe's width where
+# it is seen through a lobe; as a part of the distance where it lights a diffuse surface.
+ENTRY_PX = 2.0
+ENTRY_LOBE_WIDTH = 0.25
+ENTRY_GATHER_WIDTH = 0.2
+AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
+BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
+SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
+ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
+
+
+@dataclass(frozen=True)
+class Vertex:
+    """A vertex of paths, as lanes.
+
+    Attributes
+    ----------
+    radiance : Array3f
+        Contribution to the pixel sample: emitted, and reflected by the diffuse lobe as far as it is cached.
+    is_miss : Bool
+        Where irradiance is needed and was not found.
+    has_specular : Bool
+        Where there are other lobes.
+    path : Path
+        On its way to the vertex.
+    query : CacheQuery
+    """
+
+    radiance: Any
+    is_miss: Any
+    has_specular: Any
+    path: Path
+    query: CacheQuery
+
+
+class PathKernels:
+    """Recorded kernels; they are replayed for every frame.
+
+    Parameters
+    ----------
+    renderer
+
+    Attributes
+    ----------
+    see
+        Camera rays, and the irradiance cache.
+    see_aovs
+        Camera rays, and filtered specular AOVs.
+    extend
+        A bounce off specular lobes.
+    gather
+        A bounce off the diffuse lobe.
+    query_further
+        The rest of the cache.
+    estimate
+        Path traced irradiance.
+    terminate
+        Path traced specular lobes.
+    """
+
+    def __init__(self, renderer: LobeRenderer) -> None:
+        self._renderer = renderer
+
+        def state() -> Any:
+            return renderer.state
+
+        self.see = recorded(self._see, state)
+        self.see_aovs = recorded(self._see_aovs, state)
+        self.query_further = recorded(query_further, lambda: None)
+        self.extend = recorded(self._extend, state)
+        self.gather = recorded(self._gather, state)
+        self.estimate = recorded(self._estimate, state)
+        self.terminate = recorded(self._terminate, state)
+
+    def _see(self, cache: IrradianceCache, path: Path) -> Vertex:
+        """Camera rays: intersect, and query the cache."""
+        emitted, vertex = self._intersect(cache, path)
+        return replace(vertex, radiance=emitted + vertex.radiance)
+
+    def _see_aovs(self, aovs: UploadedImage, path: Path) -> tuple[Any, ...]:
+        """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index
+        found = lookup(*at, aovs, plane_tolerance=PLANE_TOLERANCE, min_cosine=AOV_COSINE)
+        is_found = found.weight > 0.0
+        scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
+        return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)
+
+    def _intersect(
+        self, cache: IrradianceCache, path: Path, *, soft_only: bool = False
+    ) -> tuple[Any, Vertex]:
+        """Emission at the next surface, and the vertex there, with its cached diffuse reflection."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, soft_only=soft_only)
+        albedo = point.surfaces.albedo
+        is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        sharp: tuple[Any, ...] = ()
+        if cache.is_soft:
+            rng = PCG32(path.rng)
+            rng.state ^= SHARP_SALT
+            sharp = (self._renderer.sharp_light(point, rng),)
+        query = CacheQuery(
+            position=point.position,
+            normal=point.surfaces.normal,
+            shape_index=point.surfaces.shape_index,
+            width=path.width_at(point),
+            weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
+            sharp=sharp,
+        )
+        reflected, is_miss = query_images(cache, query)
+        vertex = Vertex(reflected, is_miss, Bool(point.has_specular), path, query)
+        # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
+        emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)
+        return Array3f(emitted), vertex
+
+    def _extend(
+        self,
+        cache: IrradianceCache,
+        path: Path,
+        min_survival: Any,
+        qmc_point: Any,
+        transmitted_at: Any,
+    ) -> tuple[Any, Any, Any, Vertex]:
+        """Scatter off a specular lobe at the next surface, and intersect the one after.
+
+        Returns the radiance of next-event estimates, whether the path has another branch, and whether it has
+        as many bounces as are followed.
+        """
+        rng = PCG32(path.rng)
+        rng.state ^= BRANCH_SALT * UInt64(path.branch)
+
+        # Intersect, and sample a specular lobe.
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        sample = self._renderer.sample_specular(
+            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=path.branch
+        )
+
+        # Play Russian roulette.
+        throughput = path.throughput * sample.throughput
+        survival = dr.clip(ROULETTE_GAIN * dr.max(dr.abs(throughput)), min_survival, 1.0)
+        is_alive = sample.is_alive & (rng.next_float32() < survival)
+
+        # Extend the path; a broad lobe widens it.
+        lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
+        extended = Path(
+            lane=_aov_lane(path, point, sample, transmitted_at),
+            rays=sample.rays,
+            bounce=sample.bounce,
+            throughput=Array3f(dr.select(is_alive, throughput / survival, 0.0)),
+            width=path.width_at(point),
+            spread=dr.maximum(path.spread, lobe_width),
+            rng=rng,
+            bounces=path.bounces + 1,
+            branch=path.branch,
+        )
+
+        # Query the cache at the next vertex.
+        emitted, vertex = self._intersect(cache, extended)
+        vertex = replace(vertex, radiance=emitted + vertex.radiance)
+        is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
+        is_end = extended.bounces >= MAX_BOUNCES
+        return Array3f(path.throughput * sample.direct), Bool(is_split), Bool(is_end), vertex
+
+    def _gather(self, cache: IrradianceCache, path: Path, qmc_point: Any) -> tuple[Any, Vertex]:
+        """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""
+        rng = PCG32(path.rng)
+
+        # Intersect, and sample the diffuse lobe.
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
+        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng), soft_only=True)
+
+        # Extend the path.
+        extended = Path(
+            lane=path.lane,
+            rays=sample.rays,
+            bounce=sample.bounce,
+            throughput=Array3f(dr.select(sample.is_alive, sample.throughput, 0.0)),
+            width=path.width_at(point),
+            spread=dr.maximum(path.spread, ENTRY_GATHER_WIDTH),
+            rng=rng,
+            bounces=path.bounces + 1,
+            branch=path.branch,
+        )
+
+        # Query the cache at the next vertex.
+        emitted, vertex = self._intersect(cache, extended, soft_only=True)
+        return Array3f(sample.direct + emitted), vertex
+
+    def _estimate(self, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
+        """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
+
+        Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
+        a finite ``--max-depth`` does not cut it shorter behind several mirrors.
+        """
+        rng = PCG32(path.rng)
+        rng.state ^= ESTIMATE_SALT
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        width = path.width_at(point)
+        direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
+        irradiance = Array3f(direct + indirect)
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
+        keys = tuple(entry_key(*at, level) for level in range(LEVELS))
+        return Array3f(path.throughput * point.surfaces.albedo), irradiance, keys
+
+    def _terminate(self, path: Path) -> Any:
+        """Path trace the specular lobes at the next surface to their end."""
+        rng = PCG32(path.rng)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
+        return Array3f(path.throughput * (direct + indirect))
+
+
+def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:
+    """Lanes that receive the radiance of scattered paths: transmission has its own; UInt.
+
+    Light that passes one pane and is reflected by another, or by the other face of the same, is a
+    reflection; total internal reflection, to which there is no alternative, is not.
+    """
+    normal, bounce = point.surfaces.normal, sample.bounce
+    is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, sample.rays.direction) > 0.0
+    if path.bounce is None:
+        return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
+    is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
+    is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
+    return path.lane - dr.select(is_back, transmitted_at, 0)
