@@ -35,7 +35,7 @@ class Purpose(IntEnum):
     PREPASS_HASH_GRID = 10
     SECOND_PILOT = 11
     SPECULAR_EDGES = 12
-    VIRTUAL_IMAGE = 13
+    SPECULAR_CENTRE = 13
 
 
 @dataclass(frozen=True)

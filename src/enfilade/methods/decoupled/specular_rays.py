@@ -1,7 +1,7 @@
-"""Specular AOVs of a frame: traced at the centres of pixels, filtered, and antialiased at edges.
+"""Specular AOVs of a frame: traced for the surface at each pixel's centre, filtered, and antialiased at edges.
 
-A denoiser would blur edges between surfaces, where a pixel's rays meet both. So the rays of a pixel meet the
-surface at its centre alone, and the filtered values are looked up by camera rays over the whole pixel.
+A denoiser would blur edges between surfaces, where a pixel's rays meet both. So the rays of a pixel beside an
+edge meet the surface at its centre alone, and the filtered values are looked up by camera rays over the pixel.
 """
 
 from __future__ import annotations
@@ -63,10 +63,12 @@ def shade_specular(
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
 
-    # Trace the surfaces at pixel centres; mirrors and panes over the whole pixel, for what is seen in them.
+    # Trace over the whole pixel; beside another surface through its centre, unless it shows a virtual image.
+    is_edge, is_thin = surface_edges(frame_rays.geometry)
+    is_centre = where & (is_edge | is_thin) & ~is_seen_in
     parts = (
-        (where & ~is_seen_in, PixelFilter.CENTRE, Purpose.SPECULAR),
-        (is_seen_in, PixelFilter.GAUSSIAN, Purpose.VIRTUAL_IMAGE),
+        (where & ~is_centre, PixelFilter.GAUSSIAN, Purpose.SPECULAR),
+        (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
     )
     estimates = [frame_rays.traced(*part) for part in parts]
     images = [[s.to_image(p) for s in e.shadings] for e, (p, *_) in zip(estimates, parts, strict=True)]
@@ -80,7 +82,6 @@ def shade_specular(
     rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
-    is_edge, is_thin = surface_edges(frame_rays.geometry)
     edges = in_mirrors | (where & (is_edge | is_thin) & rays.matters(shown))
     if not edges.any():
         return aovs, estimates
