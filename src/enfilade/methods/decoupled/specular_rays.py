@@ -1,7 +1,7 @@
-"""Specular AOVs of a frame: traced for the surface at each pixel's centre, filtered, and antialiased at edges.
+"""Specular AOVs of a frame: traced for the surface at a pixel's centre, filtered, and antialiased at edges.
 
-A denoiser would blur edges between surfaces, where a pixel's rays meet both. So the rays of a pixel beside an
-edge meet the surface at its centre alone, and the filtered values are looked up by camera rays over the pixel.
+A denoiser would blur edges between surfaces, where a pixel's rays meet both. So the rays of a pixel beside
+an edge meet the surface at its centre alone; then the filtered values are looked up over the whole pixel.
 """
 
 from __future__ import annotations
