@@ -11,6 +11,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.edge_filter import filter_edges
 from enfilade.methods.decoupled.edges import (
     EdgeRays,
     dilated,
@@ -27,9 +28,9 @@ from enfilade.methods.decoupled.specular import (
     upload_aov,
 )
 from enfilade.methods.decoupled.specular_rays import shade_specular
-from enfilade.records import U8, Frame, Geometry, Provenance
+from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings
+from enfilade.settings import LimitSettings, ViewingSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 
@@ -51,11 +52,20 @@ class Frames:
 
         # Trace camera rays, then specular rays where they meet specular lobes.
         reprojected, cache = shot.shading_caches(frame)
-        diffuse = _shade_diffuse(shot, frame, reprojected, cache)
+        diffuse, refined = _shade_diffuse(shot, frame, reprojected, cache)
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         color = diffuse.shading.color.reshape(*where.shape, 3)
         virtual = self._virtual_geometry(shot, frame) if where.any() else []
-        aovs, specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
+        aovs, specular, refined_aovs = shade_specular(shot, frame, cache, where, virtual, luminance(color))
+
+        # Denoise what is left of the noise at edges.
+        if shot.settings.denoiser != "none":
+            color += filter_edges(
+                color + sum(to_float(aov.color) for aov in aovs),
+                diffuse.shading.variance.reshape(where.shape) + refined_aovs.variance,
+                refined | refined_aovs.is_refined,
+                exposure_ev=shot.walk.settings[ViewingSettings].exposure_ev,
+            )
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
@@ -111,8 +121,8 @@ class Frames:
 
 def _shade_diffuse(
     shot: ShotContext, frame: int, reprojected: IrradianceCache, cache: IrradianceCache
-) -> Estimate:
-    """Emission and diffuse reflection, with more camera rays at edges and fine textures."""
+) -> tuple[Estimate, Mask]:
+    """Emission and diffuse reflection, with more camera rays at edges and fine textures; where, (H, W)."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
     estimate = Estimate(
@@ -132,8 +142,7 @@ def _shade_diffuse(
     everywhere = np.ones(geometry.shape_index.shape, np.bool_)
     emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
     edges = is_outline(geometry) | dilated(rays.uncertain(estimate, everywhere) | emitters)
-    rays.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
-    return estimate
+    return estimate, rays.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
 
 
 def _provenance(

@@ -36,7 +36,7 @@ def shade_specular(
     where: Mask,
     virtual: Sequence[Geometry],
     beneath: F32,
-) -> tuple[list[SpecularAov], list[Estimate]]:
+) -> tuple[list[SpecularAov], list[Estimate], RefinedAovs]:
     """Specular AOVs of a frame before temporal accumulation, and the estimates that were made for them.
 
     Parameters
@@ -57,9 +57,12 @@ def shade_specular(
     aovs : list of SpecularAov
         Reflection, and transmission if there is any.
     estimates : list of Estimate
+    refined : RefinedAovs
     """
+    nowhere = RefinedAovs(np.zeros_like(where), np.zeros(where.shape, np.float32))
     if not where.any():
-        return [SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))], []
+        black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
+        return [black], [], nowhere
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
 
@@ -84,15 +87,32 @@ def shade_specular(
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | (where & (is_edge | is_thin) & rays.matters(shown))
     if not edges.any():
-        return aovs, estimates
+        return aovs, estimates, nowhere
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
     uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
     within = edges | is_seen_in
     fine = frame_rays.looked_up(within, uploaded)
     refined = rays.refine(fine, within, edges, within, 0)
-    pairs = zip(aovs, fine.shadings, strict=False)
-    return [with_edges(aov, of.to_image(within), refined) for aov, of in pairs], [*estimates, fine]
+    layers = [of.to_image(within) for of in fine.shadings[: len(aovs)]]
+    aovs = [with_edges(aov, layer, refined) for aov, layer in zip(aovs, layers, strict=True)]
+    variance = np.where(refined, sum(layer.variance for layer in layers), np.float32(0))
+    return aovs, [*estimates, fine], RefinedAovs(refined, variance)
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedAovs:
+    """Pixels whose specular AOVs have rays of their own.
+
+    Attributes
+    ----------
+    is_refined : (H, W) bool
+    variance : (H, W) float32
+        Of the luminance of the AOVs' sum; 0 elsewhere.
+    """
+
+    is_refined: Mask
+    variance: F32
 
 
 @dataclass(frozen=True)
