@@ -82,10 +82,12 @@ def shade_specular(
     aovs = filter_spatially(virtual[:count], traced[:count], where, shot.settings.denoiser)
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
+    # Aliasing is more visible than noise: these edges have the tolerance of camera rays.
     rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
+    matters = EdgeRays.of(shot.walk, beneath=beneath).matters
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
-    edges = in_mirrors | (where & (is_edge | is_thin) & rays.matters(shown))
+    edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
     if not edges.any():
         return aovs, estimates, nowhere
 
