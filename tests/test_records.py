@@ -7,7 +7,7 @@ import pytest
 
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.records import Flow, Frame, Geometry, Shading, SurfaceClass, Warped
+from enfilade.records import Flow, Frame, Geometry, Halves, Shading, SurfaceClass, Warped
 
 H, W = 3, 4
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
@@ -33,13 +33,14 @@ def geometry(**fields):
 
 
 def warped():
-    return Warped(floats(3), floats(), floats(), words(), floats(), np.zeros((H, W), bool))
+    return Warped(Halves(floats(3), floats(3)), floats(), words(), floats(), np.zeros((H, W), bool))
 
 
 RECORDS = [
     geometry(),
     Flow(floats(2), floats(2), has_backward=True, has_forward=True),
     Shading(floats(3), floats()),
+    Halves(floats(3), floats(3)),
     warped(),
     Frame(floats(3), words(np.uint8)),
 ]

@@ -170,12 +170,39 @@ class Shading:
 
 
 @dataclass(frozen=True, eq=False)
+class Halves:
+    """An image in two halves, of independent paths: what both show is no noise.
+
+    Attributes
+    ----------
+    first, second : (H, W, 3) float32
+        Linear Rec.709 radiance.
+    dropped : int
+        Samples that were NaN or infinite and were left out.
+    """
+
+    first: F32
+    second: F32
+    dropped: int = 0
+
+    def __post_init__(self) -> None:
+        _check(self.first, (*self.second.shape[:2], 3), np.float32, "first")
+        _check(self.second, self.first.shape, np.float32, "second")
+
+    @property
+    def color(self) -> F32:
+        """Mean of both halves, (H, W, 3)."""
+        mean: F32 = np.float32(0.5) * (self.first + self.second)
+        return mean
+
+
+@dataclass(frozen=True, eq=False)
 class Keyframe:
     """A frame that is traced whole."""
 
     frame: int
     geometry: Geometry
-    shading: Shading
+    shading: Halves
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +211,7 @@ class Warped:
 
     Attributes
     ----------
-    color : (H, W, 3) float32
-    variance : (H, W) float32
-        Of the luminance.
+    shading : Halves
     depth : (H, W) float32
         From the new camera.
     shape_index : (H, W) uint32
@@ -197,8 +222,7 @@ class Warped:
         Pixels without a splat; the paper calls them holes.
     """
 
-    color: F32
-    variance: F32
+    shading: Halves
     depth: F32
     shape_index: U32
     magnification: F32
@@ -206,11 +230,15 @@ class Warped:
 
     def __post_init__(self) -> None:
         size = self.is_disoccluded.shape
-        _check(self.color, (*size, 3), np.float32, "color")
-        _check(self.variance, size, np.float32, "variance")
+        _check(self.shading.first, (*size, 3), np.float32, "shading.first")
         _check(self.depth, size, np.float32, "depth")
         _check(self.shape_index, size, np.uint32, "shape_index")
         _check(self.magnification, size, np.float32, "magnification")
+
+    @property
+    def color(self) -> F32:
+        """Mean of both halves, (H, W, 3)."""
+        return self.shading.color
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,7 @@ class Purpose(IntEnum):
     SECOND_PILOT = 11
     SPECULAR_EDGES = 12
     SPECULAR_CENTRE = 13
+    KEYFRAME_SECOND_HALF = 14
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from studies.progress import Prefixed, counted
 from studies.scenes import write_scene
 from studies.versions import origin
 
-PLAIN_SPP = 64  # rays a pixel of a reference without noise
+PLAIN_SPP = 64  # rays a pixel of keyframes and references without noise
 EXTENT_FILE = "extent.json"
 
 
@@ -119,7 +119,8 @@ class Case:
     @cached_property
     def noise_free_windows(self) -> Windows:
         """Short sequences without noise, at the size of the whole walk."""
-        walk = Walkthrough(self.whole.path, self.whole.settings, NoiseFreeRenderer(self._renderer))
+        settings = self.whole.settings.replace(SamplingSettings, spp=PLAIN_SPP)
+        walk = Walkthrough(self.whole.path, settings, NoiseFreeRenderer(self._renderer))
         probes = self.extent.windows
         return Windows(walk, self.analysis, self.monitor, probes=probes, reference_spp=PLAIN_SPP)
 

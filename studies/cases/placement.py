@@ -10,10 +10,10 @@ import numpy as np
 from enfilade.camera.path import Segment
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.paper.composite import composite
-from enfilade.methods.paper.refine import warped_pair
+from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.records import Keyframe, Shading
+from enfilade.records import Halves, Keyframe
 from enfilade.settings import KeyframeSettings, Placement, WarpSettings
 from studies.cases.case import Case
 from studies.progress import counted
@@ -93,5 +93,5 @@ def disoccluded_percent(walk: Walkthrough, segment: Segment, frame: int) -> floa
 
 def _unshaded(walk: Walkthrough, frame: int) -> Keyframe:
     geometry = walk.view(frame).geometry
-    size = geometry.depth.shape
-    return Keyframe(frame, geometry, Shading(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)))
+    black = np.zeros((*geometry.depth.shape, 3), np.float32)
+    return Keyframe(frame, geometry, Halves(black, black))

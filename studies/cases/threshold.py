@@ -18,8 +18,8 @@ import numpy as np
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, analyze
 from enfilade.methods.paper.convolve import SIGMAS
+from enfilade.methods.paper.keyframe import MIN_SPP
 from enfilade.methods.paper.masks import slow_pixels
-from enfilade.methods.paper.method import MIN_SPP
 from enfilade.methods.paper.support import spatial_support_px
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor

@@ -6,7 +6,6 @@ Frames are sampled at pixels' centres, as in the paper (§5.2); the filter antia
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +16,20 @@ from enfilade.gbuffer import View, image_flow
 from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis
 from enfilade.methods.paper.composite import composite
-from enfilade.methods.paper.refine import warped_pair
+from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.support import spatial_support_px, temporal_limits
 from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
+from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.records import F32, Geometry, Keyframe, Shading, Warped
+from enfilade.records import F32, Geometry, Keyframe, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
 from studies.cases.virtual_images import reflected_geometry
 from studies.cases.visibility import Viewer
 
-CACHED_IMAGES, CACHED_VIEWS = 64, 24  # about 600 MiB at 640x480
+CACHED_IMAGES, CACHED_VIEWS, CACHED_KEYFRAMES = 64, 24, 8  # about 700 MiB at 640x480
 END_FRAMES = 10  # at the ends of a path, where the support of the temporal filter is truncated
 
 
@@ -67,6 +67,7 @@ class Windows:
         self._folder = folder
         self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
         self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
+        self._keyframes: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
 
     def around(self, frame: int, settings: AntialiasSettings) -> range:
         """Frames of the same shot that the filter may use."""
@@ -103,8 +104,8 @@ class Windows:
     def reused(self, frame: int) -> Shading:
         """A frame composited from its keyframes, with traced disocclusions (I_ibr of Fig. 9).
 
-        The keyframes are the initial ones, without splits. The variance is the warped density of
-        the noise (:mod:`enfilade.metric.noise`).
+        The keyframes are the initial ones, without splits. The variance is that of traced pixels, and 0
+        elsewhere: keyframes are denoised.
         """
         segments = (s for shot in self.analysis.segments() for s in shot)
         segment = next((s for s in segments if frame in s.inbetweens), None)
@@ -113,8 +114,10 @@ class Windows:
         return self._cached("reused", frame, lambda: self._composited(segment, frame))
 
     def keyframe(self, frame: int) -> Keyframe:
-        """A traced frame as a keyframe."""
-        return Keyframe(frame, self.geometry(frame), self.traced(frame))
+        """A keyframe of the method."""
+        return self._keyframes.get(
+            frame, lambda: Keyframe(frame, self.geometry(frame), trace_keyframe(self.walk, frame))
+        )
 
     def antialiased(
         self,
@@ -159,12 +162,9 @@ class Windows:
         settings = self.walk.settings[WarpSettings]
         warped = warped_pair(self.walk, self.keyframe(segment.first), self.keyframe(segment.last), frame)
         color, is_disoccluded = composite(*warped, geometry, progress=progress, settings=settings)
-        before, after = map(_with_variance_as_color, warped)
-        density, _ = composite(before, after, geometry, progress=progress, settings=settings)
-        variance, traced = np.ascontiguousarray(density[..., 0]), self.traced(frame)
+        traced = self.traced(frame)
         color[is_disoccluded] = traced.color[is_disoccluded]
-        variance[is_disoccluded] = traced.variance[is_disoccluded]
-        return Shading(color, variance)
+        return Shading(color, np.where(is_disoccluded, traced.variance, np.float32(0.0)))
 
     def _cached(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
         if self._folder is None:
@@ -199,7 +199,3 @@ def probe_frames(analysis: Analysis, count: int) -> list[int]:
 def _trace(walk: Walkthrough, frame: int, spp: int, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
     everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
     return walk.trace(frame, everywhere, purpose, spp=spp, pixel_filter=pixel_filter).to_image(everywhere)
-
-
-def _with_variance_as_color(warped: Warped) -> Warped:
-    return replace(warped, color=np.repeat(warped.variance[..., None], 3, axis=2))

@@ -6,7 +6,7 @@ import numpy as np
 
 from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
-from enfilade.records import Geometry, Keyframe, Shading
+from enfilade.records import Geometry, Halves, Keyframe, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Plane, Quad, Sphere
@@ -28,7 +28,9 @@ def traced_image(scene: AnalyticScene, camera: Camera, *, spp: int = 1, box: boo
 
 
 def keyframe_of(scene: AnalyticScene, camera: Camera, *, frame: int = 0, spp: int = 1) -> Keyframe:
-    return Keyframe(frame, geometry_of(scene, camera), traced_image(scene, camera, spp=spp))
+    """A keyframe through the pixels' centres, both halves the same."""
+    color = traced_image(scene, camera, spp=spp).color
+    return Keyframe(frame, geometry_of(scene, camera), Halves(color, color))
 
 
 def pixel_centres(camera: Camera) -> np.ndarray:

@@ -6,6 +6,7 @@ Usable alone, with NumPy arrays of luminance: `Aqm` for images, `SequenceAqm` fo
 from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison, Part
 from enfilade.metric.eye import Pursuit
+from enfilade.metric.halves import HalvesAqm, LuminanceHalves
 from enfilade.metric.modern import ModernMetric
 from enfilade.metric.paper import PaperMetric
 from enfilade.metric.sequence import SequenceAqm, sequence_score
@@ -14,6 +15,8 @@ from enfilade.metric.transducer import Transducer
 __all__ = [
     "Aqm",
     "Comparison",
+    "HalvesAqm",
+    "LuminanceHalves",
     "ModernMetric",
     "PaperMetric",
     "Part",

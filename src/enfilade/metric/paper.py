@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -24,7 +25,7 @@ from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["PaperMetric"]
+__all__ = ["Adaptation", "PaperMetric", "adapt"]
 
 F64: TypeAlias = npt.NDArray[np.float64]
 
@@ -60,13 +61,10 @@ class PaperMetric:
     def compare(self, pair: Pair, eyes: Sequence[Pursuit]) -> Comparison:
         """Compare two images; the most sensitive of several eye movements counts."""
         # Respond to luminance; the reference's mean sets adaptation and contrast.
-        test, reference = response(pair.test), response(pair.reference)
-        adapting = max(_mean(pair.reference, pair.valid), DARKEST_CD_M2)
-        mean = _mean(reference, pair.valid)
-        darkest = float(response(np.asarray(DARKEST_CD_M2, dtype=np.float32)))
-        contrast = 1.0 / (max(mean, darkest) * contrast_gain(adapting))
+        adaptation = adapt(pair.reference, pair.valid)
+        test, reference = adaptation.respond(pair.test), adaptation.respond(pair.reference)
         # Transform the difference rather than the test, so that equal images give exactly zero.
-        spectra = self._bank.spectra(reference - np.float32(mean), test - reference)
+        spectra = self._bank.spectra(reference, test - reference)
         noise = None
         if pair.noise_variance is not None:
             luminance = np.float32(0.5) * (pair.test + pair.reference)
@@ -75,8 +73,8 @@ class PaperMetric:
         sensitivity = ChannelSensitivity(
             self._table,
             pair.valid.shape,
-            adapting=Pyramid(np.asarray(adapting, dtype=np.float32)),
-            contrast=Pyramid(np.asarray(contrast, dtype=np.float32)),
+            adapting=Pyramid(np.asarray(adaptation.luminance_cd_m2, dtype=np.float32)),
+            contrast=Pyramid(np.asarray(adaptation.contrast, dtype=np.float32)),
             velocity=pair.velocity,
             eyes=eyes,
         )
@@ -94,6 +92,37 @@ class PaperMetric:
                 difference /= threshold_elevation(masker, self._mask_slope)
                 pool.add(band.level, raised(np.square(difference)), band.reduction)
         return pool.comparison()
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """State of an eye adapted to the mean of an image.
+
+    Attributes
+    ----------
+    luminance_cd_m2 : float
+        Mean luminance.
+    mean_response : float
+        Mean response (`metric.amplitude`).
+    contrast : float
+        Luminance contrast of a response of one.
+    """
+
+    luminance_cd_m2: float
+    mean_response: float
+    contrast: float
+
+    def respond(self, luminance_cd_m2: F32) -> F32:
+        """Response to an image, less the mean."""
+        return response(luminance_cd_m2) - np.float32(self.mean_response)
+
+
+def adapt(reference_cd_m2: F32, valid: Mask) -> Adaptation:
+    """Adapt to the valid pixels of an image."""
+    adapting = max(_mean(reference_cd_m2, valid), DARKEST_CD_M2)
+    mean = _mean(response(reference_cd_m2), valid)
+    darkest = float(response(np.asarray(DARKEST_CD_M2, dtype=np.float32)))
+    return Adaptation(adapting, mean, 1.0 / (max(mean, darkest) * contrast_gain(adapting)))
 
 
 def _csf(frequency_cpd: float, velocity_deg_s: F64, _luminance_cd_m2: F64) -> F64:

@@ -9,7 +9,7 @@ import scipy.ndimage
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper.composite import agrees, composite
 from enfilade.methods.paper.warp import warp_keyframe
-from enfilade.records import Geometry, Warped
+from enfilade.records import Geometry, Halves, Warped
 from enfilade.settings import WarpSettings
 from support.analytic_scene import AnalyticScene, Material, Plane, Sphere
 from support.analytic_truth import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
@@ -34,8 +34,7 @@ def pixel(depth=2.0, shape_index=1):
 def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded=False):
     size = (1, 1)
     return Warped(
-        np.full((*size, 3), value, np.float32),
-        np.zeros(size, np.float32),
+        Halves(*(np.full((*size, 3), value, np.float32) for _ in range(2))),
         np.full(size, depth, np.float32),
         np.full(size, shape_index, np.uint32),
         np.full(size, magnification, np.float32),

@@ -45,7 +45,7 @@ def traced_shapes(
 ):
     """Specular shapes that must be traced."""
     geometry = scene(two_panes() if shape_index is None else shape_index, surface)
-    reusable = reusable_specular_shapes(jnd.astype(np.float32), is_compared, geometry, settings)
+    reusable = reusable_specular_shapes(jnd.astype(np.float32), is_compared, EVERYWHERE, geometry, settings)
     return frozenset(geometry.shape_index[specular_pixels(geometry, reusable)].tolist())
 
 

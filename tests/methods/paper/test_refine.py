@@ -1,14 +1,18 @@
 """Refinement: segments that are split, the keyframes that this inserts, and where it ends."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from enfilade.camera.path import Segment
+from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.method import Paper
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
-from enfilade.records import Provenance
+from enfilade.records import Keyframe, Provenance
 from support.closed_room import opened_room, room_path
 from support.in_memory import run_passes, walk_of
+from support.planted_wall import FRAMES, PlantedWall, planted_path
 
 SIZE = (32, 24)
 
@@ -41,12 +45,39 @@ def test_split_segments_have_a_keyframe_in_the_middle(renderer, monkeypatch, fra
     assert np.isfinite(found.colors).all()
 
 
-def test_splitting_ends_where_it_does_not_help(renderer, monkeypatch):
+def test_splitting_goes_on_until_the_limit_holds(renderer, monkeypatch):
     visible_percent(monkeypatch, lambda _: 50.0)
     walk = walk_of(room_path(9, SIZE), renderer)
     results = Refinement(walk).refine(Segment(0, 8), pytest.fail)
-    assert [(r.first, r.last, r.is_split) for r in results] == [(0, 8, True), (0, 4, False), (4, 8, False)]
-    assert leaf_of(results, 5) == results[2]
+    leaves = [r for r in results if not r.is_split]
+    assert [(r.first, r.last) for r in leaves] == [(k, k + 1) for k in range(8)]
+    assert leaf_of([*results, SegmentResult(8, 10, 0, 9)], 9).middle == 9
+
+
+def refined(change, *, spp, seed, limit=10.0):
+    """Refinement of a walk along a wall that changes between frames 4 and 5."""
+    tables = {"sampling": {"spp": spp}, "trace": {"seed": seed}, "masks": {"split_percent": limit}}
+    walk = walk_of(planted_path(), PlantedWall(change, noise=1.0), viewing={"diagonal_m": 0.05}, **tables)
+
+    @cache
+    def keyframe(frame):
+        return Keyframe(frame, walk.view(frame).geometry, trace_keyframe(walk, frame))
+
+    return Refinement(walk).refine(Segment(0, FRAMES - 1), keyframe)
+
+
+@pytest.mark.parametrize("change", ["shadow", "highlight", "texture"])
+def test_a_change_is_found_and_split_with_8_paths(change):
+    results = refined(change, spp=8, seed=1)
+    assert {(r.first, r.last) for r in results if r.is_split} >= {(0, 8), (4, 8), (4, 6)}
+    assert not next(r for r in results if (r.first, r.last) == (0, 4)).is_split
+
+
+def test_noise_of_4_paths_is_no_difference():
+    # `studies/cases/README.md` has 1000 trials.
+    for seed in range(3):
+        (result,) = refined("none", spp=4, seed=seed)
+        assert result.percent_visible < 5.0
 
 
 def test_results_survive_a_table_of_frame_numbers():

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper.warp import _land, disparity_gradient, warp_keyframe
-from enfilade.records import Geometry, Keyframe, Shading
+from enfilade.records import Geometry, Halves, Keyframe
 from enfilade.settings import WarpSettings
 from support.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere, Waves
 from support.analytic_truth import first_hits, keyframe_of, pixel_centres, projected, psnr, ray_directions
@@ -41,7 +41,6 @@ def test_a_warp_to_the_same_camera_is_exact(name):
     assert not got.is_disoccluded.any()
     assert got.color.tobytes() == keyframe.shading.color.tobytes()
     assert got.shape_index.tobytes() == keyframe.geometry.shape_index.tobytes()
-    assert got.variance.tobytes() == keyframe.shading.variance.tobytes()
     assert (got.magnification == 1.0).all()
     np.testing.assert_allclose(got.depth, keyframe.geometry.depth, rtol=1e-6)
 
@@ -231,7 +230,7 @@ def test_values_of_disoccluded_pixels_are_zero():
     keyframe = keyframe_of(ball(), camera_at((0, 0, 4)))
     got = warp_keyframe(keyframe, beside(keyframe.geometry.camera, (0, 0, 0), (0, 15, 0)), SETTINGS)
     assert 0.1 < got.is_disoccluded.mean() < 0.6
-    for values in (got.color, got.variance, got.depth, got.shape_index, got.magnification):
+    for values in (got.color, got.depth, got.shape_index, got.magnification):
         assert np.isfinite(values).all()
         assert not values[got.is_disoccluded].any()
 
@@ -265,7 +264,7 @@ def test_surfaces_behind_the_camera_are_left_out():
     camera = room_walk(3).cameras[1]
     target = beside(camera, (0, 0, -3.2))  # through the lamp, close to the pillar
     got = warp_keyframe(keyframe_of(room(), camera), target, SETTINGS)
-    for values in (got.color, got.variance, got.depth, got.magnification):
+    for values in (got.color, got.depth, got.magnification):
         assert np.isfinite(values).all()
     assert (got.depth[~got.is_disoccluded & (got.shape_index > 0)] > 0).all()
     turned = warp_keyframe(keyframe_of(room(), camera), beside(camera, (0, 0, 0), (0, 180, 0)), SETTINGS)
@@ -281,15 +280,14 @@ def test_another_size_of_image():
     np.testing.assert_allclose(got.magnification, 1.5**2, rtol=1e-3)
 
 
-def test_variance_is_interpolated_and_grows_with_magnification():
-    camera = camera_at((0, 0, 4))
-    plain = keyframe_of(wall(), camera)
-    shading = Shading(plain.shading.color, np.full(plain.shading.variance.shape, 0.25, np.float32))
-    keyframe = Keyframe(0, plain.geometry, shading)
-    near = warp_keyframe(keyframe, camera_at((0, 0, 2)), SETTINGS)
-    np.testing.assert_allclose(near.variance, 0.25 * 4.0, rtol=1e-3)
-    far = warp_keyframe(keyframe, camera_at((0, 0, 6)), SETTINGS)
-    np.testing.assert_allclose(far.variance[~far.is_disoccluded], 0.25, rtol=1e-5)
+def test_both_halves_are_warped_alike():
+    plain = keyframe_of(wall(), camera_at((0, 0, 4)))
+    color = plain.shading.color
+    halves = dataclasses.replace(plain, shading=Halves(color, 2 * color))
+    single, pair = (warp_keyframe(k, camera_at((0.1, 0, 3)), SETTINGS) for k in (plain, halves))
+    assert pair.shading.first.tobytes() == single.color.tobytes()
+    np.testing.assert_allclose(pair.shading.second, 2 * single.color, rtol=1e-6)
+    np.testing.assert_allclose(pair.color, 1.5 * single.color, rtol=1e-6)
 
 
 def test_the_disparity_gradient_of_a_plane_is_exact():
@@ -354,7 +352,7 @@ def test_sample_positions_are_exact():
     camera = camera_at((0, 0, 4))
     keyframe = keyframe_of(wall(), camera)
     ramp = np.repeat(pixel_centres(camera)[..., :1], 3, axis=-1).astype(np.float32)
-    keyframe = Keyframe(0, keyframe.geometry, Shading(ramp, keyframe.shading.variance))
+    keyframe = Keyframe(0, keyframe.geometry, Halves(ramp, ramp))
     target = beside(camera, (0.137, 0.071, -0.4))
     got = warp_keyframe(keyframe, target, SETTINGS)
     depth, _ = first_hits(wall(), target.eye, ray_directions(target))

@@ -1,34 +1,15 @@
-"""Frames before filtering: keyframes, and in-betweens reprojected from them and filled (§4.3, Fig. 7)."""
+"""In-betweens before filtering: reprojected from keyframes, and filled (§4.3, Fig. 7)."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from enfilade.methods.paper.composite import composite
 from enfilade.methods.paper.masks import provenance_of, slow_pixels, specular_pixels
-from enfilade.methods.paper.refine import SegmentResult, warped_pair
+from enfilade.methods.paper.refine import SegmentResult
+from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, Frame, Keyframe, Mask, Provenance, Shading
+from enfilade.records import F32, Frame, Keyframe, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import MaskSettings, SamplingSettings, WarpSettings
-
-
-def fill_slow_pixels(walk: Walkthrough, frame: int, shading: Shading) -> tuple[Frame, int]:
-    """A keyframe whose slow pixels are traced again, with paths distributed over the pixel.
-
-    The temporal filter finds no new samples for them along the motion (§5.2), so that they must be
-    antialiased here. The keyframe that is warped keeps its paths through the pixels' centres.
-
-    Returns
-    -------
-    frame : Frame
-    dropped : int
-        Samples that were left out since they were not finite.
-    """
-    color = shading.color.copy()
-    is_slow = slow_pixels(walk.view(frame).speed_deg_s, walk.settings[MaskSettings])
-    dropped = _trace_into(walk, frame, color, is_slow)
-    return Frame(color, np.full(is_slow.shape, Provenance.KEYFRAME, np.uint8)), dropped
 
 
 def derive(

@@ -19,21 +19,23 @@ def slow_pixels(speed_deg_s: F32, settings: MaskSettings) -> Mask:
 
 
 def reusable_specular_shapes(
-    jnd: F32, is_compared: Mask, geometry: Geometry, settings: MaskSettings
+    jnd: F32, is_compared: Mask, is_inside: Mask, geometry: Geometry, settings: MaskSettings
 ) -> frozenset[int]:
     """Specular shapes whose reuse can't be seen (§4.3 step 4b, thresholds of §6).
 
     Each connected region of a specular shape is compared separately. It is visible if a group of its pixels
     differs by more than 2 JND, or if more than a quarter of them differ by more than 1 JND. The latter is
-    not applied to small regions, of which shapes behind foliage and railings have many. A shape of which
-    both keyframes show less than half can't be compared.
+    not applied to small regions, of which shapes behind foliage and railings have many. A shape of whose
+    inside both keyframes show less than half can't be compared.
 
     Parameters
     ----------
     jnd : (H, W) float32
         Visible difference between the two warped keyframes.
     is_compared : (H, W) bool
-        Pixels at which both keyframes show the surface.
+        Pixels inside of surfaces at which both keyframes show the surface.
+    is_inside : (H, W) bool
+        Pixels inside of surfaces: not at their outlines.
     geometry
         G-buffer of the frame.
     settings
@@ -50,7 +52,7 @@ def reusable_specular_shapes(
     reusable: set[int] = set()
     for shape_index in np.unique(geometry.shape_index[is_candidate]).tolist():
         # Skip shapes that can't be compared.
-        shown = geometry.is_specular & (geometry.shape_index == shape_index)
+        shown = geometry.is_specular & is_inside & (geometry.shape_index == shape_index)
         compared = shown & is_compared
         if np.count_nonzero(compared) < MIN_COMPARED * np.count_nonzero(shown):
             continue

@@ -12,14 +12,15 @@ from enfilade.camera.path import Segment
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.paper.inbetween import derive, fill_slow_pixels
+from enfilade.methods.denoise import why_no_denoiser
+from enfilade.methods.paper.inbetween import derive
+from enfilade.methods.paper.keyframe import MIN_SPP, trace_keyframe
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
 from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.support import spatial_support_px, temporal_limits
 from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import Frame, Keyframe, Provenance, Shading
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.records import Frame, Halves, Keyframe, Provenance
 from enfilade.settings import (
     AntialiasSettings,
     KeyframeSettings,
@@ -32,7 +33,6 @@ from enfilade.settings import (
     WarpSettings,
 )
 
-MIN_SPP = 2  # the variance of a pixel, for the metric, is that of its paths
 CACHED_KEYFRAMES = 3
 
 
@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 2
+    revision = 3
     settings = (
         TraceSettings,
         SamplingSettings,
@@ -52,8 +52,8 @@ class Paper(Method):
         AntialiasSettings,
     )
     passes = (
-        Pass("keyframes", Shading),
-        Pass("segments", Shading, reads=("keyframes",)),
+        Pass("keyframes", Halves),
+        Pass("segments", Halves, reads=("keyframes",)),
         Pass("inbetweens", Frame, reads=("keyframes", "segments")),
         Pass(FRAMES, Frame, reads=("inbetweens",)),
     )
@@ -62,7 +62,7 @@ class Paper(Method):
         self._context: _Context | None = None
 
     def check(self, settings: Settings) -> None:
-        """Refuse a single path a pixel.
+        """Refuse a single path a pixel, and a missing denoiser.
 
         Raises
         ------
@@ -70,9 +70,11 @@ class Paper(Method):
         """
         if settings[SamplingSettings].spp < MIN_SPP:
             raise SettingsError(
-                f"--method paper needs --spp {MIN_SPP} or more: the metric tells noise from differences "
-                "by the variance of a pixel's paths"
+                f"--method paper needs --spp {MIN_SPP} or more: keyframes are traced in two halves, by which "
+                "the metric tells differences from noise"
             )
+        if why := why_no_denoiser():
+            raise SettingsError(f"--method paper denoises its keyframes. {why}")
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Initial keyframes (§4.2)."""
@@ -104,7 +106,7 @@ class Paper(Method):
             self._context = _Context(inputs, walk)
         match task.pass_name:
             case "keyframes":
-                shading = _traced(walk, task.frame)
+                shading = trace_keyframe(walk, task.frame)
                 return Output({task.frame: shading}, {"dropped": shading.dropped})
             case "segments":
                 return _refined(task, self._context)
@@ -133,7 +135,7 @@ class _Context:
         pass_name = "keyframes" if frame in (initial.first, initial.last) else "segments"
         return self.keyframe_of(frame, lambda: self.inputs.record(pass_name, frame))
 
-    def keyframe_of(self, frame: int, shading: Callable[[], Shading]) -> Keyframe:
+    def keyframe_of(self, frame: int, shading: Callable[[], Halves]) -> Keyframe:
         """A keyframe with its shading."""
         return self.keyframes.get(frame, lambda: Keyframe(frame, self.walk.view(frame).geometry, shading()))
 
@@ -142,13 +144,13 @@ def _refined(task: Task, context: _Context) -> Output:
     """Split an initial segment until reuse can't be seen; traces the keyframes that this inserts."""
     walk = context.walk
     segment = next(s for s in context.inputs.analysis.segments()[task.shot] if s.first == task.frame)
-    inserted: dict[int, Shading] = {}
+    inserted: dict[int, Halves] = {}
 
     def keyframe(frame: int) -> Keyframe:
         if frame in (segment.first, segment.last):
             return context.keyframe(frame, segment)
         if frame not in inserted:
-            inserted[frame] = _traced(walk, frame)
+            inserted[frame] = trace_keyframe(walk, frame)
         return context.keyframe_of(frame, lambda: inserted[frame])
 
     results = context.refinement.refine(segment, keyframe)
@@ -169,23 +171,27 @@ def _inbetween(task: Task, context: _Context) -> Output:
         color = inputs.record("inbetweens", static).color
         return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.REUSED, np.uint8))})
 
-    # Complete an initial keyframe, or one that was inserted by a split.
+    # Take an initial keyframe, or one that was inserted by a split.
     segments = inputs.analysis.segments()[task.shot]
     if frame in keyframes_of(segments):
-        made, dropped = fill_slow_pixels(walk, frame, inputs.record("keyframes", frame))
-        return Output({frame: made}, {"dropped": dropped})
+        return _completed(frame, inputs.record("keyframes", frame))
     initial = next(s for s in segments if s.first < frame < s.last)
     tables = inputs.facts("segments", initial.first)["segments"]
     results = [SegmentResult.from_table(table, walk.path.numbers) for table in tables]
     if any(result.is_split and result.middle == frame for result in results):
-        made, dropped = fill_slow_pixels(walk, frame, inputs.record("segments", frame))
-        return Output({frame: made}, {"dropped": dropped})
+        return _completed(frame, inputs.record("segments", frame))
 
     # Derive all others from the keyframes of their segment.
     result = leaf_of(results, frame)
     first, last = (context.keyframe(k, initial) for k in (result.first, result.last))
     made, dropped = derive(walk, result, first, last, frame)
     return Output({frame: made}, {"dropped": dropped})
+
+
+def _completed(frame: int, shading: Halves) -> Output:
+    """A keyframe before filtering."""
+    color = shading.color
+    return Output({frame: Frame(color, np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8))})
 
 
 def _filtered(task: Task, context: _Context) -> Output:
@@ -210,19 +216,6 @@ def _filtered(task: Task, context: _Context) -> Output:
         settings,
     )
     return Output({frame: Frame(color, raw.provenance)})
-
-
-def _traced(walk: Walkthrough, frame: int) -> Shading:
-    """A keyframe, traced through the pixels' centres as the G-buffer: each pixel shows a single surface."""
-    size = walk.path.height, walk.path.width
-    traced = walk.trace(
-        frame,
-        np.ones(size, np.bool_),
-        Purpose.KEYFRAME,
-        spp=walk.settings[SamplingSettings].spp,
-        pixel_filter=PixelFilter.CENTRE,
-    )
-    return Shading(traced.color.reshape(*size, 3), traced.variance.reshape(size), traced.dropped)
 
 
 def _slice(inputs: Inputs, walk: Walkthrough, frame: int) -> tuple[Slice, Frame]:

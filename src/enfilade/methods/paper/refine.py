@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from enfilade.camera.path import Segment
 from enfilade.gbuffer import View
 from enfilade.methods.paper.composite import agrees
-from enfilade.methods.paper.convolve import SIGMAS
+from enfilade.methods.paper.footprint import outline_pixels, shown_alike
 from enfilade.methods.paper.masks import reusable_specular_shapes, slow_pixels, specular_pixels
-from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.support import spatial_support_px
-from enfilade.methods.paper.warp import warp_keyframe
+from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.metric import Aqm, Pursuit
+from enfilade.metric import HalvesAqm, LuminanceHalves, Pursuit
 from enfilade.records import F32, Keyframe, Mask, Warped
-from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, ViewingSettings, WarpSettings
+from enfilade.settings import AntialiasSettings, MaskSettings, MetricSettings, WarpSettings
 
 MIN_COMPARED = 0.05  # of the image: fewer unmasked pixels are not representative of a segment
-GAIN = 0.9  # of its parent's visible pixels: a half with more is not split again
 FFT_THREADS = 2
 
 
@@ -43,7 +39,7 @@ class SegmentResult:
     percent_visible, percent_visible_no_pursuit : float
         Unmasked pixels above 1 JND, percent, with and without smooth pursuit.
     is_split : bool
-        More of them than the settings allow, and splitting still helps.
+        More of them than the settings allow.
     """
 
     first: int
@@ -89,9 +85,6 @@ def leaf_of(results: Sequence[SegmentResult], frame: int) -> SegmentResult:
 class Refinement:
     """Splits segments until the metric finds few visible differences between their warped keyframes.
 
-    Splitting also ends where it does not help: differences that do not shrink with the segment, such as the
-    aliasing of keyframes sampled at pixel centres, do not come from reuse.
-
     Parameters
     ----------
     walk
@@ -100,7 +93,7 @@ class Refinement:
     def __init__(self, walk: Walkthrough) -> None:
         self._walk = walk
         slope = walk.settings[MetricSettings].mask_slope
-        self._metric = Aqm.paper(walk.viewing, mask_slope=slope, workers=FFT_THREADS)
+        self._metric = HalvesAqm(walk.viewing, mask_slope=slope, workers=FFT_THREADS)
 
     def refine(self, initial: Segment, keyframe: Callable[[int], Keyframe]) -> list[SegmentResult]:
         """Compare a segment, and its halves where it is split.
@@ -112,16 +105,13 @@ class Refinement:
             Returns the keyframe at a frame, and traces it at the first call.
         """
         results: list[SegmentResult] = []
-        pending: list[tuple[Segment, float]] = [(initial, np.inf)]
+        pending = [initial]
         while pending:
-            segment, parent_percent = pending.pop()
+            segment = pending.pop()
             result = self.compare(segment, keyframe)
-            if result.percent_visible >= GAIN * parent_percent:
-                result = replace(result, is_split=False)
             results.append(result)
             if result.is_split and result.middle is not None:
-                halves = segment.split(result.middle)
-                pending += [(half, result.percent_visible) for half in reversed(halves)]
+                pending += reversed(segment.split(result.middle))
         return results
 
     def compare(self, segment: Segment, keyframe: Callable[[int], Keyframe]) -> SegmentResult:
@@ -132,20 +122,23 @@ class Refinement:
         if middle is None:
             return SegmentResult(*ends, middle=None)
         view, masks = walk.view(middle), walk.settings[MaskSettings]
-        before, after = warped_pair(walk, keyframe(segment.first), keyframe(segment.last), middle)
+        warped = warped_pair(walk, keyframe(segment.first), keyframe(segment.last), middle)
 
-        # Compare at the pixels at which both keyframes show the surface.
+        # Compare inside the surfaces that both keyframes show.
         tolerance = walk.settings[WarpSettings].depth_tolerance
-        is_compared = agrees(before, view.geometry, tolerance) & agrees(after, view.geometry, tolerance)
-        jnd, jnd_no_pursuit = self._differences(view, before, after, is_compared)
+        is_inside = ~outline_pixels(view.geometry, tolerance)
+        is_compared = is_inside.copy()
+        for one in warped:
+            is_compared &= agrees(one, view.geometry, tolerance)
+        jnd, jnd_no_pursuit = self._differences(view, warped, is_compared)
 
         # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.
-        reusable = reusable_specular_shapes(jnd, is_compared, view.geometry, masks)
+        reusable = reusable_specular_shapes(jnd, is_compared, is_inside, view.geometry, masks)
         is_slow = slow_pixels(view.speed_deg_s, masks)
         unmasked = is_compared & ~is_slow & ~specular_pixels(view.geometry, reusable)
         if (is_compared & ~unmasked).any() and unmasked.mean() >= MIN_COMPARED:
             # Compare again without them: the metric's filters spread a difference over its neighbourhood.
-            jnd, jnd_no_pursuit = self._differences(view, before, after, unmasked)
+            jnd, jnd_no_pursuit = self._differences(view, warped, unmasked)
         percent, percent_no_pursuit = (_percent_visible(j, unmasked) for j in (jnd, jnd_no_pursuit))
         return SegmentResult(
             *ends,
@@ -156,48 +149,22 @@ class Refinement:
             is_split=percent > masks.split_percent,
         )
 
-    def _differences(self, view: View, before: Warped, after: Warped, is_compared: Mask) -> tuple[F32, F32]:
-        """JND maps between two warped keyframes, with smooth pursuit and without.
-
-        Both are filtered spatially as the delivered frame will be. The metric discounts differences within
-        their noise.
-        """
+    def _differences(self, view: View, warped: tuple[Warped, Warped], is_compared: Mask) -> tuple[F32, F32]:
+        """JND maps between two warped keyframes, with smooth pursuit and without."""
         walk = self._walk
         density, settings = walk.viewing.pixels_per_degree, walk.settings[AntialiasSettings]
         support = spatial_support_px(view.speed_deg_s, density, settings)
-        shown = [
-            walk.display_luminance(
-                reconstruct(np.where(one.is_disoccluded[..., None], other.color, one.color), support)
-            )
-            for one, other in ((before, after), (after, before))
+        images = [
+            LuminanceHalves(walk.display_luminance(one.first), walk.display_luminance(one.second))
+            for one in shown_alike(*warped, is_compared, support)
         ]
-        noise = self._displayed_variance(before.variance + after.variance)
-        pursuits = (Pursuit.PURSUIT, Pursuit.NONE)
         jnd, jnd_no_pursuit = (
             self._metric.compare(
-                *shown,
-                velocity=view.velocity_deg_s,
-                valid=is_compared,
-                noise_variance=noise,
-                noise_blur_px=support / np.float32(SIGMAS),
-                pursuit=pursuit,
+                *images, velocity=view.velocity_deg_s, valid=is_compared, pursuit=pursuit
             ).jnd
-            for pursuit in pursuits
+            for pursuit in (Pursuit.PURSUIT, Pursuit.NONE)
         )
         return jnd, jnd_no_pursuit
-
-    def _displayed_variance(self, variance: F32) -> F32:
-        """Variance on the display, (cd/m2)^2: exposure and display are linear up to the clipping."""
-        of = self._walk.settings[ViewingSettings]
-        slope = 2.0**of.exposure_ev * (of.peak_cd_m2 - of.black_cd_m2)
-        displayed: F32 = (variance * slope**2).astype(np.float32)
-        return displayed
-
-
-def warped_pair(walk: Walkthrough, first: Keyframe, last: Keyframe, frame: int) -> tuple[Warped, Warped]:
-    """Both keyframes of a segment, reprojected to a frame between them."""
-    camera, settings = walk.path.cameras[frame], walk.settings[WarpSettings]
-    return warp_keyframe(first, camera, settings), warp_keyframe(last, camera, settings)
 
 
 def _percent_visible(jnd: F32, where: Mask) -> float:

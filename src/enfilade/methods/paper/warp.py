@@ -14,7 +14,8 @@ from enfilade.kernels.bilinear import bilinear_taps
 from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject, warp_jacobian
 from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
-from enfilade.records import F32, U32, Geometry, Keyframe, Warped
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import F32, U32, Geometry, Halves, Keyframe, Warped
 from enfilade.settings import WarpSettings
 
 CONTINUOUS = 0.1  # largest relative change of disparity between neighbours on one surface
@@ -31,8 +32,6 @@ def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) ->
     Returns
     -------
     Warped
-        The variance is interpolated as the colours, and grows with the magnification: it is the density of
-        the noise, which resampling makes coarser, not weaker.
     """
     landing = _land(keyframe.geometry, camera)
     longest = settings.max_magnification
@@ -44,6 +43,12 @@ def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) ->
     )
     dr.eval(keys)
     return _resample(keyframe, camera, landing, keys, settings.depth_tolerance)
+
+
+def warped_pair(walk: Walkthrough, first: Keyframe, last: Keyframe, frame: int) -> tuple[Warped, Warped]:
+    """Both keyframes of a segment, reprojected to a frame between them."""
+    camera, settings = walk.path.cameras[frame], walk.settings[WarpSettings]
+    return warp_keyframe(first, camera, settings), warp_keyframe(last, camera, settings)
 
 
 def disparity_gradient(geometry: Geometry) -> F32:
@@ -139,13 +144,12 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     at = centre + offset
 
     # Interpolate among the neighbours on the winner's surface.
-    shape_indices, colors, variances = (
-        lanes(v) for v in (keyframe.geometry.shape_index, keyframe.shading.color, keyframe.shading.variance)
-    )
+    shape_indices = lanes(keyframe.geometry.shape_index)
+    halves = lanes(keyframe.shading.first), lanes(keyframe.shading.second)
     shape_index = dr.gather(UInt, shape_indices, winner, ~is_empty)
     disparity = dr.gather(Float, landing.disparity, winner, ~is_empty)
     gradient = dr.gather(Array2f, landing.gradient, winner, ~is_empty)
-    total, color, variance = Float(0), Array3f(0), Float(0)
+    total, colors = Float(0), [Array3f(0), Array3f(0)]
     for tap in bilinear_taps(at.x, at.y, width=source.width, height=source.height):
         step = Array2f(tap.column, tap.row) + 0.5 - centre
         expected = disparity + dr.dot(gradient, step)
@@ -153,21 +157,18 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
         is_same = (dr.gather(UInt, shape_indices, tap.lane) == shape_index) & (jump <= tolerance * disparity)
         weight = dr.select(is_same & ~is_empty, tap.weight, 0.0)  # the position may be NaN where it is empty
         total += weight
-        color += weight * dr.gather(Array3f, colors, tap.lane)
-        variance += weight * dr.gather(Float, variances, tap.lane)
+        colors = [c + weight * dr.gather(Array3f, h, tap.lane) for c, h in zip(colors, halves, strict=True)]
 
     # Normalize, and clear disoccluded pixels.
     is_disoccluded = is_empty | (total <= 0.0)
     inverse = dr.select(is_disoccluded, 0.0, 1.0 / total)
     magnification = dr.select(is_disoccluded, 0.0, det)
-    color, variance = color * inverse, variance * inverse * dr.maximum(det, 1.0)
-    variance = dr.select(is_disoccluded, 0.0, variance)
+    first, second = (color * inverse for color in colors)
     depth = dr.select(is_disoccluded | (depth >= INFINITE), 0.0, depth)
     shape_index = dr.select(is_disoccluded, 0, shape_index)
-    dr.eval(color, variance, depth, shape_index, magnification, is_disoccluded)
+    dr.eval(first, second, depth, shape_index, magnification, is_disoccluded)
     return Warped(
-        color=image(color, height, width),
-        variance=image(variance, height, width),
+        shading=Halves(image(first, height, width), image(second, height, width)),
         depth=image(depth, height, width),
         shape_index=image(shape_index, height, width),
         magnification=image(magnification, height, width),
