@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Stands for Blender in tests: answers --version, and does what its source file says in place of an import.
 
 The source file is JSON: ``{"do": "export"}``, or one of the failures below. Other keys replace those of
@@ -77,6 +76,13 @@ def export(job, wish):
     if "echo" in wish:
         (out / "seen.json").write_text(json.dumps({"job": job, "environ": dict(os.environ)}))
     (out / "import.json").write_text(json.dumps(table))
+
+
+def write_program(file):
+    """A program that runs this file with this Python; returns its path."""
+    file.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I "{__file__}" "$@"\n')
+    file.chmod(0o755)
+    return file
 
 
 def main():

@@ -1,22 +1,16 @@
 """Files for a program that stands for Blender, and does what they say."""
 
 import json
-import sys
 
 import pytest
 
-from support import fake_blender
-
-PROGRAM = fake_blender.__file__
+from support.fake_blender import write_program
 
 
 @pytest.fixture
 def program(tmp_path):
-    """Its path: a script that starts it with this Python."""
-    file = tmp_path / "blender"
-    file.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I "{PROGRAM}" "$@"\n')
-    file.chmod(0o755)
-    return file
+    """Its path."""
+    return write_program(tmp_path / "blender")
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from enfilade.errors import RunFolderError, SceneError
+from enfilade.errors import CameraPathError, RunFolderError, SceneError
 from enfilade.files import read_json
 from enfilade.scene.blender.notes import TITLES, Note, NoteKind
 from enfilade.scene.blender.process import RESULT_FILE, printable
@@ -89,6 +89,21 @@ class ImportedScene:
         """The camera path; None if the file has no camera."""
         file = self.folder / PATH_FILE
         return file if file.is_file() else None
+
+    def checked_path(self) -> Path:
+        """The camera path.
+
+        Raises
+        ------
+        CameraPathError
+            The file has no camera.
+        """
+        if self.path_file is None:
+            raise CameraPathError(
+                f"{self.source} has no camera that can be used (scene {self.scene!r}); add one to it, choose "
+                "one by --set blender.camera=NAME, or give a path by --path"
+            )
+        return self.path_file
 
     @property
     def summary(self) -> str:
