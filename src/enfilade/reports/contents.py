@@ -15,6 +15,8 @@ from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import TRACED_COLUMNS, percent, psnr_text, seconds, spoken
+from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.notes import TITLES, NoteGroup, NoteKind, grouped
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -62,6 +64,8 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         "difference": _difference(film.difference, summary, reference),
         "noise_note": "" if film.difference is None else _sentence(film.difference["noise_note"]),
         "stages": _stages(run),
+        "imported": run.imported,
+        "import_notes": [] if run.imported is None else _import_notes(run.imported),
         "settings": _settings(run),
         "identity": _identity(run),
         "columns": panels,
@@ -160,6 +164,17 @@ def _difference(
             ("", seconds(other), "the reference; comparable on the same machine"),
         ]
     return rows
+
+
+def _import_notes(imported: ImportedScene) -> list[tuple[str, list[NoteGroup]]]:
+    """Parts of the imported file that are not as they were, under the titles of their kinds."""
+    groups = grouped(imported.notes)
+    titled = [
+        (title, [group for group in groups if group.kind is kind])
+        for kind, title in TITLES.items()
+        if kind is not NoteKind.MAPPED
+    ]
+    return [(title, found) for title, found in titled if found]
 
 
 def _sentence(note: str) -> str:
