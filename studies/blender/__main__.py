@@ -89,6 +89,7 @@ def render(scene: Path, spp: int, seed: int) -> F32:
             "to_world": mi.ScalarTransform4f(
                 np.array(frame["camera_to_world"]) @ np.diag([-1.0, 1.0, -1.0, 1.0])
             ),
+            "sampler": {"type": "multijitter"},
             "film": {
                 "type": "hdrfilm",
                 "width": path["render_width"],

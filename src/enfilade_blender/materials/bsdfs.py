@@ -11,6 +11,7 @@ import numpy as np
 from enfilade_blender.materials import ggx, mapping
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
+    AttributeValue,
     Bump,
     Constant,
     ImageValue,
@@ -26,7 +27,9 @@ from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
 SMOOTH = 1e-3  # alpha below which a surface is a mirror
 ALPHA_MIN = 0.01
+SHEEN_IOR, SHEEN_ROUGHNESS = 1.5, Constant((0.7,))
 WHITE = (1.0, 1.0, 1.0)
+TRANSMITTING = {"dielectric", "roughdielectric", "thindielectric", "null", "mask", "twosided"}
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -54,6 +57,10 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
 
     transmission = _input(shader, "Transmission Weight", 0.0)
     whole = _blend(transmission, opaque, lambda: _principled_glass(shader, context), context)
+    coat, coat_ior = _input(shader, "Coat Weight", 0.0), _number(shader, "Coat IOR", 1.5)
+    whole = layered(whole, coat, coat_ior, _input(shader, "Coat Roughness", 0.03), WHITE, context)
+    tint = context.textures.mean(_input(shader, "Sheen Tint", 1.0))
+    whole = layered(whole, _input(shader, "Sheen Weight", 0.0), SHEEN_IOR, SHEEN_ROUGHNESS, tint, context)
     _note_principled(shader, context)
     return _with_normal(whole, shader.normal, context)
 
@@ -61,14 +68,29 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
 def plastic_bsdf(
     colour_value: Value, roughness: Value, ior: float, context: Context
 ) -> Element:
-    """Diffuse reflection below a dielectric interface; a textured roughness is a blend of two constant ones."""
+    """Diffuse reflection below a dielectric interface; one of textured roughness is a layer.
+
+    So is one of a colour attribute, whose mean `roughplastic` would ask for.
+    """
     if ior < 1.01:
-        return _twosided(plugin("bsdf", "diffuse", reflectance=context.textures.colour(colour_value)))
-    if isinstance(roughness, Constant):
-        return _twosided(_plastic_of(colour_value, roughness.number, ior, context))
-    low, high, weight = _two_roughnesses(roughness, context)
-    parts = [_plastic_of(colour_value, r, ior, context) for r in (low, high)]
-    return _twosided(plugin("bsdf", "blendbsdf", *parts, weight=weight))
+        return plugin("bsdf", "diffuse", reflectance=context.textures.colour(colour_value))
+    if isinstance(roughness, Constant) and not isinstance(colour_value, AttributeValue):
+        return _plastic_of(colour_value, roughness.number, ior, context)
+    base = plugin("bsdf", "diffuse", reflectance=context.textures.colour(colour_value))
+    return layered(base, Constant((1.0,)), ior, roughness, WHITE, context)
+
+
+def two_sided(bsdf: Element) -> Element:
+    """The BSDF, whose opaque parts are seen from both sides."""
+    nested = [child for child in bsdf if child.tag == "bsdf"]
+    kinds = {element.get("type") for element in bsdf.iter("bsdf")}
+    if not kinds & TRANSMITTING:
+        return plugin("bsdf", "twosided", bsdf)
+    for child in nested:
+        index = list(bsdf).index(child)
+        bsdf.remove(child)
+        bsdf.insert(index, two_sided(child))
+    return bsdf
 
 
 def is_one(value: Value) -> bool:
@@ -85,11 +107,11 @@ def _diffuse_lobe(lobe: Lobe, context: Context) -> Element:
     if not is_zero(lobe.roughness):
         what, effect = "the roughness of diffuse reflection is left out", "the surface is Lambertian"
         context.notes.add("approximated", context.owner, lobe.name, what, effect)
-    return _twosided(plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour)))
+    return plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour))
 
 
 def _glossy_lobe(lobe: Lobe, context: Context) -> Element:
-    return _twosided(_conductor(lobe.colour, lobe.roughness, {}, context, has_fresnel=False))
+    return _conductor(lobe.colour, lobe.roughness, {}, context, edge=None)
 
 
 def _glass_lobe(lobe: Lobe, context: Context) -> Element:
@@ -149,21 +171,22 @@ def _metal(shader: Principled, context: Context) -> Element:
         alpha = max(roughness.number**2, ALPHA_MIN)
         extra = {"alpha_u": alpha / aspect, "alpha_v": alpha * aspect}
     base = _input(shader, "Base Color", 0.8)
-    return _twosided(_conductor(base, roughness, extra, context, has_fresnel=min(edge) > 0.99))
+    return _conductor(base, roughness, extra, context, edge=edge)
 
 
 def _conductor(
-    reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context, *, has_fresnel: bool
-) -> Element:
-    """A metal. With Fresnel and a constant colour, its index of refraction is fitted; else the colour scales it."""
+    reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
+    *, edge: tuple[float, float, float] | None,
+) -> Element:  # fmt: skip
+    """A metal. With an edge tint and a constant colour, its index of refraction is fitted; else the colour scales it."""
     alpha = _alpha(roughness, context)
     typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
     optics: dict[str, Property] = {"material": "none"}
     if isinstance(reflectance, Constant):
         r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
         gain = np.array([ggx.metal_scale(float(c), typical) for c in r])
-        if has_fresnel:
-            eta, k = mapping.conductor_ior(r, np.zeros(3))
+        if edge is not None:
+            eta, k = mapping.conductor_ior(r, np.array(edge))
             optics = {"eta": _unbounded(eta), "k": _unbounded(k), "specular_reflectance": colour(gain)}
         else:
             optics["specular_reflectance"] = colour(r * gain)
@@ -188,35 +211,36 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
     return 0.25
 
 
-def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, Element | float]:
-    """Two roughnesses, and a texture of the share of the second; alpha is linear in between."""
-    if not isinstance(roughness, ImageValue | Texture) or (
-        isinstance(roughness, ImageValue) and context.textures.is_missing(roughness)
-    ):
-        return 0.5, 0.5, 0.5
-    pixels = context.textures.pixels(roughness).mean(axis=-1, keepdims=True)
-    low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
-    if high - low < 1e-2:
-        return low, high, 0.5
-    share = np.clip((pixels**2 - low**2) / (high**2 - low**2), 0.0, 1.0)
-    return low, high, context.textures.rewritten(roughness, share, "roughness")
+def layered(
+    base: Element, weight: Value, ior: float, roughness: Value, tint: tuple[float, float, float], context: Context
+) -> Element:
+    """A dielectric layer over a BSDF. It reflects by Fresnel; what it reflects of uniform light is missing below.
+
+    A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is dimmed by
+    the rest, and no colour of it is scaled.
+    """
+    mean = ggx.mean_reflectance(round(ior, 3))
+    if is_zero(weight) or mean < 1e-3:
+        return base
+    alpha = _alpha(roughness, context)
+    optics: dict[str, Property] = {"eta": (ior,) * 3, "k": (0.0,) * 3, "specular_reflectance": colour(tint, 1.0 / mean)}
+    if isinstance(alpha, float) and alpha < SMOOTH:
+        layer = plugin("bsdf", "conductor", **optics)
+    else:
+        layer = plugin("bsdf", "roughconductor", distribution="ggx", alpha=alpha, **optics)
+    return plugin("bsdf", "blendbsdf", base, layer, weight=context.textures.scaled_number(weight, mean))
 
 
 def _with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
-    """The BSDF inside a normal map or bump map. Two-sided BSDFs stay outside."""
+    """The BSDF inside a normal map or bump map, without a shadowing term, which Cycles has for diffuse lobes only."""
     if normal is None or (isinstance(normal, NormalMap | Bump) and _is_void(normal, context)):
         return bsdf
-    inner = bsdf
-    is_twosided = bsdf.get("type") == "twosided"
-    if is_twosided:
-        inner = next(child for child in bsdf if child.tag == "bsdf")
     if isinstance(normal, NormalMap):
-        wrapped = plugin("bsdf", "normalmap", inner, normalmap=_normal_texture(normal, context))
-    elif isinstance(normal, Bump):
-        wrapped = plugin("bsdf", "bumpmap", inner, _height(normal, context), scale=normal.scale)
-    else:
-        raise TypeError("procedural normals are baked before they are written")
-    return _twosided(wrapped) if is_twosided else wrapped
+        return plugin("bsdf", "normalmap", bsdf, normalmap=_normal_texture(normal, context), use_shadowing_function=False)
+    if isinstance(normal, Bump):
+        height = _height(normal, context)
+        return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
+    raise TypeError("procedural normals are baked before they are written")
 
 
 def _is_void(normal: NormalMap | Bump, context: Context) -> bool:
@@ -257,10 +281,6 @@ def _blend(
     return plugin("bsdf", "blendbsdf", first(), second(), weight=context.textures.number(weight))
 
 
-def _twosided(bsdf: Element) -> Element:
-    return plugin("bsdf", "twosided", bsdf)
-
-
 def _unbounded(values: np.ndarray) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
@@ -277,8 +297,7 @@ def _number(shader: Principled, name: str, default: float) -> float:
 def _note_principled(shader: Principled, context: Context) -> None:
     """Notes on inputs that are not, or not exactly, carried over."""
     effects = {
-        "Coat Weight": ("the coat is left out", "reflections of the coat are missing"),
-        "Sheen Weight": ("the sheen is left out", "edges are not brighter than the middle"),
+        "Sheen Weight": ("a rough dielectric layer", "brightness of edges differs a little"),
         "Subsurface Weight": ("diffuse reflection", "light does not spread below the surface"),
         "Thin Film Thickness": ("the thin film is left out", "there are no interference colours"),
         "Diffuse Roughness": ("the roughness of diffuse reflection is left out", "the surface is Lambertian"),

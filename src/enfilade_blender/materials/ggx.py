@@ -34,6 +34,13 @@ def metal_scale(reflectance: float, alpha: float) -> float:
 
 
 @lru_cache(maxsize=256)
+def mean_reflectance(ior: float) -> float:
+    """Reflectance of a smooth dielectric under uniform light, 0..1."""
+    mu = (np.arange(256) + 0.5) / 256
+    return float(np.sum(mu * _fresnel(mu, ior)) / np.sum(mu))
+
+
+@lru_cache(maxsize=256)
 def plastic_gain(alpha: float, ior: float) -> float:
     """Factor of the diffuse reflectance of Mitsuba's ``roughplastic`` that restores what its rough interface loses.
 

@@ -73,8 +73,10 @@ class Graph:
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
             first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
-            factor = self.value(node.inputs[0], inner)
-            return Mix(factor, first, second, self._fresnel(node.inputs[0], inner), node.name)
+            ior = self._fresnel(node.inputs[0], inner)
+            if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
+                return Mix(Constant((0.5,)), first, second, ior, node.name)
+            return Mix(self.value(node.inputs[0], inner), first, second, None, node.name)
         if node.type == "ADD_SHADER":
             return Add(*(self.shader(node.inputs[i], inner) for i in (0, 1)), name=node.name)
         if node.type in ("EMISSION", "BACKGROUND"):

@@ -49,20 +49,51 @@ def interface_ior(ior: float, level: float) -> float:
     return (1.0 + root) / (1.0 - root)
 
 
-def conductor_ior(reflectance: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Complex index of refraction of a metal, by its reflectance along the normal and the tint of its edges.
+def conductor_ior(reflectance: np.ndarray, tint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Complex index of refraction of a metal that reflects as Blender's does.
 
-    Gulbrandsen 2014, Artist Friendly Metallic Fresnel. Both inputs are 0..1; `reflectance` is kept below 1.
+    Blender's metals have Schlick's reflectance, multiplied near 82 degrees by a tint (Kutz et al. 2021, F82). Of the
+    indices with a reflectance along the normal (Gulbrandsen 2014), those nearest to it over all directions are taken.
+
+    Parameters
+    ----------
+    reflectance : (3,) float64
+        Along the normal, 0..1; kept below 1.
+    tint : (3,) float64
+        Specular Tint, 0..1.
 
     Returns
     -------
-    eta, k : ndarray
+    eta, k : (3,) float64
     """
-    r = np.clip(reflectance, 0.0, 0.999)
-    root = np.sqrt(r)
-    eta = edge * (1.0 - r) / (1.0 + r) + (1.0 - edge) * (1.0 + root) / (1.0 - root)
+    r, edges = np.clip(reflectance, 0.0, 0.999)[:, None], np.linspace(0.0, 1.0, 65)[None]
+    eta = edges * (1.0 - r) / (1.0 + r) + (1.0 - edges) * (1.0 + np.sqrt(r)) / (1.0 - np.sqrt(r))
     k = np.sqrt(np.maximum((r * (eta + 1.0) ** 2 - (eta - 1.0) ** 2) / (1.0 - r), 0.0))
-    return eta, k
+    cosines = (np.arange(32) + 0.5) / 32
+    wanted = np.stack([_f82(float(r[i, 0]), float(tint[i]), cosines) for i in range(len(r))])
+    found = conductor_reflectance(eta[..., None], k[..., None], cosines)
+    best = np.argmin(((found - wanted[:, None]) ** 2 * cosines).sum(axis=-1), axis=1)
+    rows = np.arange(len(r))
+    return eta[rows, best], k[rows, best]
+
+
+def conductor_reflectance(eta: np.ndarray, k: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """Fresnel's reflectance of unpolarized light by a conductor."""
+    c2, s2 = cosine**2, 1.0 - cosine**2
+    first = eta**2 - k**2 - s2
+    both = np.sqrt(first**2 + 4.0 * eta**2 * k**2)
+    a = np.sqrt(np.maximum(0.5 * (both + first), 0.0))
+    across = (both + c2 - 2.0 * a * cosine) / (both + c2 + 2.0 * a * cosine)
+    along = across * (c2 * both + s2**2 - 2.0 * a * cosine * s2) / (c2 * both + s2**2 + 2.0 * a * cosine * s2)
+    return 0.5 * (across + along)
+
+
+def _f82(reflectance: float, tint: float, cosine: np.ndarray) -> np.ndarray:
+    """Schlick's reflectance, lowered to `tint` of itself where the cosine is 1/7."""
+    schlick = reflectance + (1.0 - reflectance) * (1.0 - cosine) ** 5
+    at_edge = reflectance + (1.0 - reflectance) * (6.0 / 7.0) ** 5
+    lowered = at_edge * (1.0 - tint) / ((6.0 / 7.0) ** 6 / 7.0)
+    return np.clip(schlick - lowered * cosine * (1.0 - cosine) ** 6, 0.0, 1.0)
 
 
 def uv_matrix(

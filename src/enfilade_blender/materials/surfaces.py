@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from enfilade_blender.materials.bsdfs import Context, is_one, is_zero, lobe_bsdf, plastic_bsdf, principled_bsdf
+from enfilade_blender.materials.bsdfs import Context, is_one, is_zero, layered, lobe_bsdf, plastic_bsdf, principled_bsdf, two_sided
 from enfilade_blender.materials.values import (
     Add,
     Constant,
@@ -59,9 +59,13 @@ class Surface:
         """Whether everything passes through the surface."""
         return is_zero(self.opacity) and not self.opacity_is_inverted
 
+    def plain(self) -> Element:
+        """BSDF without its opacity, of one side; black where there is none."""
+        return self.bsdf if self.bsdf is not None else plugin("bsdf", "diffuse", reflectance=BLACK)
+
     def element(self, context: Context) -> Element:
         """BSDF with its opacity."""
-        bsdf = self.bsdf if self.bsdf is not None else plugin("bsdf", "diffuse", reflectance=BLACK)
+        bsdf = two_sided(self.plain())
         if is_one(self.opacity):
             return bsdf
         opacity = context.textures.number(self.opacity)
@@ -124,8 +128,8 @@ def _mix(mix: Mix, context: Context) -> Surface:
     """A mix, by what its parts are: a cut-out, a coated surface, thin glass, a light, or two BSDFs."""
     if is_zero(mix.factor) or is_one(mix.factor):
         return build(mix.second if is_one(mix.factor) else mix.first, context)
-    if mix.fresnel_ior is not None and (special := _fresnel_mix(mix, mix.fresnel_ior, context)):
-        return special
+    if mix.fresnel_ior is not None and isinstance(mix.second, Lobe):
+        return _interface(mix.first, mix.second, mix.fresnel_ior, context)
     first, second = build(mix.first, context), build(mix.second, context)
     if first.is_invisible and not second.is_invisible:
         return _cut_out(second, mix, context, is_inverted=False)
@@ -134,17 +138,16 @@ def _mix(mix: Mix, context: Context) -> Surface:
     return _blended(first, second, mix, context)
 
 
-def _fresnel_mix(mix: Mix, ior: float, context: Context) -> Surface | None:
-    """Glossy over diffuse by Fresnel's factor is plastic; glossy over transparent is thin glass."""
-    below, above = mix.first, mix.second
-    if not (isinstance(below, Lobe) and isinstance(above, Lobe) and above.kind == "glossy"):
-        return None
-    if below.kind == "diffuse":
+def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surface:
+    """Glossy over a shader by Fresnel's factor: over diffuse it is plastic, over transparent thin glass."""
+    if isinstance(below, Lobe) and below.kind == "diffuse":
         return Surface(plastic_bsdf(below.colour, above.roughness, ior, context))
-    if below.kind == "transparent":
+    if isinstance(below, Lobe) and below.kind == "transparent":
         tint = context.textures.colour(below.colour)
         return Surface(plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, specular_transmittance=tint))
-    return None
+    surface = build(below, context)
+    tint = context.textures.mean(above.colour)
+    return replace(surface, bsdf=layered(surface.plain(), WHITE, ior, above.roughness, tint, context))
 
 
 def _cut_out(surface: Surface, mix: Mix, context: Context, *, is_inverted: bool) -> Surface:
@@ -171,7 +174,7 @@ def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Sur
         context.notes.add("approximated", context.owner, mix.name, what, effect)
     if first.bsdf is None and second.bsdf is None:
         return Surface(None, emitted=_joined(emitted, mix, context))
-    parts = [part.element(context) for part in (first, second)]
+    parts = [part.plain() if is_one(part.opacity) else part.element(context) for part in (first, second)]
     weight = context.textures.number(mix.factor)
     bsdf = plugin("bsdf", "blendbsdf", *parts, weight=weight)
     return Surface(bsdf, emitted=_joined(emitted, mix, context))
@@ -186,7 +189,7 @@ def _sum(add: Add, context: Context) -> Surface:
         return replace(first, emitted=emitted)
     what, effect = "a sum of two BSDFs is a mix of equal shares", "the surface is darker"
     context.notes.add("approximated", context.owner, add.name, what, effect)
-    parts = [part.element(context) for part in (first, second)]
+    parts = [part.plain() for part in (first, second)]
     return Surface(plugin("bsdf", "blendbsdf", *parts, weight=0.5), emitted=emitted)
 
 

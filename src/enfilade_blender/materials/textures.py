@@ -68,6 +68,15 @@ class Textures:
             return value.number
         return self._texture(value)
 
+    def scaled_number(self, value: Value, scale: float) -> float | Element:
+        """A number times another."""
+        if isinstance(value, Constant):
+            return value.number * scale
+        if not isinstance(value, ImageValue | Texture) or (isinstance(value, ImageValue) and self.is_missing(value)):
+            return 0.5 * scale
+        grey = self.pixels(value).mean(axis=-1, keepdims=True)
+        return self.rewritten(value, grey * scale, f"grey times {scale:.3g}")
+
     def mean(self, value: Value) -> tuple[float, float, float]:
         """Mean linear colour of a value; mid grey of attributes."""
         if isinstance(value, Constant):

@@ -100,9 +100,9 @@ def finish(name, material):
 def three(materials):
     """Three objects in a row: a sphere, a cube, and a sphere."""
     first, second, third = materials
-    sphere("Left", (-1.35, 0.0, 0.6), 0.6, first)
-    cube("Middle", (0.0, 0.2, 0.45), 0.9, second).rotation_euler = (0.0, 0.0, 0.5)
-    sphere("Right", (1.35, 0.0, 0.6), 0.6, third)
+    sphere("Left", (-1.35, 0.0, 0.61), 0.6, first)
+    cube("Middle", (0.0, 0.2, 0.46), 0.9, second).rotation_euler = (0.0, 0.0, 0.5)
+    sphere("Right", (1.35, 0.0, 0.61), 0.6, third)
 
 
 def principled(name, **inputs):
@@ -139,7 +139,7 @@ def node_of(tree, kind, **inputs):
     return node
 
 
-def image(name, function, size=64, *, space="sRGB", alpha=None):
+def image(name, function, size=256, *, space="sRGB", alpha=None):
     """An image of ``function(x, y)`` -> (H, W, 3), x and y in 0..1 with y up, packed into the file."""
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size
     rgba = np.ones((size, size, 4), np.float32)

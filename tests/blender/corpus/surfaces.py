@@ -98,8 +98,8 @@ def normal_map(folder):
     stage()
 
     def waves(x, y):
-        slope = 0.5 * np.sin(2 * np.pi * 6 * x)
-        normal = np.stack([-slope, 0.5 * np.sin(2 * np.pi * 4 * y), np.ones_like(x)], -1)
+        slope = 0.3 * np.sin(2 * np.pi * 6 * x)
+        normal = np.stack([-slope, 0.3 * np.sin(2 * np.pi * 4 * y), np.ones_like(x)], -1)
         return normal / np.linalg.norm(normal, axis=-1, keepdims=True) * 0.5 + 0.5
 
     normals = image("normals", waves, 256, space="Non-Color")
