@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The program: ``python enfilade_blender JOB.json``, or ``blender --background --python __main__.py -- JOB.json``.
+"""The program: ``python enfilade_blender JOB.json``, or ``blender --python __main__.py -- JOB.json``.
 
-The package is loaded from its folder, without a folder on the path of modules: beside it may lie packages for another
-Python, and Blender's scripts must not find modules of this program under their own names.
+The package is loaded from its folder, without a folder on the path of modules: beside it may lie packages
+for another Python, and Blender's scripts must not find modules of this program under their own names.
 """
 
 from __future__ import annotations

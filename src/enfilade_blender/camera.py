@@ -75,9 +75,10 @@ def read_views(selection: Selection, notes: Notes) -> list[View]:
 def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
     """Content of ``camera_path.json``.
 
-    Beside nerfstudio's keys, a frame may have ``principal_point`` (shares of width and height, from the left and
-    the top), ``aperture_radius`` and ``focus_distance`` (scene units); the path has ``cuts`` (numbers of frames,
-    from 1, that begin a shot), ``shutter`` (share of a frame) and ``first_frame``, the number of its first frame in Blender.
+    Beside nerfstudio's keys, a frame may have ``principal_point`` (shares of width and height, from the
+    left and the top), ``aperture_radius`` and ``focus_distance`` (scene units); the path has ``cuts``
+    (numbers of frames, from 1, that begin a shot), ``shutter`` (share of a frame) and ``first_frame``, the
+    number of its first frame in Blender.
     """
     render = selection.scene.render
     cuts = [i for i in range(2, len(views) + 1) if views[i - 1].name != views[i - 2].name]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The evaluated scene as a renderer sees it: meshes after modifiers, with all their instances.
 
-Blender hands the scene of a render, rather than that of its viewport, to render engines only. This module is one
-which renders nothing: visibility, modifiers and levels of subdivision are those of renders.
+Blender hands the scene of a render, rather than that of its viewport, to render engines only. This module
+is one which renders nothing: visibility, modifiers and levels of subdivision are those of renders.
 """
 
 from __future__ import annotations
@@ -115,7 +115,13 @@ def evaluate(selection: Selection, limits: Limits, notes: Notes) -> Evaluated:
 def _render(selection: Selection) -> None:
     """Render nothing, in 8x8 pixels, by a camera of our own where there is none."""
     scene, render = selection.scene, selection.scene.render
-    before = render.engine, render.resolution_x, render.resolution_y, render.use_compositing, render.use_sequencer
+    before = (
+        render.engine,
+        render.resolution_x,
+        render.resolution_y,
+        render.use_compositing,
+        render.use_sequencer,
+    )
     camera, own = scene.camera, None
     if camera is None:
         own = bpy.data.objects.new("enfilade camera", bpy.data.cameras.new("enfilade camera"))
@@ -126,7 +132,9 @@ def _render(selection: Selection) -> None:
     for layer in scene.view_layers:
         layer.use = layer == selection.view_layer
     bpy.ops.render.render(scene=scene.name)
-    render.engine, render.resolution_x, render.resolution_y, render.use_compositing, render.use_sequencer = before
+    render.engine, render.resolution_x, render.resolution_y, render.use_compositing, render.use_sequencer = (
+        before
+    )
     scene.camera = camera
     if own is not None:
         bpy.data.objects.remove(own)
@@ -139,7 +147,8 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         result.instances += 1
         if result.instances > limits.instances:
             raise ExportError(
-                f"the scene has more than {limits.instances} instances", instance.parent.name if instance.parent else obj.name,
+                f"the scene has more than {limits.instances} instances",
+                instance.parent.name if instance.parent else obj.name,
                 "reduce its scattered objects, or raise the limit",
             )
         if not instance.show_self:
@@ -160,7 +169,8 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
                 result.triangles += len(placed.mesh)
         if result.triangles > limits.triangles:
             raise ExportError(
-                f"the scene has more than {limits.triangles} triangles", obj.name,
+                f"the scene has more than {limits.triangles} triangles",
+                obj.name,
                 "lower its levels of subdivision or its number of instances, or raise the limit",
             )
     result.placed = [placed for placed in by_key.values() if placed is not None]
@@ -178,7 +188,9 @@ def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
 
 def _name(instance: Any) -> str:
     obj = instance.object
-    return f"{instance.parent.name}: {obj.name}" if instance.is_instance and instance.parent else str(obj.name)
+    return (
+        f"{instance.parent.name}: {obj.name}" if instance.is_instance and instance.parent else str(obj.name)
+    )
 
 
 def _note_object(obj: Any, notes: Notes) -> None:
@@ -191,4 +203,6 @@ def _note_object(obj: Any, notes: Notes) -> None:
     for system in getattr(obj, "particle_systems", ()):
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             what = "hair can't be exported"
-            notes.add("not-carried", obj.name, f"Particles {system.name}", what, "it is missing from the picture")
+            notes.add(
+                "not-carried", obj.name, f"Particles {system.name}", what, "it is missing from the picture"
+            )

@@ -11,10 +11,12 @@ from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
 from enfilade_blender.lights import emitters, split_suns
+from enfilade_blender.limits import check_size
+from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.open_file import Selection, open_source
 from enfilade_blender.run import write_json
-from enfilade_blender.scene_xml import Element, Identifiers, plugin, write_scene
+from enfilade_blender.scene_xml import Element, plugin, write_scene
 from enfilade_blender.shapes import Shapes
 from enfilade_blender.world import environment
 
@@ -30,7 +32,9 @@ def export(job: Job) -> dict[str, Any]:
     notes = Notes()
     report_progress(0.0, "open")
     selection = open_source(job)
+    check_size(selection, job.limits)
     report_progress(0.05, "cameras")
+    note_motion(selection, notes)
     views = read_views(selection, notes)
     if views:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
@@ -81,8 +85,8 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
 def _integrator(selection: Selection, has_glass: bool) -> Element:
     """A path tracer with the file's limit of bounces.
 
-    Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the smaller one; glass
-    needs further bounces.
+    Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
+    smaller one; glass needs further bounces.
     """
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))

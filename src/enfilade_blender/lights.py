@@ -68,7 +68,11 @@ def lamp_colour(data: Any) -> Colour:
 
 def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]:
     """Lamps that are emitters of their own, and the brightest sun that has a disc."""
-    soft = [lamp for lamp in lamps if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp.data)) > 0]
+    soft = [
+        lamp
+        for lamp in lamps
+        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp.data)) > 0
+    ]
     if not soft:
         return lamps, None
     brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp.data)))
@@ -79,7 +83,10 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     direction = _axis(brightest.matrix)
     sun = Sun(brightest.name, direction, lamp_colour(brightest.data), float(brightest.data.angle))
     notes.add(
-        "mapped", brightest.name, "Sun", "a disc of the environment map",
+        "mapped",
+        brightest.name,
+        "Sun",
+        "a disc of the environment map",
         "the disc is seen by the camera and in mirrors; in Cycles it is not seen by the camera",
     )
     return [lamp for lamp in lamps if lamp is not brightest], sun
@@ -127,7 +134,9 @@ def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     matrix = axes @ FORWARD
     matrix[:3, 2] /= max(np.linalg.norm(matrix[:3, 2]), 1e-12)
     light = plugin("emitter", "area", radiance=radiance)
-    shape = plugin("shape", "disk" if is_round else "rectangle", light, plugin("bsdf", "null"), to_world=matrix)
+    shape = plugin(
+        "shape", "disk" if is_round else "rectangle", light, plugin("bsdf", "null"), to_world=matrix
+    )
     shape.set("id", identifiers.unique(lamp.name))
     return shape
 
@@ -154,7 +163,9 @@ def _note_unusual(lamp: Lamp, notes: Notes) -> None:
         what, effect = "its spread is left out", "light reaches all directions"
         notes.add("not-carried", lamp.name, "Spread", what, effect)
     if not data.use_shadow:
-        notes.add("not-carried", lamp.name, "Shadow", "it casts shadows", "shadows are where Blender has none")
+        notes.add(
+            "not-carried", lamp.name, "Shadow", "it casts shadows", "shadows are where Blender has none"
+        )
 
 
 def _axis(matrix: np.ndarray) -> np.ndarray:

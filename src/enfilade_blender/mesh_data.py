@@ -11,7 +11,7 @@ from enfilade_blender.ply import F32, Mesh
 
 
 def read_mesh(obj: Any, graph: Any) -> Mesh | None:
-    """Triangles of an evaluated object, with normals of corners, all UV maps and colours; None without a surface.
+    """Triangles of an evaluated object, with normals, UV maps and colours; None without a surface.
 
     Parameters
     ----------

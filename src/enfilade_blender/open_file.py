@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens a Blender file, or one that Blender imports, without running its scripts, and selects what is exported."""
+"""Opens a Blender file, or one that Blender imports, without its scripts; selects what is exported."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from enfilade_blender.open_file import open_source
 def render_frames(job: Job) -> dict[str, Any]:
     """Render ``job.frame_list`` into ``cycles-NNNN.exr``; content of ``cycles.json``.
 
-    Data stays in memory from frame to frame. With ``job.unbiased`` the file's clamping, filtered glossy and light
-    threshold are off, and pixels are boxes. Limits of bounces stay the file's.
+    Data stays in memory from frame to frame. With ``job.unbiased`` the file's clamping, filtered glossy and
+    light threshold are off, and pixels are boxes. Limits of bounces stay the file's.
     """
     selection = open_source(job)
     scene = selection.scene
@@ -47,5 +47,17 @@ def render_frames(job: Job) -> dict[str, Any]:
         render.filepath = str(job.out / f"cycles-{frame:04d}.exr")
         start = time.perf_counter(), time.process_time()
         bpy.ops.render.render(write_still=True, scene=scene.name)
-        seconds.append({"frame": frame, "wall_s": time.perf_counter() - start[0], "cpu_s": time.process_time() - start[1]})
-    return {"format": "enfilade-cycles", "version": 1, "blender": bpy.app.version_string, "spp": job.spp, "frames": seconds}
+        seconds.append(
+            {
+                "frame": frame,
+                "wall_s": time.perf_counter() - start[0],
+                "cpu_s": time.process_time() - start[1],
+            }
+        )
+    return {
+        "format": "enfilade-cycles",
+        "version": 1,
+        "blender": bpy.app.version_string,
+        "spp": job.spp,
+        "frames": seconds,
+    }

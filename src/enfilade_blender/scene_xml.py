@@ -38,7 +38,7 @@ def reference(identifier: str) -> Element:
 
 
 def colour(values: Iterable[float], scale: float = 1.0) -> tuple[float, float, float] | Element:
-    """A reflectance. Mitsuba refuses colours above 1, which compensate for lost energy, but not as a texture."""
+    """A reflectance. Mitsuba refuses colours above 1, which make up for lost energy, but not as a texture."""
     r, g, b = (max(float(value) * scale, 0.0) for value in values)
     if max(r, g, b) <= 1.0:
         return r, g, b

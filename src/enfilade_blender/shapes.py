@@ -88,7 +88,9 @@ class Shapes:
             if number % 50 == 0:
                 report_progress(0.3 + 0.6 * number / len(placed), "materials")
             copies = len(item.matrices)
-            is_instanced = total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
+            is_instanced = (
+                total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
+            )
             shapes += self._object(item, is_instanced=is_instanced)
         return [*self._bsdfs, *shapes]
 
@@ -96,8 +98,14 @@ class Shapes:
         parts = list(_parts(placed))
         elements, instanced = [], []
         for part in parts:
-            name = part.name if len(parts) == 1 else f"{part.name}: {part.material.name if part.material else 'none'}"
-            shader, mesh, is_own = self._bakery.resolve(self._shader(part.material), part.material, part.mesh, placed)
+            name = (
+                part.name
+                if len(parts) == 1
+                else f"{part.name}: {part.material.name if part.material else 'none'}"
+            )
+            shader, mesh, is_own = self._bakery.resolve(
+                self._shader(part.material), part.material, part.mesh, placed
+            )
             bsdf, surface, uv, attribute = self._bsdf(shader, part, mesh, is_own=is_own)
             if surface.is_invisible and not surface.emitted:
                 continue
@@ -152,7 +160,9 @@ class Shapes:
             surface = build(shader, self._context(material))
             element = surface.element(self._context(material))
             name = material.name if material else "no material"
-            identifier = self._bsdf_ids.unique(f"material {name}: {part.name}" if is_own else f"material {name}")
+            identifier = self._bsdf_ids.unique(
+                f"material {name}: {part.name}" if is_own else f"material {name}"
+            )
             self._bsdfs.append(named(element, identifier))
             self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
             self._shared[key] = identifier, surface

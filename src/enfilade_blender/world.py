@@ -36,7 +36,9 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
         image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder)
-        notes.add("baked", world.name, "World", f"an environment map of {image.shape[1]}x{image.shape[0]}", "")
+        notes.add(
+            "baked", world.name, "World", f"an environment map of {image.shape[1]}x{image.shape[0]}", ""
+        )
     if sun is not None:
         image += sun_disc(sun, image.shape[1])
     write_exr(folder / FILE, image)
@@ -80,13 +82,20 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
     if not world.use_nodes or world.node_tree is None:
         r, g, b = world.color
         return float(r), float(g), float(b)
-    output = next((node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
+    output = next(
+        (node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output),
+        None,
+    )
     if output is None:
         return 0.0, 0.0, 0.0
     shader = Graph(world.name, notes).shader(output.inputs["Surface"], ())
     if isinstance(shader, Nothing):
         return 0.0, 0.0, 0.0
-    is_plain = isinstance(shader, Emission) and isinstance(shader.colour, Constant) and isinstance(shader.strength, Constant)
+    is_plain = (
+        isinstance(shader, Emission)
+        and isinstance(shader.colour, Constant)
+        and isinstance(shader.strength, Constant)
+    )
     if not is_plain:
         return None
     r, g, b = (c * shader.strength.number for c in shader.colour.colour)

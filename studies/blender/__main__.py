@@ -27,7 +27,7 @@ SEEDS = 1, 2
 def main(
     blender: str, only: tuple[str, ...], spp: int, source: Path | None, out: Path, *, keep: bool
 ) -> None:
-    """Render each file by Cycles and, exported, by Mitsuba; print differences; write both pictures side by side."""
+    """Render each file by Cycles and, exported, by Mitsuba; print differences, and write both pictures."""
     if source:
         files = [source]
     else:

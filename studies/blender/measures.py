@@ -34,8 +34,8 @@ class Fidelity:
 def compare(reference: tuple[F32, F32], image: tuple[F32, F32]) -> Fidelity:
     """Compare two halves of a reference with two halves of an image, all linear (H, W, 3).
 
-    SSIM between halves of different renderers is divided by the geometric mean of that between halves of the same,
-    which differ by noise alone.
+    SSIM between halves of different renderers is divided by the geometric mean of that between halves of
+    the same, which differ by noise alone.
     """
     first, second = 0.5 * (reference[0] + reference[1]), 0.5 * (image[0] + image[1])
     difference = (second.mean(axis=(0, 1)) - first.mean(axis=(0, 1))) / max(float(first.mean()), 1e-6)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes what has no counterpart in Mitsuba: Cycles evaluates a node's output over the mesh, into a texture.
 
-A value of images and colour corrections alone is baked once over the unit square of texture coordinates. Any other
-is baked for each object, over texture coordinates that are made for it; then all textures of the material are, since a
-mesh has one set of coordinates in Mitsuba.
+A value of images and colour corrections alone is baked once over the unit square of texture coordinates.
+Any other is baked for each object, over texture coordinates that are made for it; then all textures of the
+material are, since a mesh has one set of coordinates in Mitsuba.
 """
 
 from __future__ import annotations
@@ -61,24 +61,27 @@ class Bakery:
         self._of_uv: dict[Any, Value] = {}
         self._scene: BakeScene | None = None
 
-    def resolve(
-        self, shader: Shader, material: Any, mesh: Mesh, placed: Placed
-    ) -> tuple[Shader, Mesh, bool]:
-        """A shader without procedural values, the mesh that it belongs to, and whether it is this object's own."""
+    def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
+        """A shader without procedural values, its mesh, and whether it is this object's own."""
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-        uv_maps = {value.uv_map or mesh.active_uv for value in values_of(shader) if isinstance(value, ImageValue)}
+        uv_maps = {
+            value.uv_map or mesh.active_uv for value in values_of(shader) if isinstance(value, ImageValue)
+        }
         if not wanted and len(uv_maps) <= 1:
             return shader, mesh, False
-        if self._scene is None:
-            self._scene = BakeScene(self._job.bake_samples)
         if all(isinstance(value, Procedural) and value.is_of_uv for value in wanted) and len(uv_maps) <= 1:
             shared = replaced(shader, lambda value: self._over_uv(value, material, next(iter(uv_maps), "")))
             return shared, mesh, False
         size = self._resolution(placed, mesh)
-        with self._scene.mesh(mesh, placed) as canvas:
+        with self._stage().mesh(mesh, placed) as canvas:
             mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
             own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, size))
         return own, mesh, True
+
+    def _stage(self) -> BakeScene:
+        if self._scene is None:
+            self._scene = BakeScene(self._job.bake_samples)
+        return self._scene
 
     def _over_uv(self, value: Any, material: Any, uv_map: str) -> Any:
         if not isinstance(value, Procedural):
@@ -86,14 +89,16 @@ class Bakery:
         key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
         if key not in self._of_uv:
             sizes = [
-                max(found.node.image.size) for found in upstream(value.output)
+                max(found.node.image.size)
+                for found in upstream(value.output)
                 if found.node.type == "TEX_IMAGE" and found.node.image is not None
             ]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
-            assert self._scene is not None
-            with self._scene.square() as canvas:
+            with self._stage().square() as canvas:
                 pixels, _ = canvas.bake(value.output, material, size)
-            self._of_uv[key] = self._stored(pixels, None, value, material.name, uv_map, "the unit square of UV")
+            self._of_uv[key] = self._stored(
+                pixels, None, value, material.name, uv_map, "the unit square of UV"
+            )
         return self._of_uv[key]
 
     def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
@@ -129,7 +134,13 @@ class Bakery:
 
     def _note(self, output: Output, name: str, where: str, size: int) -> None:
         what = f"baked to {size}x{size} pixels over {where}"
-        self._notes.add("baked", name, f"{output.node.name}: {output.socket.name}", what, "detail is limited to its pixels")
+        self._notes.add(
+            "baked",
+            name,
+            f"{output.node.name}: {output.socket.name}",
+            what,
+            "detail is limited to its pixels",
+        )
 
     def _resolution(self, placed: Placed, mesh: Mesh) -> int:
         """A power of two, by the object's largest size in the views of the path."""
@@ -145,5 +156,3 @@ class Bakery:
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
         power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
         return int(min(power, self._job.bake_px))
-
-

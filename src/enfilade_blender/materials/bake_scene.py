@@ -60,7 +60,9 @@ class BakeScene:
         normals = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), (2, 3, 3))
         uv = corners[triangles][..., :2]
         slots = np.zeros(2, np.int32)
-        with self._canvas(_data(Mesh(corners, triangles, normals, {"UVMap": uv}, {}, slots, "UVMap")), np.eye(4)) as canvas:
+        with self._canvas(
+            _data(Mesh(corners, triangles, normals, {"UVMap": uv}, {}, slots, "UVMap")), np.eye(4)
+        ) as canvas:
             yield canvas
 
     @contextmanager
@@ -166,7 +168,7 @@ def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:
 
 
 def _exposed(tree: Any, groups: tuple[Any, ...], output: Output) -> Any:
-    """The output's twin in a copied tree; from inside groups it is led out through new sockets of their copies."""
+    """The output's twin in a copied tree, led out of groups through new sockets of their copies."""
     if not groups:
         node = tree.nodes[output.node.name]
         return next(socket for socket in node.outputs if socket.identifier == output.socket.identifier)

@@ -65,9 +65,7 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
     return _with_normal(whole, shader.normal, context)
 
 
-def plastic_bsdf(
-    colour_value: Value, roughness: Value, ior: float, context: Context
-) -> Element:
+def plastic_bsdf(colour_value: Value, roughness: Value, ior: float, context: Context) -> Element:
     """Diffuse reflection below a dielectric interface; one of textured roughness is a layer.
 
     So is one of a colour attribute, whose mean `roughplastic` would ask for.
@@ -115,7 +113,9 @@ def _glossy_lobe(lobe: Lobe, context: Context) -> Element:
 
 
 def _glass_lobe(lobe: Lobe, context: Context) -> Element:
-    ior = lobe.ior.number if isinstance(lobe.ior, Constant) else float(np.mean(context.textures.mean(lobe.ior)))
+    ior = (
+        lobe.ior.number if isinstance(lobe.ior, Constant) else float(np.mean(context.textures.mean(lobe.ior)))
+    )
     return _glass(lobe.colour, lobe.colour, lobe.roughness, ior, context)
 
 
@@ -124,7 +124,9 @@ def _principled_glass(shader: Principled, context: Context) -> Element:
     tint: Value = base
     if isinstance(base, Constant):  # twice through an interface is once through the colour
         tint = Constant(tuple(max(c, 0.0) ** 0.5 for c in base.colour))
-    return _glass(tint, Constant(WHITE), _input(shader, "Roughness", 0.5), _number(shader, "IOR", 1.45), context)
+    return _glass(
+        tint, Constant(WHITE), _input(shader, "Roughness", 0.5), _number(shader, "IOR", 1.45), context
+    )
 
 
 def _glass(transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context) -> Element:
@@ -138,7 +140,9 @@ def _glass(transmitted: Value, reflected: Value, roughness: Value, ior: float, c
             tints[name] = tint
     if isinstance(alpha, float) and alpha < SMOOTH:
         return plugin("bsdf", "dielectric", int_ior=ior, ext_ior=1.0, **tints)
-    return plugin("bsdf", "roughdielectric", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0, **tints)
+    return plugin(
+        "bsdf", "roughdielectric", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0, **tints
+    )
 
 
 def _plastic(shader: Principled, context: Context) -> Element:
@@ -178,7 +182,7 @@ def _conductor(
     reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
     *, edge: tuple[float, float, float] | None,
 ) -> Element:  # fmt: skip
-    """A metal. With an edge tint and a constant colour, its index of refraction is fitted; else the colour scales it."""
+    """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
     alpha = _alpha(roughness, context)
     typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
     optics: dict[str, Property] = {"material": "none"}
@@ -212,18 +216,27 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
 
 
 def layered(
-    base: Element, weight: Value, ior: float, roughness: Value, tint: tuple[float, float, float], context: Context
+    base: Element,
+    weight: Value,
+    ior: float,
+    roughness: Value,
+    tint: tuple[float, float, float],
+    context: Context,
 ) -> Element:
-    """A dielectric layer over a BSDF. It reflects by Fresnel; what it reflects of uniform light is missing below.
+    """A dielectric layer over a BSDF, which is dimmed by what the layer reflects of uniform light.
 
-    A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is dimmed by
-    the rest, and no colour of it is scaled.
+    A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is
+    dimmed by the rest, and no colour of it is scaled.
     """
     mean = ggx.mean_reflectance(round(ior, 3))
     if is_zero(weight) or mean < 1e-3:
         return base
     alpha = _alpha(roughness, context)
-    optics: dict[str, Property] = {"eta": (ior,) * 3, "k": (0.0,) * 3, "specular_reflectance": colour(tint, 1.0 / mean)}
+    optics: dict[str, Property] = {
+        "eta": (ior,) * 3,
+        "k": (0.0,) * 3,
+        "specular_reflectance": colour(tint, 1.0 / mean),
+    }
     if isinstance(alpha, float) and alpha < SMOOTH:
         layer = plugin("bsdf", "conductor", **optics)
     else:
@@ -232,11 +245,17 @@ def layered(
 
 
 def _with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
-    """The BSDF inside a normal map or bump map, without a shadowing term, which Cycles has for diffuse lobes only."""
+    """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
     if normal is None or (isinstance(normal, NormalMap | Bump) and _is_void(normal, context)):
         return bsdf
     if isinstance(normal, NormalMap):
-        return plugin("bsdf", "normalmap", bsdf, normalmap=_normal_texture(normal, context), use_shadowing_function=False)
+        return plugin(
+            "bsdf",
+            "normalmap",
+            bsdf,
+            normalmap=_normal_texture(normal, context),
+            use_shadowing_function=False,
+        )
     if isinstance(normal, Bump):
         height = _height(normal, context)
         return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
@@ -261,7 +280,9 @@ def _normal_texture(normal: NormalMap, context: Context) -> Element:
     value = normal.image
     if isinstance(value, ImageValue | Texture) and abs(normal.strength - 1.0) > 1e-3:
         n = context.textures.pixels(value) * 2.0 - 1.0
-        n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
+        n = np.concatenate(
+            [n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1
+        )
         n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
         return context.textures.rewritten(value, 0.5 * n + 0.5, f"normal {normal.strength:.3g}")
     element = context.textures.colour(value)
@@ -308,4 +329,6 @@ def _note_principled(shader: Principled, context: Context) -> None:
     for name in ("IOR", "Specular IOR Level"):
         if not isinstance(_input(shader, name, 0.5), Constant):
             effect = "reflections have the same strength everywhere"
-            context.notes.add("approximated", context.owner, f"{shader.name}: {name}", "a texture is left out", effect)
+            context.notes.add(
+                "approximated", context.owner, f"{shader.name}: {name}", "a texture is left out", effect
+            )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Energy that a GGX lobe of single scattering keeps.
 
-Blender's metals and glass add the light that is scattered several times between microfacets; Mitsuba's GGX loses it.
-The loss depends on roughness, and little on direction: reflectances are scaled by its mean (Turquin 2019, Practical
-multiple scattering compensation for microfacet models).
+Blender's metals and glass add the light that is scattered several times between microfacets; Mitsuba's GGX
+loses it. The loss depends on roughness, and little on direction: reflectances are scaled by its mean
+(Turquin 2019, Practical multiple scattering compensation for microfacet models).
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ COSINES, STEPS = 16, 48
 def kept_energy(alpha: float) -> float:
     """Albedo of a GGX lobe of reflectance 1 under uniform light, with Mitsuba's separable Smith term, 0..1.
 
-    Visible normals are sampled (Heitz 2018); the weight of a sample is the shadowing of the reflected direction.
+    Visible normals are sampled (Heitz 2018); the weight of a sample is the shadowing of the reflected
+    direction.
     """
     if alpha < 1e-3:
         return 1.0
@@ -42,10 +43,11 @@ def mean_reflectance(ior: float) -> float:
 
 @lru_cache(maxsize=256)
 def plastic_gain(alpha: float, ior: float) -> float:
-    """Factor of the diffuse reflectance of Mitsuba's ``roughplastic`` that restores what its rough interface loses.
+    """Factor of the reflectance of Mitsuba's ``roughplastic`` that restores what its rough interface loses.
 
-    The diffuse lobe is ``T(i) T(o) / (ior^2 (1 - R))``, with the transmittance T of single scattering and the internal
-    reflectance R. Its albedo becomes that below a smooth interface, which Blender's Principled BSDF has at all roughnesses.
+    The diffuse lobe is ``T(i) T(o) / (ior^2 (1 - R))``, with the transmittance T of single scattering and
+    the internal reflectance R. Its albedo becomes that below a smooth interface, which Blender's Principled
+    BSDF has at all roughnesses.
     """
     if alpha < 1e-3 or ior < 1.001:
         return 1.0

@@ -56,7 +56,10 @@ class Graph:
         if not outputs:
             return Nothing()
         output = next((node for node in outputs if node.is_active_output), outputs[0])
-        for name, effect in (("Volume", "the object is without it"), ("Displacement", "the surface is smooth")):
+        for name, effect in (
+            ("Volume", "the object is without it"),
+            ("Displacement", "the surface is smooth"),
+        ):
             if output.inputs[name].is_linked:
                 self._notes.add("not-carried", self._owner, name, f"{name.lower()} is not exported", effect)
         return self.shader(output.inputs["Surface"], ())
@@ -80,7 +83,9 @@ class Graph:
         if node.type == "ADD_SHADER":
             return Add(*(self.shader(node.inputs[i], inner) for i in (0, 1)), name=node.name)
         if node.type in ("EMISSION", "BACKGROUND"):
-            return Emission(self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner))
+            return Emission(
+                self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)
+            )
         return self._lobe(node, inner)
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
@@ -109,7 +114,10 @@ class Graph:
             return None
         node, inner = found.node, found.groups
         if node.type == "NORMAL_MAP" and node.space == "TANGENT":
-            image, strength = self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)
+            image, strength = (
+                self.value(node.inputs["Color"], inner),
+                self.value(node.inputs["Strength"], inner),
+            )
             if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
                 return NormalMap(image, strength.number)
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
@@ -127,7 +135,9 @@ class Graph:
         if kind is None:
             what, effect = "this shader has no counterpart", "its surface is a neutral grey"
             self._notes.add("not-carried", self._owner, f"{node.name} ({node.type})", what, effect)
-            return Lobe("diffuse", Constant((0.5, 0.5, 0.5)), Constant((0.0,)), Constant((1.0,)), None, node.name)
+            return Lobe(
+                "diffuse", Constant((0.5, 0.5, 0.5)), Constant((0.0,)), Constant((1.0,)), None, node.name
+            )
         if kind.note:
             self._notes.add("approximated", self._owner, node.name, kind.note, kind.effect)
 
@@ -163,7 +173,9 @@ class Graph:
 def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
     """The output that feeds an input, as :class:`Output`; without one, the socket whose default holds."""
     while True:
-        links = [link for link in socket.links if link.is_valid and not link.is_muted] if socket.is_linked else []
+        links = (
+            [link for link in socket.links if link.is_valid and not link.is_muted] if socket.is_linked else []
+        )
         if not links:
             return socket
         source = links[0].from_socket
@@ -250,7 +262,9 @@ def _dependence(output: Output) -> tuple[bool, bool]:
             coordinates = image_coordinates(node, found.groups)
             is_of_uv &= coordinates == ("", IDENTITY) and node.extension == "REPEAT"
         else:
-            is_of_uv &= node.type in table.COLOUR_NODES or (node.type == "TEX_COORD" and found.socket.name == "UV")
+            is_of_uv &= node.type in table.COLOUR_NODES or (
+                node.type == "TEX_COORD" and found.socket.name == "UV"
+            )
     return is_of_uv, is_of_view
 
 

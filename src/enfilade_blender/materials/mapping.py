@@ -20,8 +20,9 @@ BLENDER_3 = {  # names of Blender 3 by those of Blender 4
 }
 PRINCIPLED = (
     "Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Diffuse Roughness", "Subsurface Weight",
-    "Specular IOR Level", "Specular Tint", "Anisotropic", "Transmission Weight", "Coat Weight", "Coat Roughness",
-    "Coat IOR", "Sheen Weight", "Sheen Tint", "Emission Color", "Emission Strength", "Thin Film Thickness",
+    "Specular IOR Level", "Specular Tint", "Anisotropic", "Transmission Weight", "Coat Weight",
+    "Coat Roughness", "Coat IOR", "Sheen Weight", "Sheen Tint", "Emission Color", "Emission Strength",
+    "Thin Film Thickness",
 )  # fmt: skip
 
 
@@ -36,7 +37,7 @@ def principled_names(sockets: list[str]) -> dict[str, str]:
 
 
 def interface_ior(ior: float, level: float) -> float:
-    """Index of refraction of the Principled BSDF's interface: its level scales the reflectance along the normal.
+    """Index of refraction of the Principled BSDF's interface; its level scales the reflectance at the normal.
 
     Parameters
     ----------
@@ -52,8 +53,9 @@ def interface_ior(ior: float, level: float) -> float:
 def conductor_ior(reflectance: np.ndarray, tint: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Complex index of refraction of a metal that reflects as Blender's does.
 
-    Blender's metals have Schlick's reflectance, multiplied near 82 degrees by a tint (Kutz et al. 2021, F82). Of the
-    indices with a reflectance along the normal (Gulbrandsen 2014), those nearest to it over all directions are taken.
+    Blender's metals have Schlick's reflectance, multiplied near 82 degrees by a tint (Kutz et al. 2021,
+    F82). Of the indices with a reflectance along the normal (Gulbrandsen 2014), those nearest to it over all
+    directions are taken.
 
     Parameters
     ----------
@@ -120,7 +122,7 @@ def product(first: Matrix3, second: Matrix3) -> Matrix3:
 
 
 def spot_ramp(half_angle: float, blend: float) -> tuple[float, float]:
-    """Angles (outer, inner; radians) of a linear ramp with the flux and the width of Blender's spot of a blend.
+    """Angles (outer, inner; radians) of a linear ramp with the width of Blender's spot of a blend.
 
     Blender's spot is a smoothstep of the cosine, over the share `blend` of ``1 - cos(half_angle)``.
     """

@@ -5,7 +5,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from enfilade_blender.materials.bsdfs import Context, is_one, is_zero, layered, lobe_bsdf, plastic_bsdf, principled_bsdf, two_sided
+from enfilade_blender.materials.bsdfs import (
+    Context,
+    is_one,
+    is_zero,
+    layered,
+    lobe_bsdf,
+    plastic_bsdf,
+    principled_bsdf,
+    two_sided,
+)
 from enfilade_blender.materials.values import (
     Add,
     Constant,
@@ -144,7 +153,9 @@ def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surf
         return Surface(plastic_bsdf(below.colour, above.roughness, ior, context))
     if isinstance(below, Lobe) and below.kind == "transparent":
         tint = context.textures.colour(below.colour)
-        return Surface(plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, specular_transmittance=tint))
+        return Surface(
+            plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, specular_transmittance=tint)
+        )
     surface = build(below, context)
     tint = context.textures.mean(above.colour)
     return replace(surface, bsdf=layered(surface.plain(), WHITE, ior, above.roughness, tint, context))
@@ -217,7 +228,9 @@ def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radianc
     if isinstance(colour, Constant) and max(colour.colour) - min(colour.colour) < 1e-6:
         return (Radiance(strength, colour.number),)
     effect = "the pattern of the emission's strength is lost"
-    context.notes.add("approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect)
+    context.notes.add(
+        "approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect
+    )
     return (Radiance(colour, sum(context.textures.mean(strength)) / 3.0),)
 
 

@@ -31,33 +31,52 @@ LOBES = {
     "BSDF_GLOSSY": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
     "BSDF_ANISOTROPIC": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
     "BSDF_METALLIC": LobeKind(
-        "glossy", "`conductor` or `roughconductor`", "the edge tint is left out", "metal is darker at grazing angles"
+        "glossy",
+        "`conductor` or `roughconductor`",
+        "the edge tint is left out",
+        "metal is darker at grazing angles",
     ),
     "BSDF_GLASS": LobeKind("glass", "`dielectric` or `roughdielectric`"),
     "BSDF_REFRACTION": LobeKind(
-        "glass", "`dielectric` or `roughdielectric`", "glass, which also reflects", "the surface has reflections"
+        "glass",
+        "`dielectric` or `roughdielectric`",
+        "glass, which also reflects",
+        "the surface has reflections",
     ),
     "BSDF_TRANSPARENT": LobeKind("transparent", "`mask`"),
     "BSDF_TRANSLUCENT": LobeKind(
-        "diffuse", "`diffuse`", "diffuse reflection in place of transmission", "light from behind does not shine through"
+        "diffuse",
+        "`diffuse`",
+        "diffuse reflection in place of transmission",
+        "light from behind does not shine through",
     ),
     "SUBSURFACE_SCATTERING": LobeKind(
         "diffuse", "`diffuse`", "diffuse reflection", "light does not spread below the surface"
     ),
-    "BSDF_SHEEN": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"),
-    "BSDF_VELVET": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"),
+    "BSDF_SHEEN": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
+    ),
+    "BSDF_VELVET": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
+    ),
     "BSDF_TOON": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "light has no steps"),
     "BSDF_HAIR": LobeKind("glossy", "`roughconductor`", "a glossy surface", "highlights of hair differ"),
-    "BSDF_HAIR_PRINCIPLED": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "highlights of hair are missing"),
+    "BSDF_HAIR_PRINCIPLED": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "highlights of hair are missing"
+    ),
 }
 COLOUR_NODES = {  # functions of their inputs alone
-    "RGB", "VALUE", "MATH", "VECT_MATH", "MIX", "MIX_RGB", "VALTORGB", "CURVE_RGB", "CURVE_FLOAT", "CURVE_VEC",
-    "GAMMA", "BRIGHTCONTRAST", "HUE_SAT", "INVERT", "SEPRGB", "COMBRGB", "SEPARATE_COLOR", "COMBINE_COLOR",
-    "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
+    "RGB", "VALUE", "MATH", "VECT_MATH", "MIX", "MIX_RGB", "VALTORGB", "CURVE_RGB", "CURVE_FLOAT",
+    "CURVE_VEC", "GAMMA", "BRIGHTCONTRAST", "HUE_SAT", "INVERT", "SEPRGB", "COMBRGB", "SEPARATE_COLOR",
+    "COMBINE_COLOR", "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
 }  # fmt: skip
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
 PRINCIPLED = (
-    ("Base Color, Metallic 0", "mapped", "`diffuse` under a dielectric interface: `plastic` or `roughplastic`"),
+    (
+        "Base Color, Metallic 0",
+        "mapped",
+        "`diffuse` under a dielectric interface: `plastic` or `roughplastic`",
+    ),
     ("Base Color, Metallic 1", "mapped", "`conductor` or `roughconductor`, of a fitted index of refraction"),
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
@@ -67,7 +86,11 @@ PRINCIPLED = (
     ("Alpha", "mapped", "`mask`"),
     ("Emission Color, Emission Strength", "mapped", "`area` emitter; open meshes shine on both sides"),
     ("Normal: Normal Map, Bump of images", "mapped", "`normalmap`, `bumpmap`"),
-    ("Coat", "approximated", "the interface of `roughplastic` on rough plastics, `blendbsdf` with a mirror on others"),
+    (
+        "Coat",
+        "approximated",
+        "the interface of `roughplastic` on rough plastics, `blendbsdf` with a mirror on others",
+    ),
     ("Sheen", "approximated", "a lighter diffuse colour"),
     ("Anisotropic", "mapped", "`alpha_u`, `alpha_v` of metals along the UV map; its rotation is not carried"),
     ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),
@@ -77,10 +100,18 @@ PRINCIPLED = (
 )
 INPUTS = (
     ("Constants, RGB, Value", "mapped", "numbers"),
-    ("Image Texture with UV Map and Mapping", "mapped", "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`"),
+    (
+        "Image Texture with UV Map and Mapping",
+        "mapped",
+        "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
+    ),
     ("Colour attribute", "mapped", "`mesh_attribute`"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
-    ("Everything else: noise, ramps, Object and Generated coordinates", "baked", "a bitmap of each mesh, on UVs of its own"),
+    (
+        "Everything else: noise, ramps, Object and Generated coordinates",
+        "baked",
+        "a bitmap of each mesh, on UVs of its own",
+    ),
     ("Fresnel, Layer Weight in a Mix Shader", "mapped", "the interface of `plastic`, or `thindielectric`"),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
     ("Light Path", "approximated", "0: all rays see one material"),
@@ -88,7 +119,11 @@ INPUTS = (
 )
 LIGHTS = (
     ("Point", "mapped", "`sphere` with an `area` emitter of its radius; `point` for radius 0"),
-    ("Spot", "approximated", "`spot`: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp"),
+    (
+        "Spot",
+        "approximated",
+        "`spot`: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
+    ),
     ("Area: square, rectangle, disk, ellipse", "mapped", "`rectangle` or `disk`, seen by the camera"),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
@@ -98,7 +133,11 @@ LIGHTS = (
 )
 OBJECTS = (
     ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
-    ("Collection, geometry nodes and particle instances", "mapped", "merged, or `instance` where they are many"),
+    (
+        "Collection, geometry nodes and particle instances",
+        "mapped",
+        "merged, or `instance` where they are many",
+    ),
     ("Linked libraries", "mapped", "within the source's folder and the allowed ones"),
     ("Animated objects", "not carried", "as in the first frame"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
@@ -114,8 +153,16 @@ def markdown() -> str:
         for name, kind in LOBES.items()
     ]
     shaders += [
-        ("Mix shader", "mapped", "`blendbsdf`; with Transparent `mask`; with Fresnel `plastic` or `thindielectric`"),
-        ("Add shader", "approximated", "an `area` emitter beside the other shader; else `blendbsdf` of equal shares"),
+        (
+            "Mix shader",
+            "mapped",
+            "`blendbsdf`; with Transparent `mask`; with Fresnel `plastic` or `thindielectric`",
+        ),
+        (
+            "Add shader",
+            "approximated",
+            "an `area` emitter beside the other shader; else `blendbsdf` of equal shares",
+        ),
         ("Emission", "mapped", "`area` emitter"),
         ("Any other shader", "not carried", "a neutral grey"),
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values of materials as numbers, colours and textures of Mitsuba; image files are copied into the scene's folder."""
+"""Values of materials as numbers, colours and textures of Mitsuba; copies of image files."""
 
 from __future__ import annotations
 
@@ -72,7 +72,9 @@ class Textures:
         """A number times another."""
         if isinstance(value, Constant):
             return value.number * scale
-        if not isinstance(value, ImageValue | Texture) or (isinstance(value, ImageValue) and self.is_missing(value)):
+        if not isinstance(value, ImageValue | Texture) or (
+            isinstance(value, ImageValue) and self.is_missing(value)
+        ):
             return 0.5 * scale
         grey = self.pixels(value).mean(axis=-1, keepdims=True)
         return self.rewritten(value, grey * scale, f"grey times {scale:.3g}")
@@ -150,7 +152,9 @@ class Textures:
         node = value.output.node
         if node.extension == "CLIP":
             effect = "beyond its border the image's last pixels continue"
-            self._notes.add("approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect)
+            self._notes.add(
+                "approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect
+            )
         file, raw = self._file(value)
         matrix = FLIP @ np.array(value.matrix)
         smooth = node.interpolation != "Closest"
@@ -166,11 +170,13 @@ class Textures:
             if is_alpha:
                 self._files[key] = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
             else:
-                self._files[key] = self._copied(image, name) or self.write(name, linear_pixels(image)[..., :3], raw=raw)
+                self._files[key] = self._copied(image, name) or self.write(
+                    name, linear_pixels(image)[..., :3], raw=raw
+                )
         return self._files[key], raw
 
     def _copied(self, image: Any, name: str) -> str:
-        """Name of an unchanged copy of an image's file, or of its packed bytes; empty where Mitsuba can't read it."""
+        """Name of an unchanged copy of an image's file or packed bytes; empty where Mitsuba can't read it."""
         import bpy
 
         source = Path(bpy.path.abspath(image.filepath, library=image.library))
@@ -212,4 +218,6 @@ def linear_pixels(image: Any) -> F32:
 
 def linear_from_srgb(encoded: F32) -> F32:
     """IEC 61966-2-1, inverse."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )

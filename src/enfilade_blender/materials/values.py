@@ -171,7 +171,7 @@ class Emission:
 
 @dataclass(frozen=True)
 class Mix:
-    """A share `factor` of the second shader, and the rest of the first; `fresnel_ior` where the factor is Fresnel's."""
+    """A share of the second shader, the rest of the first; `fresnel_ior` where the share is Fresnel's."""
 
     factor: Value
     first: Shader

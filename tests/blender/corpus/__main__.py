@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes files: ``python tests/blender/corpus FOLDER [NAME ...]``, in Blender's Python; ``--list`` names them."""
+"""Makes files: ``python tests/blender/corpus FOLDER [NAME ...]``, in Blender's Python; ``--list`` names
+them."""
 
 import os
 import sys
@@ -14,7 +15,7 @@ CASES = {case.__name__: case for module in (surfaces, lights, objects) for case 
 
 if __name__ == "__main__":
     if sys.argv[1] == "--list":
-        print(*CASES)
+        sys.stdout.write(" ".join(CASES))
         sys.exit()
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)

@@ -21,16 +21,53 @@ def point(folder):
 
 def spot(folder):
     _objects()
-    light("SPOT", "Soft", (-1.5, -3.0, 4.0), 500.0, target=(-0.8, 0, 0.3), spot_size=0.7, spot_blend=0.6, shadow_soft_size=0.0)
-    light("SPOT", "Hard", (2.0, -3.0, 4.0), 500.0, target=(1.0, 0, 0.3), spot_size=0.5, spot_blend=0.1, shadow_soft_size=0.0, color=(0.5, 0.7, 1.0))
+    light(
+        "SPOT",
+        "Soft",
+        (-1.5, -3.0, 4.0),
+        500.0,
+        target=(-0.8, 0, 0.3),
+        spot_size=0.7,
+        spot_blend=0.6,
+        shadow_soft_size=0.0,
+    )
+    light(
+        "SPOT",
+        "Hard",
+        (2.0, -3.0, 4.0),
+        500.0,
+        target=(1.0, 0, 0.3),
+        spot_size=0.5,
+        spot_blend=0.1,
+        shadow_soft_size=0.0,
+        color=(0.5, 0.7, 1.0),
+    )
 
 
 def area(folder):
     _objects()
     light("AREA", "Square", (-2.5, -2.5, 3.5), 60.0, shape="SQUARE", size=0.8)
-    light("AREA", "Rectangle", (-0.8, -3.5, 3.5), 60.0, shape="RECTANGLE", size=1.5, size_y=0.3, color=(1.0, 0.5, 0.4))
+    light(
+        "AREA",
+        "Rectangle",
+        (-0.8, -3.5, 3.5),
+        60.0,
+        shape="RECTANGLE",
+        size=1.5,
+        size_y=0.3,
+        color=(1.0, 0.5, 0.4),
+    )
     light("AREA", "Disk", (0.8, -3.5, 3.5), 60.0, shape="DISK", size=0.8, color=(0.5, 1.0, 0.5))
-    scaled = light("AREA", "Ellipse", (2.5, -2.5, 3.5), 60.0, shape="ELLIPSE", size=0.5, size_y=1.2, color=(0.5, 0.5, 1.0))
+    scaled = light(
+        "AREA",
+        "Ellipse",
+        (2.5, -2.5, 3.5),
+        60.0,
+        shape="ELLIPSE",
+        size=0.5,
+        size_y=1.2,
+        color=(0.5, 0.5, 1.0),
+    )
     scaled.scale = (1.5, 1.5, 1.5)
 
 

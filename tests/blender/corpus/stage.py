@@ -24,8 +24,22 @@ def new_file():
 
 def stage(*, lit=True):
     scene = new_file()
-    floor = plane("Floor", (0.0, 0.0, 0.0), 8.0, principled("floor", **{"Base Color": (0.45, 0.42, 0.4, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}))
-    wall = plane("Wall", (0.0, 3.0, 2.0), 8.0, principled("wall", **{"Base Color": (0.3, 0.45, 0.6, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}))
+    floor = plane(
+        "Floor",
+        (0.0, 0.0, 0.0),
+        8.0,
+        principled(
+            "floor", **{"Base Color": (0.45, 0.42, 0.4, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
+        ),
+    )
+    wall = plane(
+        "Wall",
+        (0.0, 3.0, 2.0),
+        8.0,
+        principled(
+            "wall", **{"Base Color": (0.3, 0.45, 0.6, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
+        ),
+    )
     wall.rotation_euler = (math.pi / 2, 0.0, 0.0)
     if lit:
         light("AREA", "Key", (-2.0, -3.0, 4.0), 150.0, target=(0, 0, 0.5), size=1.5)

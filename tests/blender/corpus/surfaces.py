@@ -4,80 +4,167 @@
 import bpy
 import numpy as np
 
-from corpus.stage import cube, image, node_of, plane, principled, shader, sphere, stage, three, tiles
+from corpus.stage import image, node_of, plane, principled, shader, stage, three, tiles
 
 
 def diffuse(folder):
     stage()
-    three([shader(f"diffuse {i}", "ShaderNodeBsdfDiffuse", Color=(*c, 1))[0] for i, c in enumerate([(0.8, 0.2, 0.2), (0.7, 0.7, 0.7), (0.1, 0.5, 0.2)])])
+    three(
+        [
+            shader(f"diffuse {i}", "ShaderNodeBsdfDiffuse", Color=(*c, 1))[0]
+            for i, c in enumerate([(0.8, 0.2, 0.2), (0.7, 0.7, 0.7), (0.1, 0.5, 0.2)])
+        ]
+    )
 
 
 def plastic(folder):
     stage()
-    three([principled(f"plastic {r}", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": r}) for r in (0.15, 0.3, 0.6)])
+    three(
+        [
+            principled(f"plastic {r}", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": r})
+            for r in (0.15, 0.3, 0.6)
+        ]
+    )
 
 
 def plastic_smooth(folder):
     stage()
-    three([principled("red", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": 0.0}),
-           principled("white", **{"Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.5, "IOR": 1.7}),
-           principled("black", **{"Base Color": (0.01, 0.01, 0.01, 1), "Roughness": 0.1, "Specular IOR Level": 1.0})])
+    three(
+        [
+            principled("red", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": 0.0}),
+            principled("white", **{"Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.5, "IOR": 1.7}),
+            principled(
+                "black", **{"Base Color": (0.01, 0.01, 0.01, 1), "Roughness": 0.1, "Specular IOR Level": 1.0}
+            ),
+        ]
+    )
 
 
 def metal(folder):
     stage()
-    three([principled(f"metal {r}", **{"Base Color": (0.9, 0.65, 0.3, 1), "Metallic": 1.0, "Roughness": r}) for r in (0.0, 0.3, 0.7)])
+    three(
+        [
+            principled(f"metal {r}", **{"Base Color": (0.9, 0.65, 0.3, 1), "Metallic": 1.0, "Roughness": r})
+            for r in (0.0, 0.3, 0.7)
+        ]
+    )
 
 
 def metal_image(folder):
     stage()
     colours = image("tiles", tiles)
-    three([principled(f"metal {r}", **{"Base Color": colours, "Metallic": 1.0, "Roughness": r}) for r in (0.1, 0.3, 0.6)])
+    three(
+        [
+            principled(f"metal {r}", **{"Base Color": colours, "Metallic": 1.0, "Roughness": r})
+            for r in (0.1, 0.3, 0.6)
+        ]
+    )
 
 
 def glossy(folder):
     stage()
-    three([shader(f"glossy {r}", "ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.7, 1), Roughness=r)[0] for r in (0.05, 0.25, 0.6)])
+    three(
+        [
+            shader(f"glossy {r}", "ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.7, 1), Roughness=r)[0]
+            for r in (0.05, 0.25, 0.6)
+        ]
+    )
 
 
 def glass(folder):
     stage()
     clear = {"Transmission Weight": 1.0, "Roughness": 0.0, "IOR": 1.45}
-    three([principled("clear", **clear, **{"Base Color": (1, 1, 1, 1)}),
-           principled("green", **clear, **{"Base Color": (0.5, 0.9, 0.6, 1)}),
-           shader("glass", "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.5)[0]])
+    three(
+        [
+            principled("clear", **clear, **{"Base Color": (1, 1, 1, 1)}),
+            principled("green", **clear, **{"Base Color": (0.5, 0.9, 0.6, 1)}),
+            shader("glass", "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.5)[0],
+        ]
+    )
 
 
 def glass_rough(folder):
     stage()
-    three([principled(f"rough {r}", **{"Base Color": (1, 1, 1, 1), "Transmission Weight": 1.0, "Roughness": r}) for r in (0.1, 0.3, 0.5)])
+    three(
+        [
+            principled(
+                f"rough {r}", **{"Base Color": (1, 1, 1, 1), "Transmission Weight": 1.0, "Roughness": r}
+            )
+            for r in (0.1, 0.3, 0.5)
+        ]
+    )
 
 
 def coat(folder):
     stage()
-    three([principled("coated plastic", **{"Base Color": (0.6, 0.05, 0.05, 1), "Roughness": 0.8, "Coat Weight": 1.0, "Coat Roughness": 0.05}),
-           principled("coated metal", **{"Base Color": (0.2, 0.3, 0.7, 1), "Metallic": 1.0, "Roughness": 0.5, "Coat Weight": 1.0}),
-           principled("half a coat", **{"Base Color": (0.6, 0.5, 0.05, 1), "Roughness": 0.5, "Coat Weight": 0.5})])
+    three(
+        [
+            principled(
+                "coated plastic",
+                **{
+                    "Base Color": (0.6, 0.05, 0.05, 1),
+                    "Roughness": 0.8,
+                    "Coat Weight": 1.0,
+                    "Coat Roughness": 0.05,
+                },
+            ),
+            principled(
+                "coated metal",
+                **{"Base Color": (0.2, 0.3, 0.7, 1), "Metallic": 1.0, "Roughness": 0.5, "Coat Weight": 1.0},
+            ),
+            principled(
+                "half a coat", **{"Base Color": (0.6, 0.5, 0.05, 1), "Roughness": 0.5, "Coat Weight": 0.5}
+            ),
+        ]
+    )
 
 
 def sheen(folder):
     stage()
-    three([principled(f"cloth {w}", **{"Base Color": (0.1, 0.12, 0.3, 1), "Roughness": 0.9, "Sheen Weight": w}) for w in (0.3, 0.6, 1.0)])
+    three(
+        [
+            principled(
+                f"cloth {w}", **{"Base Color": (0.1, 0.12, 0.3, 1), "Roughness": 0.9, "Sheen Weight": w}
+            )
+            for w in (0.3, 0.6, 1.0)
+        ]
+    )
 
 
 def emission(folder):
     stage()
     bpy.data.objects["Key"].data.energy = 20.0
-    three([principled("glow", **{"Base Color": (0, 0, 0, 1), "Emission Color": (1, 0.6, 0.3, 1), "Emission Strength": 3.0}),
-           shader("emission", "ShaderNodeEmission", Color=(0.2, 0.5, 1, 1), Strength=2.0)[0],
-           principled("picture", **{"Base Color": (0.1, 0.1, 0.1, 1), "Emission Color": image("tiles", tiles), "Emission Strength": 1.0})])
-    screen = plane("Screen", (0.0, 2.0, 1.9), 1.2, shader("screen", "ShaderNodeEmission", Color=(1, 1, 1, 1), Strength=1.5)[0])
+    three(
+        [
+            principled(
+                "glow",
+                **{"Base Color": (0, 0, 0, 1), "Emission Color": (1, 0.6, 0.3, 1), "Emission Strength": 3.0},
+            ),
+            shader("emission", "ShaderNodeEmission", Color=(0.2, 0.5, 1, 1), Strength=2.0)[0],
+            principled(
+                "picture",
+                **{
+                    "Base Color": (0.1, 0.1, 0.1, 1),
+                    "Emission Color": image("tiles", tiles),
+                    "Emission Strength": 1.0,
+                },
+            ),
+        ]
+    )
+    screen = plane(
+        "Screen",
+        (0.0, 2.0, 1.9),
+        1.2,
+        shader("screen", "ShaderNodeEmission", Color=(1, 1, 1, 1), Strength=1.5)[0],
+    )
     screen.rotation_euler = (-1.57, 0.0, 0.0)  # turned away: its back is seen
 
 
 def alpha(folder):
     stage()
-    leaf = image("leaf", tiles, alpha=lambda x, y: ((x - 0.5) ** 2 + (y - 0.5) ** 2 < 0.16).astype(np.float32))
+    leaf = image(
+        "leaf", tiles, alpha=lambda x, y: ((x - 0.5) ** 2 + (y - 0.5) ** 2 < 0.16).astype(np.float32)
+    )
     cut = principled("cut out", Roughness=0.9)
     tree = cut.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
@@ -104,7 +191,11 @@ def normal_map(folder):
 
     normals = image("normals", waves, 256, space="Non-Color")
     materials = []
-    for name, strength, inputs in (("full", 1.0, {"Roughness": 0.4}), ("half", 0.5, {"Roughness": 0.9}), ("metal", 1.0, {"Metallic": 1.0, "Roughness": 0.2})):
+    for name, strength, inputs in (
+        ("full", 1.0, {"Roughness": 0.4}),
+        ("half", 0.5, {"Roughness": 0.9}),
+        ("metal", 1.0, {"Metallic": 1.0, "Roughness": 0.2}),
+    ):
         material = principled(name, **inputs)
         tree = material.node_tree
         texture = tree.nodes.new("ShaderNodeTexImage")
@@ -118,7 +209,12 @@ def normal_map(folder):
 
 def bump(folder):
     stage()
-    heights = image("heights", lambda x, y: np.repeat((0.5 + 0.5 * np.sin(40 * x) * np.sin(30 * y))[..., None], 3, -1), 256, space="Non-Color")
+    heights = image(
+        "heights",
+        lambda x, y: np.repeat((0.5 + 0.5 * np.sin(40 * x) * np.sin(30 * y))[..., None], 3, -1),
+        256,
+        space="Non-Color",
+    )
     materials = []
     for name, strength, distance in (("low", 1.0, 0.02), ("half", 0.5, 0.05), ("high", 1.0, 0.05)):
         material = principled(name, Roughness=0.5)
@@ -134,33 +230,67 @@ def bump(folder):
 
 def roughness_image(folder):
     stage()
-    stripes = image("stripes", lambda x, y: np.repeat((0.15 + 0.5 * (np.sin(30 * y) > 0))[..., None], 3, -1), space="Non-Color")
-    ramp = image("ramp", lambda x, y: np.repeat((0.1 + 0.7 * x)[..., None], 3, -1), space="Non-Color")
-    three([principled("stripes", **{"Base Color": (0.1, 0.3, 0.35, 1), "Roughness": stripes}),
-           principled("ramp", **{"Base Color": (0.3, 0.3, 0.3, 1), "Roughness": ramp}),
-           principled("metal", **{"Base Color": (0.8, 0.8, 0.8, 1), "Metallic": 1.0, "Roughness": stripes})])
+    stripes = image(
+        "stripes",
+        lambda _x, y: np.repeat((0.15 + 0.5 * (np.sin(30 * y) > 0))[..., None], 3, -1),
+        space="Non-Color",
+    )
+    ramp = image("ramp", lambda x, _y: np.repeat((0.1 + 0.7 * x)[..., None], 3, -1), space="Non-Color")
+    three(
+        [
+            principled("stripes", **{"Base Color": (0.1, 0.3, 0.35, 1), "Roughness": stripes}),
+            principled("ramp", **{"Base Color": (0.3, 0.3, 0.3, 1), "Roughness": ramp}),
+            principled("metal", **{"Base Color": (0.8, 0.8, 0.8, 1), "Metallic": 1.0, "Roughness": stripes}),
+        ]
+    )
 
 
 def metallic_image(folder):
     stage()
-    spots = image("spots", lambda x, y: np.repeat((np.sin(30 * x) * np.sin(30 * y) > 0).astype(float)[..., None], 3, -1), space="Non-Color")
-    three([principled("spots", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": spots}),
-           principled("half", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": 0.5}),
-           principled("tinted", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": 1.0, "Specular Tint": (0.2, 0.2, 0.2, 1)})])
+    spots = image(
+        "spots",
+        lambda x, y: np.repeat((np.sin(30 * x) * np.sin(30 * y) > 0).astype(float)[..., None], 3, -1),
+        space="Non-Color",
+    )
+    three(
+        [
+            principled("spots", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": spots}),
+            principled("half", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": 0.5}),
+            principled(
+                "tinted",
+                **{
+                    "Base Color": (0.8, 0.5, 0.2, 1),
+                    "Roughness": 0.3,
+                    "Metallic": 1.0,
+                    "Specular Tint": (0.2, 0.2, 0.2, 1),
+                },
+            ),
+        ]
+    )
 
 
 def mixes(folder):
     stage()
     plain, tree, mix = shader("plain", "ShaderNodeMixShader", Fac=0.3)
     tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.2, 0.1, 1)).outputs[0], mix.inputs[1])
-    tree.links.new(node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.3).outputs[0], mix.inputs[2])
+    tree.links.new(
+        node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.3).outputs[0],
+        mix.inputs[2],
+    )
     fresnel, tree, mix = shader("fresnel", "ShaderNodeMixShader")
     tree.links.new(node_of(tree, "ShaderNodeFresnel", IOR=1.5).outputs[0], mix.inputs[0])
     tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.1, 0.2, 0.6, 1)).outputs[0], mix.inputs[1])
-    tree.links.new(node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.2).outputs[0], mix.inputs[2])
+    tree.links.new(
+        node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.2).outputs[0],
+        mix.inputs[2],
+    )
     glow, tree, total = shader("sum", "ShaderNodeAddShader")
-    tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.2, 0.6, 0.2, 1)).outputs[0], total.inputs[0])
-    tree.links.new(node_of(tree, "ShaderNodeEmission", Color=(1, 0.5, 0.2, 1), Strength=0.3).outputs[0], total.inputs[1])
+    tree.links.new(
+        node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.2, 0.6, 0.2, 1)).outputs[0], total.inputs[0]
+    )
+    tree.links.new(
+        node_of(tree, "ShaderNodeEmission", Color=(1, 0.5, 0.2, 1), Strength=0.3).outputs[0], total.inputs[1]
+    )
     three([plain, fresnel, glow])
 
 
@@ -221,7 +351,10 @@ def procedural(folder):
     tree.links.new(bumps.outputs[0], tree.nodes["Principled BSDF"].inputs["Normal"])
     checker = principled("checker", Roughness=0.8)
     tree = checker.node_tree
-    tree.links.new(node_of(tree, "ShaderNodeTexChecker", Scale=7.0).outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    tree.links.new(
+        node_of(tree, "ShaderNodeTexChecker", Scale=7.0).outputs[0],
+        tree.nodes["Principled BSDF"].inputs["Base Color"],
+    )
     three([noise, voronoi, checker])
 
 
@@ -238,7 +371,11 @@ def corrected_images(folder):
     packed = principled("occlusion roughness metallic")
     tree = packed.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image("orm", lambda x, y: np.stack([np.ones_like(x), 0.2 + 0.6 * x, (y > 0.5).astype(float)], -1), space="Non-Color")
+    texture.image = image(
+        "orm",
+        lambda x, y: np.stack([np.ones_like(x), 0.2 + 0.6 * x, (y > 0.5).astype(float)], -1),
+        space="Non-Color",
+    )
     parts = tree.nodes.new("ShaderNodeSeparateColor")
     tree.links.new(texture.outputs[0], parts.inputs[0])
     tree.links.new(parts.outputs[1], tree.nodes["Principled BSDF"].inputs["Roughness"])
@@ -270,7 +407,25 @@ def grouped(colours):
 
 
 CASES = (
-    diffuse, plastic, plastic_smooth, metal, metal_image, glossy, glass, glass_rough, coat, sheen, emission, alpha,
-    normal_map, bump, roughness_image, metallic_image, mixes, vertex_colours, mapped_images, procedural,
+    diffuse,
+    plastic,
+    plastic_smooth,
+    metal,
+    metal_image,
+    glossy,
+    glass,
+    glass_rough,
+    coat,
+    sheen,
+    emission,
+    alpha,
+    normal_map,
+    bump,
+    roughness_image,
+    metallic_image,
+    mixes,
+    vertex_colours,
+    mapped_images,
+    procedural,
     corrected_images,
 )
