@@ -6,52 +6,15 @@ Blender's cameras look along -z with y up, as the file wants; the world stays Bl
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 
 from enfilade_blender.notes import Notes
-from enfilade_blender.open_file import Selection
+from enfilade_blender.records import Selection, View
 
-FOCUS_DEFAULT_MM = 1000.0
 MM = 1000.0
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """A camera at a frame.
-
-    Attributes
-    ----------
-    name : str
-    pose : (4, 4) float64
-        Rigid, from camera to world.
-    projection : (4, 4) float64
-        OpenGL's.
-    lens : dict
-        Optional keys of the file.
-    """
-
-    name: str
-    pose: np.ndarray
-    projection: np.ndarray
-    lens: dict[str, Any]
-
-    @property
-    def fov_deg(self) -> float:
-        """Vertical field of view."""
-        return math.degrees(2.0 * math.atan(1.0 / self.projection[1, 1]))
-
-    def pixels(self, points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-        """Pixel coordinates and depth of points (N, 3) of the world, (N, 3)."""
-        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-        depth = np.maximum(-local[:, 2], 1e-6)
-        x = (self.projection[0, 0] * local[:, 0] / depth - self.projection[0, 2] + 1.0) * 0.5 * size[0]
-        y = (1.0 - self.projection[1, 1] * local[:, 1] / depth + self.projection[1, 2]) * 0.5 * size[1]
-        return np.stack([x, y, -local[:, 2]], axis=-1)
 
 
 def read_views(selection: Selection, notes: Notes) -> list[View]:

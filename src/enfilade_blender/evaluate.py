@@ -8,7 +8,6 @@ is one which renders nothing: visibility, modifiers and levels of subdivision ar
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
@@ -18,8 +17,7 @@ from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Limits
 from enfilade_blender.mesh_data import read_mesh
 from enfilade_blender.notes import Notes
-from enfilade_blender.open_file import Selection
-from enfilade_blender.ply import Mesh
+from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
 
 ENGINE = "ENFILADE_EXPORT"
 SURFACES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -31,47 +29,6 @@ NOT_CARRIED = {
     "GPENCIL": "grease pencil",
 }
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
-
-
-@dataclass(eq=False)
-class Placed:
-    """An object's mesh with the matrices of its copies.
-
-    Attributes
-    ----------
-    name : str
-        Of the object; of an instance, with that of its instancer.
-    mesh
-    slots : tuple
-        Materials (bpy) or None.
-    matrices : list of (4, 4) float64
-    is_instance : bool
-    """
-
-    name: str
-    mesh: Mesh
-    slots: tuple[Any, ...]
-    matrices: list[np.ndarray] = field(default_factory=list)
-    is_instance: bool = False
-
-
-@dataclass(eq=False)
-class Lamp:
-    """A light of the scene: its data and its matrix (4, 4) float64."""
-
-    name: str
-    data: Any
-    matrix: np.ndarray
-
-
-@dataclass(eq=False)
-class Evaluated:
-    """Objects and lights of a scene at one frame."""
-
-    placed: list[Placed] = field(default_factory=list)
-    lamps: list[Lamp] = field(default_factory=list)
-    instances: int = 0
-    triangles: int = 0
 
 
 class _Engine(bpy.types.RenderEngine):

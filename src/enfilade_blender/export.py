@@ -14,7 +14,8 @@ from enfilade_blender.lights import emitters, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
-from enfilade_blender.open_file import Selection, open_source
+from enfilade_blender.open_file import open_source
+from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import Element, plugin, write_scene
 from enfilade_blender.shapes import Shapes

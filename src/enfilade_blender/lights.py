@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from enfilade_blender.evaluate import Lamp
 from enfilade_blender.materials.mapping import spot_ramp
 from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp
 from enfilade_blender.scene_xml import Element, Identifiers, plugin
 
 Colour = tuple[float, float, float]

@@ -10,7 +10,7 @@ from typing import Any
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Limits
-from enfilade_blender.open_file import Selection
+from enfilade_blender.records import Selection
 
 MAX_LEVELS = 12  # of subdivision: a cube has 2e8 triangles
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from enfilade_blender.notes import Notes
-from enfilade_blender.open_file import Selection
+from enfilade_blender.records import Selection
 
 SAMPLES = 5  # frames at which poses are compared
 LISTED = 20  # objects that are named

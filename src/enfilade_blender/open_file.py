@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import bpy
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
+from enfilade_blender.records import Selection
 
 IMPORTERS: dict[str, Callable[..., Any]] = {
     ".glb": lambda file: bpy.ops.import_scene.gltf(filepath=file),
@@ -35,26 +35,6 @@ DATA = (
     "collections",
     "scenes",
 )
-
-
-@dataclass(frozen=True)
-class Selection:
-    """What a job exports.
-
-    Attributes
-    ----------
-    scene : bpy.types.Scene
-    view_layer : bpy.types.ViewLayer
-    frames : tuple of int
-        First and last.
-    size : tuple of int
-        Width and height, pixels.
-    """
-
-    scene: Any
-    view_layer: Any
-    frames: tuple[int, int]
-    size: tuple[int, int]
 
 
 def open_source(job: Job) -> Selection:

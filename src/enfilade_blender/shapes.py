@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from enfilade_blender.camera import View
-from enfilade_blender.evaluate import Placed
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context
@@ -26,8 +24,8 @@ from enfilade_blender.materials.values import (
     values_of,
 )
 from enfilade_blender.notes import Notes, report_progress
-from enfilade_blender.open_file import Selection
 from enfilade_blender.ply import Mesh, joined, write_ply
+from enfilade_blender.records import Placed, Selection, View
 from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, reference
 
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), Constant((0.0,)), Constant((1.0,)), None, "no material")

@@ -16,7 +16,7 @@ from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.textures import linear_pixels
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.notes import Notes
-from enfilade_blender.open_file import Selection
+from enfilade_blender.records import Selection
 from enfilade_blender.scene_xml import Element, plugin
 
 WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096

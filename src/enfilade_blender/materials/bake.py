@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from enfilade_blender.camera import View
-from enfilade_blender.evaluate import Placed
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
@@ -35,8 +33,8 @@ from enfilade_blender.materials.values import (
     values_of,
 )
 from enfilade_blender.notes import Notes
-from enfilade_blender.open_file import Selection
 from enfilade_blender.ply import Mesh
+from enfilade_blender.records import Placed, Selection, View
 
 BAKED_UV = "enfilade"
 SMALLEST = 64  # pixels

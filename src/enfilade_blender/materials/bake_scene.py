@@ -10,11 +10,11 @@ from typing import Any
 import bpy
 import numpy as np
 
-from enfilade_blender.evaluate import Placed
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials.textures import linear_pixels
 from enfilade_blender.materials.values import Output
 from enfilade_blender.ply import Mesh
+from enfilade_blender.records import Placed
 
 MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
