@@ -59,9 +59,9 @@ def _recipe() -> tuple[str, tuple[str, ...]]:
         if found is not None:
             return found, packages
     raise EnfiladeError(
-        f"the module bpy needs Python {' or '.join(RECIPES)}, which is not here; install it (such as sudo apt-get "
-        "install python3.11 python3.11-venv), or install Blender 4.2 or newer (https://blender.org) and put "
-        "`blender` on PATH"
+        f"the module bpy needs Python {' or '.join(RECIPES)}, which is not here; install it (such as sudo "
+        "apt-get install python3.11 python3.11-venv), or install Blender 4.2 or newer (blender.org) and "
+        "put `blender` on PATH"
     )
 
 
