@@ -31,7 +31,7 @@ NOT_CARRIED = {
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 
 
-class _Engine(bpy.types.RenderEngine):
+class _Engine(bpy.types.RenderEngine):  # type: ignore[misc]
     bl_idname = ENGINE
     bl_label = "enfilade export"
     bl_use_preview = False

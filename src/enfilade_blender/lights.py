@@ -100,9 +100,8 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
         return []
     _note_unusual(lamp, notes)
     if data.type == "SUN":
-        x, y, z = -_axis(lamp.matrix)
         sun = plugin("emitter", "directional", irradiance=colour)
-        sun.append(_vector("direction", x, y, z))
+        sun.append(_vector("direction", -_axis(lamp.matrix)))
         return [sun]
     if data.type == "AREA":
         return [_area(lamp, colour, identifiers)]
@@ -112,11 +111,11 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
     place = lamp.matrix[:3, 3]
     if radius <= TINY:
         emitter = plugin("emitter", "point", intensity=_scaled(colour, point_intensity(1.0)))
-        emitter.append(_vector("position", *place, tag="point"))
+        emitter.append(_vector("position", place, tag="point"))
         return [emitter]
     light = plugin("emitter", "area", radiance=_scaled(colour, sphere_radiance(1.0, radius)))
     shape = plugin("shape", "sphere", light, plugin("bsdf", "null"), radius=radius)
-    shape.append(_vector("center", *place, tag="point"))
+    shape.append(_vector("center", place, tag="point"))
     shape.set("id", identifiers.unique(name))
     return [shape]
 
@@ -177,5 +176,6 @@ def _scaled(colour: Colour, scale: float) -> Colour:
     return colour[0] * scale, colour[1] * scale, colour[2] * scale
 
 
-def _vector(name: str, x: float, y: float, z: float, tag: str = "vector") -> Element:
-    return Element(tag, name=name, x=f"{x:.9g}", y=f"{y:.9g}", z=f"{z:.9g}")
+def _vector(name: str, values: np.ndarray, tag: str = "vector") -> Element:
+    x, y, z = (f"{value:.9g}" for value in values)
+    return Element(tag, name=name, x=x, y=y, z=z)

@@ -72,7 +72,8 @@ def _pixel_cosine(rows: np.ndarray, width: int, toward: np.ndarray) -> np.ndarra
     polar = (rows[:, None] + 0.5) / (width // 2) * math.pi
     turn = (np.arange(width)[None, :] + 0.5) / width * 2.0 * math.pi
     cosine = np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1]) + np.cos(polar) * toward[2]
-    return np.maximum(cosine, 0.0)
+    positive: np.ndarray = np.maximum(cosine, 0.0)
+    return positive
 
 
 def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
@@ -91,14 +92,12 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
     shader = Graph(world.name, notes).shader(output.inputs["Surface"], ())
     if isinstance(shader, Nothing):
         return 0.0, 0.0, 0.0
-    is_plain = (
-        isinstance(shader, Emission)
-        and isinstance(shader.colour, Constant)
-        and isinstance(shader.strength, Constant)
-    )
-    if not is_plain:
+    if not isinstance(shader, Emission):
         return None
-    r, g, b = (c * shader.strength.number for c in shader.colour.colour)
+    colour, strength = shader.colour, shader.strength
+    if not (isinstance(colour, Constant) and isinstance(strength, Constant)):
+        return None
+    r, g, b = (c * strength.number for c in colour.colour)
     return r, g, b
 
 

@@ -228,10 +228,11 @@ def layered(
     A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is
     dimmed by the rest, and no colour of it is scaled.
     """
-    mean = ggx.mean_reflectance(round(ior, 3))
+    alpha = _alpha(roughness, context)
+    typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
+    mean = ggx.mean_reflectance(round(typical, 3), round(ior, 3))
     if is_zero(weight) or mean < 1e-3:
         return base
-    alpha = _alpha(roughness, context)
     optics: dict[str, Property] = {
         "eta": (ior,) * 3,
         "k": (0.0,) * 3,

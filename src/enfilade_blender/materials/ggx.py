@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-COSINES, STEPS = 16, 48
+COSINES, STEPS = 24, 48
 
 
 @lru_cache(maxsize=256)
@@ -35,27 +35,28 @@ def metal_scale(reflectance: float, alpha: float) -> float:
 
 
 @lru_cache(maxsize=256)
-def mean_reflectance(ior: float) -> float:
-    """Reflectance of a smooth dielectric under uniform light, 0..1."""
-    mu = (np.arange(256) + 0.5) / 256
-    return float(np.sum(mu * _fresnel(mu, ior)) / np.sum(mu))
+def mean_reflectance(alpha: float, ior: float) -> float:
+    """Reflectance of a dielectric interface under uniform light, 0..1."""
+    mu, weights = _cosines()
+    if alpha < 1e-3:
+        return float(_fresnel(mu, ior) @ weights)
+    return float(np.array([_interface(m, alpha, ior)[0] for m in mu]) @ weights)
 
 
 @lru_cache(maxsize=256)
 def plastic_gain(alpha: float, ior: float) -> float:
     """Factor of the reflectance of Mitsuba's ``roughplastic`` that restores what its rough interface loses.
 
-    The diffuse lobe is ``T(i) T(o) / (ior^2 (1 - R))``, with the transmittance T of single scattering and
-    the internal reflectance R. Its albedo becomes that below a smooth interface, which Blender's Principled
-    BSDF has at all roughnesses.
+    The diffuse lobe is ``T(i) T(o) / (ior^2 (1 - R))``, with the transmittance T of single scattering and the
+    internal reflectance R. With the gain, its albedo is what the interface does not reflect, as in Blender.
     """
     if alpha < 1e-3 or ior < 1.001:
         return 1.0
     mu, weights = _cosines()
     rough = np.array([_interface(m, alpha, ior)[1] for m in mu]) @ weights
-    smooth = np.array([1.0 - _fresnel(np.array([m]), ior)[0] for m in mu]) @ weights
+    passed = 1.0 - mean_reflectance(alpha, ior)
     internal = np.array([_interface(m, alpha, 1.0 / ior)[0] for m in mu]) @ weights
-    return float(smooth * ior**2 * (1.0 - internal) / rough**2)
+    return float(passed * ior**2 * (1.0 - internal) / rough**2)
 
 
 def _cosines() -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +91,8 @@ def _fresnel(cosine: np.ndarray, ior: float) -> np.ndarray:
 def _shadowing(cosine: np.ndarray, alpha: float) -> np.ndarray:
     """Smith's G1."""
     tangent2 = (1.0 - cosine**2) / np.maximum(cosine**2, 1e-12)
-    return 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tangent2))
+    shadowing: np.ndarray = 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tangent2))
+    return shadowing
 
 
 def _albedo(mu: float, alpha: float) -> float:
@@ -115,4 +117,5 @@ def _visible_normals(mu: float, alpha: float) -> np.ndarray:
     normal: np.ndarray = x[..., None] * tangent + y[..., None] * bitangent + z[..., None] * stretched
     normal[..., :2] *= alpha
     normal[..., 2] = np.maximum(normal[..., 2], 1e-9)
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return normal

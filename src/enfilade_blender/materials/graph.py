@@ -81,7 +81,7 @@ class Graph:
                 return Mix(Constant((0.5,)), first, second, ior, node.name)
             return Mix(self.value(node.inputs[0], inner), first, second, None, node.name)
         if node.type == "ADD_SHADER":
-            return Add(*(self.shader(node.inputs[i], inner) for i in (0, 1)), name=node.name)
+            return Add(self.shader(node.inputs[0], inner), self.shader(node.inputs[1], inner), node.name)
         if node.type in ("EMISSION", "BACKGROUND"):
             return Emission(
                 self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)

@@ -87,7 +87,8 @@ def conductor_reflectance(eta: np.ndarray, k: np.ndarray, cosine: np.ndarray) ->
     a = np.sqrt(np.maximum(0.5 * (both + first), 0.0))
     across = (both + c2 - 2.0 * a * cosine) / (both + c2 + 2.0 * a * cosine)
     along = across * (c2 * both + s2**2 - 2.0 * a * cosine * s2) / (c2 * both + s2**2 + 2.0 * a * cosine * s2)
-    return 0.5 * (across + along)
+    reflectance: np.ndarray = 0.5 * (across + along)
+    return reflectance
 
 
 def _f82(reflectance: float, tint: float, cosine: np.ndarray) -> np.ndarray:

@@ -90,8 +90,7 @@ class Surface:
         if isinstance(radiance.colour, Constant):
             r, g, b = (c * radiance.strength for c in radiance.colour.colour)
             return (r, g, b) if max(r, g, b) > 0.0 else None
-        is_image = isinstance(radiance.colour, ImageValue)
-        if is_image and context.textures.is_missing(radiance.colour):
+        if isinstance(radiance.colour, ImageValue) and context.textures.is_missing(radiance.colour):
             return (0.5 * radiance.strength,) * 3
         if abs(radiance.strength - 1.0) < 1e-3 or not isinstance(radiance.colour, ImageValue | Texture):
             element = context.textures.colour(radiance.colour)

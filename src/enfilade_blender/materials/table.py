@@ -171,7 +171,7 @@ def markdown() -> str:
         "Objects": OBJECTS,
     }  # fmt: skip
     for title, rows in sections.items():
-        parts.append(f"| {title} | | in the exported scene |\n| --- | --- | --- |")
+        parts.append(f"| {title} | outcome | in the exported scene |\n| --- | --- | --- |")
         parts[-1] += "".join(f"\n| {what} | {how} | {becomes} |" for what, how, becomes in rows)
     return "\n\n".join(parts) + "\n"
 
