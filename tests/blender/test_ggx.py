@@ -56,4 +56,6 @@ def test_a_white_metal_gets_all_lost_energy_back():
 
 
 def test_the_mean_reflectance_of_glass():
-    assert mean_reflectance(0.0, 1.5) == pytest.approx(0.0918, abs=2e-4)  # d'Eon 2021, diffuse Fresnel reflectance
+    assert mean_reflectance(0.0, 1.5) == pytest.approx(
+        0.0918, abs=2e-4
+    )  # d'Eon 2021, diffuse Fresnel reflectance

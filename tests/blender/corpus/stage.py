@@ -178,5 +178,5 @@ def tiles(x, y, n=8, dark=(0.1, 0.1, 0.3), bright=(0.9, 0.8, 0.6)):
 
 def save(folder, name):
     file = Path(folder) / f"{name}.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(file), compress=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), compress=True, relative_remap=False)
     return file
