@@ -62,14 +62,12 @@ class Bakery:
     def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
         """A shader without procedural values, its mesh, and whether it is this object's own."""
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-        uv_maps = {
-            value.uv_map or mesh.active_uv for value in values_of(shader) if isinstance(value, ImageValue)
-        }
+        uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
         if not wanted and len(uv_maps) <= 1:
             return shader, mesh, False
-        if all(isinstance(value, Procedural) and value.is_of_uv for value in wanted) and len(uv_maps) <= 1:
-            shared = replaced(shader, lambda value: self._over_uv(value, material, next(iter(uv_maps), "")))
-            return shared, mesh, False
+        if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
+            uv_map = next(iter(uv_maps), "")
+            return replaced(shader, lambda value: self._over_uv(value, material, uv_map)), mesh, False
         size = self._resolution(placed, mesh)
         with self._stage().mesh(mesh, placed) as canvas:
             mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
@@ -86,13 +84,9 @@ class Bakery:
             return value
         key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
         if key not in self._of_uv:
-            sizes = [
-                max(found.node.image.size)
-                for found in upstream(value.output)
-                if found.node.type == "TEX_IMAGE" and found.node.image is not None
-            ]
+            sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
-            with self._stage().square() as canvas:
+            with self._stage().square(uv_map) as canvas:
                 pixels, _ = canvas.bake(value.output, material, size)
             self._of_uv[key] = self._stored(
                 pixels, None, value, material.name, uv_map, "the unit square of UV"
@@ -154,3 +148,17 @@ class Bakery:
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
         power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
         return int(min(power, self._job.bake_px))
+
+
+def _images(output: Output) -> list[Any]:
+    """Images that an output depends on."""
+    nodes = [found.node for found in upstream(output) if found.node.type == "TEX_IMAGE"]
+    return [node.image for node in nodes if node.image is not None]
+
+
+def _uv_maps(value: Any) -> list[str]:
+    """UV map that a value looks images up by; empty for other values."""
+    if isinstance(value, ImageValue):
+        return [value.uv_map]
+    is_of_uv = isinstance(value, Procedural) and value.uv_map is not None and _images(value.output)
+    return [value.uv_map] if is_of_uv else []

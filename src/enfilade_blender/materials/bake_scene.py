@@ -53,15 +53,15 @@ class BakeScene:
             yield canvas
 
     @contextmanager
-    def square(self) -> Iterator[Canvas]:
-        """The unit square, which is its own texture coordinates."""
+    def square(self, uv_map: str) -> Iterator[Canvas]:
+        """The unit square, which is its own texture coordinates, by the name of a UV map."""
         corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
         triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
         normals = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), (2, 3, 3))
         uv = corners[triangles][..., :2]
-        slots = np.zeros(2, np.int32)
+        name, slots = uv_map or "UVMap", np.zeros(2, np.int32)
         with self._canvas(
-            _data(Mesh(corners, triangles, normals, {"UVMap": uv}, {}, slots, "UVMap")), np.eye(4)
+            _data(Mesh(corners, triangles, normals, {name: uv}, {}, slots, name)), np.eye(4)
         ) as canvas:
             yield canvas
 

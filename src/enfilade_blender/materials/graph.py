@@ -103,6 +103,10 @@ class Graph:
             return AttributeValue(found, node.layer_name)
         if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and found.socket.name == "Color":
             return AttributeValue(found, node.attribute_name)
+        if node.type == "TEX_IMAGE" and node.image is None:
+            effect = "a mid grey is in its place"
+            self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
+            return Constant((0.5, 0.5, 0.5))
         if node.type == "TEX_IMAGE" and (coordinates := image_coordinates(node, found.groups)):
             return ImageValue(found, *coordinates)
         return Procedural(found, *_dependence(found))
@@ -252,24 +256,24 @@ def upstream(output: Output) -> Iterator[Output]:
                 waiting.append(found)
 
 
-def _dependence(output: Output) -> tuple[bool, bool]:
-    """Whether an output is a periodic function of UV alone, and whether it depends on the view."""
-    is_of_uv, is_of_view = True, False
+def _dependence(output: Output) -> tuple[str | None, bool]:
+    """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
+    is_of_uv, is_of_view, uv_maps = True, False, set()
     for found in upstream(output):
         node = found.node
         is_of_view |= node.type in table.VIEW_NODES
         if node.type == "TEX_IMAGE":
             coordinates = image_coordinates(node, found.groups)
-            is_of_uv &= coordinates == ("", IDENTITY) and node.extension == "REPEAT"
+            is_of_uv &= coordinates is not None and coordinates[1] == IDENTITY and node.extension == "REPEAT"
+            uv_maps.add(coordinates[0] if coordinates else "")
         else:
-            is_of_uv &= node.type in table.COLOUR_NODES or (
-                node.type == "TEX_COORD" and found.socket.name == "UV"
-            )
-    return is_of_uv, is_of_view
+            is_of_uv &= node.type in table.COLOUR_NODES or node.type in ("TEX_COORD", "UVMAP")
+    is_of_uv &= len(uv_maps) <= 1
+    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view
 
 
 def _is_of_uv(value: Value) -> bool:
-    return isinstance(value, Procedural) and value.is_of_uv
+    return isinstance(value, Procedural) and value.uv_map is not None
 
 
 def _by_identifier(sockets: Any, like: Any) -> Any:

@@ -80,14 +80,15 @@ class Procedural:
     Attributes
     ----------
     output
-    is_of_uv : bool
-        It depends on nothing but texture coordinates, with a period of 1: one texture serves all objects.
+    uv_map : str or None
+        It depends on nothing but this UV map (empty: the active one), with a period of 1: one texture serves all
+        objects. None: it depends on more.
     is_of_view : bool
         It depends on the direction of view or the kind of ray, which a texture does not.
     """
 
     output: Output
-    is_of_uv: bool = False
+    uv_map: str | None = None
     is_of_view: bool = False
 
 
