@@ -81,8 +81,8 @@ class Procedural:
     ----------
     output
     uv_map : str or None
-        It depends on nothing but this UV map (empty: the active one), with a period of 1: one texture serves all
-        objects. None: it depends on more.
+        It depends on nothing but this UV map (empty: the active one), with a period of 1: one texture serves
+        all objects. None: it depends on more.
     is_of_view : bool
         It depends on the direction of view or the kind of ray, which a texture does not.
     """
