@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,9 +25,13 @@ from enfilade.errors import SceneError, SettingsError
 from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings
 
 if TYPE_CHECKING:
+    from enfilade.monitor import Monitor
     from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.blender.notes import Note
-    from enfilade.scene.blender.source import Source
+    from enfilade.scene.blender.source import Choices, Source
+    from enfilade.settings import Settings
+
+LISTED = 5  # objects that differ most
 
 
 @click.command("import", short_help="Import a file of Blender, glTF, USD, FBX or OBJ as a scene.")
@@ -42,6 +46,20 @@ if TYPE_CHECKING:
 @click.option("--overwrite", "is_replaced", is_flag=True, help="Replace an imported scene that is there.")
 @click.option("--size", type=Size(), help="Width and height of the images, pixels.  [default: the file's]")
 @click.option("--frames", metavar="FIRST-LAST", help="Frames, both ends included.  [default: the file's]")
+@click.option(
+    "--check",
+    "is_checked",
+    is_flag=True,
+    help="Then render frames by Cycles and by Mitsuba, and write check.html, which compares their objects.",
+)
+@click.option("--check-frames", metavar="RANGES", help="Frames of the check.  [default: three]")
+@click.option(
+    "--check-spp",
+    type=click.IntRange(2),
+    default=64,
+    show_default=True,
+    help="Paths a pixel of the check, of each renderer.",
+)
 @settings_options(*IMPORT_FLAGS, "--allow")
 @json_option
 @quiet_option
@@ -58,6 +76,7 @@ def command(
     frames: str | None,
     as_json: bool,
     quiet: bool,
+    **checking: Any,
 ) -> None:
     """Import the file SOURCE, by Blender in a process of its own, as a scene folder for `enfilade render`.
 
@@ -81,12 +100,56 @@ def command(
             source, folder, choices, settings[LimitSettings], monitor,
             program=blender.program, is_strict=blender.strict,
         )  # fmt: skip
+        checked = _checked(imported, source, settings, choices, monitor, **checking)
     spent = Source.read(folder)
     if as_json:
-        click.echo(json.dumps(_table(imported, spent), indent=2))
+        found = _table(imported, spent) | ({"check": checked} if checked else {})
+        click.echo(json.dumps(found, indent=2))
         return
-    for line in (*_notes(imported.notes), *_ending(imported, spent)):
+    for line in (*_notes(imported.notes), *_ending(imported, spent), *_check_lines(checked)):
         click.echo(line)
+
+
+def _checked(
+    imported: ImportedScene,
+    source: Path,
+    settings: Settings,
+    choices: Choices,
+    monitor: Monitor,
+    *,
+    is_checked: bool,
+    check_frames: str | None,
+    check_spp: int,
+) -> dict[str, Any]:
+    """Render and compare frames, and write the page; returns its place and the differences, or nothing."""
+    if not is_checked:
+        if check_frames is not None:
+            raise SettingsError("--check-frames needs --check")
+        return {}
+    from enfilade.camera import parse_frames
+    from enfilade.device import activate
+    from enfilade.reports.fidelity import differences_of, write_check
+    from enfilade.runs.fidelity import check_import
+    from enfilade.scene.blender.find import find_blender
+
+    activate("auto")
+    numbers = None if check_frames is None else parse_frames(check_frames)
+    blender, limits = find_blender(settings[BlenderSettings].program), settings[LimitSettings]
+    made = check_import(imported, source, blender, choices, limits, monitor, numbers=numbers, spp=check_spp)
+    differences = differences_of(made)
+    page = write_check(imported, made, differences)
+    return {"page": str(page), "spp": made.spp, "differences": [asdict(of) for of in differences]}
+
+
+def _check_lines(checked: dict[str, Any]) -> Iterator[str]:
+    """The largest differences, and the page."""
+    if not checked:
+        return
+    for of in checked["differences"][: LISTED + 1]:
+        color, noise = of["color_percent"], of["noise_percent"]
+        more = f"contrast {of['contrast_percent']:+.1f} %, highlights {of['highlight_percent']:+.1f} %"
+        yield f"check   {of['name'][:32]:32} colour {color:5.1f} % (noise {noise:.1f}), {more}"
+    yield f"page    {checked['page']}"
 
 
 def _check_place(folder: Path, *, is_replaced: bool) -> None:

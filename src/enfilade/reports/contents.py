@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from enfilade import __version__
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
 from enfilade.reports.panels import quality_panel, run_panels, time_panel
@@ -71,7 +70,6 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         "columns": panels,
         "numbers": run.numbers,
         "data": json.dumps(_data(run, film, charted)).replace("<", "\\u003c"),
-        "version": __version__,
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     }
 

@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
@@ -23,12 +23,16 @@ from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import SCRIPT, Blender
 from enfilade.settings import LimitSettings
 
-__all__ = ["ERROR_FILE", "RESULT_FILE", "printable", "run_job"]
+__all__ = ["CYCLES_FILE", "ERROR_FILE", "RESULT_FILE", "printable", "run_job"]
 
-RESULT_FILE, ERROR_FILE = "import.json", "error.json"  # written last, in the job's folder `out`
+RESULT_FILE, CYCLES_FILE = (
+    "import.json",
+    "cycles.json",
+)  # of the tasks, written last in the job's folder `out`
+ERROR_FILE = "error.json"
 PROGRESS = re.compile(r"^progress: ([01](?:\.\d+)?)(?: (.*))?$")
 STEPS = 100  # of a progress bar
-STAGES = {"export": "import", "cycles": "Cycles"}  # names of the tasks in progress
+TASKS = {"export": ("import", RESULT_FILE), "cycles": ("Cycles", CYCLES_FILE)}  # name in progress, result
 ENDING_S = 20.0  # that a process has after its result: bpy may hang at its end
 LOOK_S = 0.25
 TAIL = 8  # lines of output in the message of a crash
@@ -59,6 +63,8 @@ def run_job(
         The script refused the file; or Blender crashed, or took too much memory or time.
     """
     out, about = Path(job["out"]), f"{job['source']} by Blender {blender.version}"
+    name, result = TASKS[job["task"]]
+    answers = (out / result, out / ERROR_FILE)
     with tempfile.TemporaryDirectory(prefix="enfilade-blender-") as home:
         job_file = Path(home) / "job.json"
         job_file.write_text(json.dumps(job), encoding="utf-8")
@@ -69,13 +75,13 @@ def run_job(
             start_new_session=True,
         ) as process:  # fmt: skip
             try:
-                last, is_late = _follow(process, out, limits.import_s, monitor, STAGES[job["task"]])
+                last, is_late = _follow(process, answers, limits.import_s, monitor, name)
             finally:
                 with suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)
-    if (out / ERROR_FILE).is_file():
-        raise SceneError(_refusal(out / ERROR_FILE, about))
-    if (out / RESULT_FILE).is_file():
+    if answers[1].is_file():
+        raise SceneError(_refusal(answers[1], about))
+    if answers[0].is_file():
         return
     if is_late:
         raise SceneError(
@@ -85,7 +91,7 @@ def run_job(
 
 
 def _follow(
-    process: subprocess.Popen[bytes], out: Path, seconds: float, monitor: Monitor, name: str
+    process: subprocess.Popen[bytes], answers: Sequence[Path], seconds: float, monitor: Monitor, name: str
 ) -> tuple[list[str], bool]:
     """Show progress until the process ends or must end; returns its last lines, and whether it is late."""
     lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
@@ -97,7 +103,7 @@ def _follow(
             line = lines.get(timeout=LOOK_S)
         except queue.Empty:
             line = ""
-        if not has_result and any((out / file).exists() for file in (RESULT_FILE, ERROR_FILE)):
+        if not has_result and any(file.exists() for file in answers):
             has_result, deadline = True, time.monotonic() + ENDING_S
         if line is None:
             with suppress(subprocess.TimeoutExpired):
