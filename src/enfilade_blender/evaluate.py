@@ -37,12 +37,14 @@ class _Engine(bpy.types.RenderEngine):  # type: ignore[misc]
     bl_use_preview = False
     visit: Callable[[Any], None] | None = None
     error: Exception | None = None
+    is_done = False
 
     def render(self, depsgraph: Any) -> None:
         """Visit the scene; Blender swallows errors of engines, so they are kept."""
         try:
             if _Engine.visit is not None:
                 _Engine.visit(depsgraph)
+                _Engine.is_done = True
         except (ExportError, MemoryError) as error:
             _Engine.error = error
 
@@ -58,7 +60,7 @@ def evaluate(selection: Selection, limits: Limits, notes: Notes) -> Evaluated:
     selection.scene.frame_set(selection.frames[0])
     result = Evaluated()
     _Engine.visit = lambda graph: _read(graph, result, limits, notes)
-    _Engine.error = None
+    _Engine.error, _Engine.is_done = None, False
     bpy.utils.register_class(_Engine)
     try:
         _render(selection)
@@ -66,6 +68,8 @@ def evaluate(selection: Selection, limits: Limits, notes: Notes) -> Evaluated:
         bpy.utils.unregister_class(_Engine)
     if _Engine.error is not None:
         raise _Engine.error
+    if not _Engine.is_done:
+        raise RuntimeError("the evaluated scene was not read; the error is printed above")
     return result
 
 
@@ -98,16 +102,13 @@ def _render(selection: Selection) -> None:
 
 
 def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
+    _check_generated(graph, limits)
     by_key: dict[Any, Placed | None] = {}
     for instance in graph.object_instances:
         obj = instance.object
         result.instances += 1
         if result.instances > limits.instances:
-            raise ExportError(
-                f"the scene has more than {limits.instances} instances",
-                instance.parent.name if instance.parent else obj.name,
-                "reduce its scattered objects, or raise the limit",
-            )
+            raise _too_many(limits, instance.parent.name if instance.parent else obj.name)
         if not instance.show_self:
             continue
         matrix = np.array(instance.matrix_world, np.float64)
@@ -131,6 +132,27 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
                 "lower its levels of subdivision or its number of instances, or raise the limit",
             )
     result.placed = [placed for placed in by_key.values() if placed is not None]
+
+
+def _check_generated(graph: Any, limits: Limits) -> None:
+    """Refuse too many instances of geometry nodes before Blender lists them, which takes 400 bytes each."""
+    total = 0
+    for obj in graph.objects:
+        if not hasattr(obj, "evaluated_geometry") or all(m.type != "NODES" for m in obj.modifiers):
+            continue
+        geometry = obj.evaluated_geometry()  # owns the points
+        points = geometry.instances_pointcloud()
+        total += len(points.points) if points is not None else 0
+        if total > limits.instances:
+            raise _too_many(limits, obj.name)
+
+
+def _too_many(limits: Limits, name: str) -> ExportError:
+    what, advice = (
+        f"the scene has more than {limits.instances} instances",
+        "reduce its scattered objects, or raise the limit",
+    )
+    return ExportError(what, name, advice)
 
 
 def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
