@@ -10,7 +10,7 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
-from enfilade_blender.lights import emitters, split_suns
+from enfilade_blender.lights import emitters, note_seen, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
@@ -46,6 +46,7 @@ def export(job: Job) -> dict[str, Any]:
     elements = shapes.write(evaluated.placed)
     report_progress(0.9, "lights")
     lamps, sun = split_suns(evaluated.lamps, notes)
+    note_seen(lamps, sun, views, selection.size, notes)
     identifiers = shapes.identifiers
     for lamp in lamps:
         elements += emitters(lamp, identifiers, notes)

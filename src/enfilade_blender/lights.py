@@ -14,7 +14,7 @@ import numpy as np
 
 from enfilade_blender.materials.mapping import spot_ramp
 from enfilade_blender.notes import Notes
-from enfilade_blender.records import Lamp
+from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Element, Identifiers, plugin
 
 Colour = tuple[float, float, float]
@@ -82,14 +82,27 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
             notes.add("approximated", lamp.name, "Angle", what, effect)
     direction = _axis(brightest.matrix)
     sun = Sun(brightest.name, direction, lamp_colour(brightest.data), float(brightest.data.angle))
-    notes.add(
-        "mapped",
-        brightest.name,
-        "Sun",
-        "a disc of the environment map",
-        "the disc is seen by the camera and in mirrors; in Cycles it is not seen by the camera",
-    )
     return [lamp for lamp in lamps if lamp is not brightest], sun
+
+
+def note_seen(
+    lamps: list[Lamp], sun: Sun | None, views: list[View], size: tuple[int, int], notes: Notes
+) -> None:
+    """Note lamps and a sun in the field of view of a frame: Cycles does not show them to the camera."""
+    what = "the lamp is seen where nothing hides it"
+    for lamp in lamps:
+        data, place = lamp.data, lamp.matrix[:3, 3]
+        has_shape = data.type == "AREA" or (data.type == "POINT" and data.shadow_soft_size > TINY)
+        lit = [v for v in views if data.type != "AREA" or (place - v.pose[:3, 3]) @ _axis(lamp.matrix) > 0.0]
+        if has_shape and any(_is_in(view, place, size) for view in lit):
+            notes.add("approximated", lamp.name, "Light", what, "a bright shape where Cycles shows none")
+    if sun is not None and any(_is_in(view, view.pose[:3, 3] + sun.direction, size) for view in views):
+        notes.add("approximated", sun.name, "Sun", what, "a bright disc in the sky where Cycles shows none")
+
+
+def _is_in(view: View, place: np.ndarray, size: tuple[int, int]) -> bool:
+    x, y, depth = view.pixels(place[None], size)[0]
+    return bool(depth > 0.0 and 0.0 <= x <= size[0] and 0.0 <= y <= size[1])
 
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:

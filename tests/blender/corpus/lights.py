@@ -85,7 +85,7 @@ def sun_sharp(folder):
 
 def sky(folder):
     _objects()
-    value = world((1, 1, 1), 0.15)
+    value = world((1, 1, 1), 0.02)
     texture = value.node_tree.nodes.new("ShaderNodeTexSky")
     texture.sky_type, texture.sun_elevation, texture.sun_rotation = "NISHITA", 0.6, 2.4
     value.node_tree.links.new(texture.outputs[0], value.node_tree.nodes["Background"].inputs[0])
