@@ -77,6 +77,24 @@ def test_two_commands_do_not_import_into_one_folder(shot, tables, tmp_path):
     assert imported(shot(), run, tables).folder == run / "scene"
 
 
+def test_before_the_run_begins_a_changed_file_is_imported_again(shot, tables, tmp_path):
+    run = tmp_path / "run"
+    assert imported(shot(), run, tables).fps == 24.0
+    source = shot(fps=25.0)
+    assert imported(source, run, tables).fps == 25.0
+    assert imported(source, run, tables).fps == 25.0
+    assert len(source.with_suffix(".calls").read_text().splitlines()) == 2
+    (run / "run.json").touch()
+    with pytest.raises(RunFolderError, match="has changed since it was imported"):
+        imported(shot(), run, tables)
+
+
+def test_wrong_files_leave_no_folder(tables, tmp_path):
+    with pytest.raises(SceneError, match="there is no file"):
+        imported(tmp_path / "gone.blend", tmp_path / "run", tables)
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_failed_import_does_not_spoil_the_folder(shot, tables, tmp_path):
     run = tmp_path / "run"
     with pytest.raises(SceneError):

@@ -80,7 +80,7 @@ def run_job(
                 with suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)
     if answers[1].is_file():
-        raise SceneError(_refusal(answers[1], about))
+        raise SceneError(_refusal(answers[1], about, str(job["source"])))
     if answers[0].is_file():
         return
     if is_late:
@@ -130,14 +130,18 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
-def _refusal(file: Path, about: str) -> str:
-    """The message of an error file."""
+def _refusal(file: Path, about: str, source: str) -> str:
+    """The message of an error file; a place that is the source is not named twice."""
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
         what, where, remedy = (printable(str(found[key])) for key in ("what", "where", "do"))
     except (OSError, ValueError, LookupError, TypeError) as error:
         return f"{about}: it failed, and {file.name} is damaged ({error})"
-    return f"{about}: {what}" + (f" ({where})" if where else "") + (f"; {remedy}" if remedy else "")
+    return (
+        f"{about}: {what}"
+        + (f" ({where})" if where not in ("", source) else "")
+        + (f"; {remedy}" if remedy else "")
+    )
 
 
 def _crash(about: str, code: int, megabytes: int, last: list[str]) -> str:
