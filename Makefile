@@ -5,6 +5,7 @@
 # make judge   set up ColorVideoVDP in .venv-judge, for the bench (two minutes, 1.7 GB)
 # make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
 # make blender set up, install Blender as the Python module bpy in .venv-blender (374 MB to load; two minutes)
+# make addon   write dist/enfilade-addon.zip, an extension of Blender 4.2 and newer
 # make check   set up, check formatting, lint, types and import rules
 # make setup   create .venv with the locked versions; installs system libraries by apt if they are missing
 # make lock    update requirements.lock from pyproject.toml
@@ -14,7 +15,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup judge blender python libraries browser demo test validate-metric bench case-studies check format lock clean
+.PHONY: help setup judge blender addon python libraries browser demo test validate-metric bench case-studies check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -51,6 +52,11 @@ judge:
 
 blender: setup
 	$(BIN)/enfilade doctor --install-blender
+
+addon: python
+	@mkdir -p dist
+	@cd blender_addon && "$$(sh ../setup/python.sh)" -m zipfile -c ../dist/enfilade-addon.zip blender_manifest.toml __init__.py command.py
+	@echo "dist/enfilade-addon.zip"
 
 case-studies: setup
 	$(BIN)/python -m studies.cases --preset $(or $(PRESET),full) $(CASES)
