@@ -36,9 +36,8 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
         image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder)
-        notes.add(
-            "baked", world.name, "World", f"an environment map of {image.shape[1]}x{image.shape[0]}", ""
-        )
+        what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
+        notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
     if sun is not None:
         image += sun_disc(sun, image.shape[1])
     write_exr(folder / FILE, image)

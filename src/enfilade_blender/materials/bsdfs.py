@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BSDFs of Mitsuba for Blender's lobes and its Principled BSDF."""
+"""BSDFs of Mitsuba for Blender's lobes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from enfilade_blender.materials.values import (
     Lobe,
     Normal,
     NormalMap,
-    Principled,
     Texture,
     Value,
 )
@@ -27,9 +26,18 @@ from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
 SMOOTH = 1e-3  # alpha below which a surface is a mirror
 ALPHA_MIN = 0.01
-SHEEN_IOR, SHEEN_ROUGHNESS = 1.5, Constant((0.7,))
+ROUGHEST_PLASTIC = 0.65  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 WHITE = (1.0, 1.0, 1.0)
-TRANSMITTING = {"dielectric", "roughdielectric", "thindielectric", "null", "mask", "twosided"}
+NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
+TRANSMITTING = {
+    "principledthin",
+    "dielectric",
+    "roughdielectric",
+    "thindielectric",
+    "null",
+    "mask",
+    "twosided",
+}
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -44,38 +52,59 @@ class Context:
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
     """BSDF of a closure with one lobe."""
-    builders = {"diffuse": _diffuse_lobe, "glossy": _glossy_lobe, "glass": _glass_lobe}
-    return _with_normal(builders[lobe.kind](lobe, context), lobe.normal, context)
+    builders = {
+        "diffuse": _diffuse_lobe,
+        "glossy": _glossy_lobe,
+        "glass": _glass_lobe,
+        "translucent": _translucent_lobe,
+    }
+    return with_normal(builders[lobe.kind](lobe, context), lobe.normal, context)
 
 
-def principled_bsdf(shader: Principled, context: Context) -> Element:
-    """BSDF of the Principled BSDF, without its emission and opacity."""
+def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) -> Element:
+    """Diffuse reflection below a dielectric interface.
 
-    def opaque() -> Element:
-        metallic = _input(shader, "Metallic", 0.0)
-        return _blend(metallic, lambda: _plastic(shader, context), lambda: _metal(shader, context), context)
-
-    transmission = _input(shader, "Transmission Weight", 0.0)
-    whole = _blend(transmission, opaque, lambda: _principled_glass(shader, context), context)
-    coat, coat_ior = _input(shader, "Coat Weight", 0.0), _number(shader, "Coat IOR", 1.5)
-    whole = layered(whole, coat, coat_ior, _input(shader, "Coat Roughness", 0.03), WHITE, context)
-    tint = context.textures.mean(_input(shader, "Sheen Tint", 1.0))
-    whole = layered(whole, _input(shader, "Sheen Weight", 0.0), SHEEN_IOR, SHEEN_ROUGHNESS, tint, context)
-    _note_principled(shader, context)
-    return _with_normal(whole, shader.normal, context)
-
-
-def plastic_bsdf(colour_value: Value, roughness: Value, ior: float, context: Context) -> Element:
-    """Diffuse reflection below a dielectric interface; one of textured roughness is a layer.
-
-    So is one of a colour attribute, whose mean `roughplastic` would ask for.
+    A textured roughness is a blend of two constant ones. A colour attribute is below a layer: `roughplastic`
+    would ask for its mean.
     """
     if ior < 1.01:
-        return plugin("bsdf", "diffuse", reflectance=context.textures.colour(colour_value))
-    if isinstance(roughness, Constant) and not isinstance(colour_value, AttributeValue):
-        return _plastic_of(colour_value, roughness.number, ior, context)
-    base = plugin("bsdf", "diffuse", reflectance=context.textures.colour(colour_value))
-    return layered(base, Constant((1.0,)), ior, roughness, WHITE, context)
+        return plugin("bsdf", "diffuse", reflectance=context.textures.colour(base))
+    if isinstance(base, AttributeValue):
+        diffuse = plugin("bsdf", "diffuse", reflectance=context.textures.colour(base))
+        return layered(diffuse, Constant((1.0,)), ior, roughness, WHITE, context)
+    if isinstance(roughness, Constant):
+        return _plastic_of(base, roughness.number, ior, context)
+    low, high, weight = _two_roughnesses(roughness, context)
+    return plugin(
+        "bsdf", "blendbsdf", *[_plastic_of(base, r, ior, context) for r in (low, high)], weight=weight
+    )
+
+
+def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
+    alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
+    if alpha < SMOOTH:
+        reflectance = context.textures.colour(base)
+        return plugin("bsdf", "plastic", int_ior=ior, ext_ior=1.0, diffuse_reflectance=reflectance)
+    alpha = max(alpha, ALPHA_MIN)
+    reflectance = context.textures.scaled(base, ggx.plastic_gain(round(alpha, 3), round(ior, 3)))
+    return plugin(
+        "bsdf", "roughplastic", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0,
+        diffuse_reflectance=reflectance,
+    )  # fmt: skip
+
+
+def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, Element | float]:
+    """Two roughnesses, and the share of the second; alpha is linear in between."""
+    if not isinstance(roughness, ImageValue | Texture):
+        return 0.5, 0.5, 0.5
+    if isinstance(roughness, ImageValue) and context.textures.is_missing(roughness):
+        return 0.5, 0.5, 0.5
+    pixels = context.textures.pixels(roughness).mean(axis=-1, keepdims=True)
+    low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
+    if high - low < 1e-2:
+        return low, high, 0.5
+    share = np.clip((pixels**2 - low**2) / (high**2 - low**2), 0.0, 1.0)
+    return low, high, context.textures.rewritten(roughness, share, "roughness")
 
 
 def two_sided(bsdf: Element) -> Element:
@@ -108,28 +137,29 @@ def _diffuse_lobe(lobe: Lobe, context: Context) -> Element:
     return plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour))
 
 
+def _translucent_lobe(lobe: Lobe, context: Context) -> Element:
+    """Diffuse transmission alone: the thin principled BSDF without an interface."""
+    colour_value = context.textures.colour(lobe.colour)
+    return plugin(
+        "bsdf", "principledthin", base_color=colour_value, diff_trans=2.0, eta=NO_INTERFACE, roughness=0.5
+    )
+
+
 def _glossy_lobe(lobe: Lobe, context: Context) -> Element:
-    return _conductor(lobe.colour, lobe.roughness, {}, context, edge=None)
+    return conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
 
 
 def _glass_lobe(lobe: Lobe, context: Context) -> Element:
     ior = (
         lobe.ior.number if isinstance(lobe.ior, Constant) else float(np.mean(context.textures.mean(lobe.ior)))
     )
-    return _glass(lobe.colour, lobe.colour, lobe.roughness, ior, context)
+    return glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
 
 
-def _principled_glass(shader: Principled, context: Context) -> Element:
-    base = _input(shader, "Base Color", 0.8)
-    tint: Value = base
-    if isinstance(base, Constant):  # twice through an interface is once through the colour
-        tint = Constant(tuple(max(c, 0.0) ** 0.5 for c in base.colour))
-    return _glass(
-        tint, Constant(WHITE), _input(shader, "Roughness", 0.5), _number(shader, "IOR", 1.45), context
-    )
-
-
-def _glass(transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context) -> Element:
+def glass_bsdf(
+    transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context
+) -> Element:
+    """Glass of two tints; of rough glass, energy that single scattering loses is restored."""
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
     alpha = _alpha(roughness, context)
     scale = 1.0 if not isinstance(alpha, float) else 1.0 / ggx.kept_energy(round(alpha, 3))
@@ -145,40 +175,7 @@ def _glass(transmitted: Value, reflected: Value, roughness: Value, ior: float, c
     )
 
 
-def _plastic(shader: Principled, context: Context) -> Element:
-    ior = mapping.interface_ior(_number(shader, "IOR", 1.45), _number(shader, "Specular IOR Level", 0.5))
-    base, roughness = _input(shader, "Base Color", 0.8), _input(shader, "Roughness", 0.5)
-    return plastic_bsdf(base, roughness, ior, context)
-
-
-def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
-    alpha = roughness * roughness
-    if alpha < SMOOTH:
-        reflectance = context.textures.colour(base)
-        return plugin("bsdf", "plastic", int_ior=ior, ext_ior=1.0, diffuse_reflectance=reflectance)
-    alpha = max(alpha, ALPHA_MIN)
-    gain = ggx.plastic_gain(round(alpha, 3), round(ior, 3))
-    reflectance = context.textures.scaled(base, gain)
-    return plugin(
-        "bsdf", "roughplastic", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0,
-        diffuse_reflectance=reflectance,
-    )  # fmt: skip
-
-
-def _metal(shader: Principled, context: Context) -> Element:
-    edge = context.textures.mean(_input(shader, "Specular Tint", 1.0))
-    anisotropy = _number(shader, "Anisotropic", 0.0)
-    extra: dict[str, Property] = {}
-    roughness = _input(shader, "Roughness", 0.5)
-    if anisotropy > 0.0 and isinstance(roughness, Constant):
-        aspect = (1.0 - 0.9 * anisotropy) ** 0.5
-        alpha = max(roughness.number**2, ALPHA_MIN)
-        extra = {"alpha_u": alpha / aspect, "alpha_v": alpha * aspect}
-    base = _input(shader, "Base Color", 0.8)
-    return _conductor(base, roughness, extra, context, edge=edge)
-
-
-def _conductor(
+def conductor_bsdf(
     reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
     *, edge: tuple[float, float, float] | None,
 ) -> Element:  # fmt: skip
@@ -245,7 +242,7 @@ def layered(
     return plugin("bsdf", "blendbsdf", base, layer, weight=context.textures.scaled_number(weight, mean))
 
 
-def _with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
+def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
     """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
     if normal is None or (isinstance(normal, NormalMap | Bump) and _is_void(normal, context)):
         return bsdf
@@ -292,7 +289,7 @@ def _normal_texture(normal: NormalMap, context: Context) -> Element:
     return element
 
 
-def _blend(
+def blend(
     weight: Value, first: Callable[[], Element], second: Callable[[], Element], context: Context
 ) -> Element:
     """Two BSDFs by a weight; a BSDF without any weight is not built."""
@@ -305,31 +302,3 @@ def _blend(
 
 def _unbounded(values: np.ndarray) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
-
-
-def _input(shader: Principled, name: str, default: float) -> Value:
-    return shader.inputs.get(name, Constant((default,)))
-
-
-def _number(shader: Principled, name: str, default: float) -> float:
-    value = _input(shader, name, default)
-    return value.number if isinstance(value, Constant) else default
-
-
-def _note_principled(shader: Principled, context: Context) -> None:
-    """Notes on inputs that are not, or not exactly, carried over."""
-    effects = {
-        "Sheen Weight": ("a rough dielectric layer", "brightness of edges differs a little"),
-        "Subsurface Weight": ("diffuse reflection", "light does not spread below the surface"),
-        "Thin Film Thickness": ("the thin film is left out", "there are no interference colours"),
-        "Diffuse Roughness": ("the roughness of diffuse reflection is left out", "the surface is Lambertian"),
-    }
-    for name, (what, effect) in effects.items():
-        if not is_zero(_input(shader, name, 0.0)):
-            context.notes.add("approximated", context.owner, f"{shader.name}: {name}", what, effect)
-    for name in ("IOR", "Specular IOR Level"):
-        if not isinstance(_input(shader, name, 0.5), Constant):
-            effect = "reflections have the same strength everywhere"
-            context.notes.add(
-                "approximated", context.owner, f"{shader.name}: {name}", "a texture is left out", effect
-            )

@@ -12,9 +12,9 @@ from enfilade_blender.materials.bsdfs import (
     layered,
     lobe_bsdf,
     plastic_bsdf,
-    principled_bsdf,
     two_sided,
 )
+from enfilade_blender.materials.principled import principled_bsdf
 from enfilade_blender.materials.values import (
     Add,
     Constant,

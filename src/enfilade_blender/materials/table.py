@@ -44,12 +44,7 @@ LOBES = {
         "the surface has reflections",
     ),
     "BSDF_TRANSPARENT": LobeKind("transparent", "`mask`"),
-    "BSDF_TRANSLUCENT": LobeKind(
-        "diffuse",
-        "`diffuse`",
-        "diffuse reflection in place of transmission",
-        "light from behind does not shine through",
-    ),
+    "BSDF_TRANSLUCENT": LobeKind("translucent", "`principledthin`"),
     "SUBSURFACE_SCATTERING": LobeKind(
         "diffuse", "`diffuse`", "diffuse reflection", "light does not spread below the surface"
     ),
@@ -81,13 +76,17 @@ PRINCIPLED = (
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
     ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
-    ("Roughness, textured", "mapped", "a dielectric layer over `diffuse` on plastics; `alpha` on metals"),
+    ("Roughness, textured", "mapped", "`blendbsdf` of two plastics; `alpha` on metals"),
     ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
     ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
     ("Alpha", "mapped", "`mask`"),
     ("Emission Color, Emission Strength", "mapped", "`area` emitter; open meshes shine on both sides"),
     ("Normal: Normal Map, Bump of images", "mapped", "`normalmap`, `bumpmap`"),
-    ("Coat", "mapped", "a dielectric layer: `blendbsdf` with a `roughconductor` of its index, k = 0"),
+    (
+        "Coat",
+        "mapped",
+        "`roughplastic` over rough plastics; else `blendbsdf` with a `roughconductor` of k = 0",
+    ),
     ("Sheen", "approximated", "a rough dielectric layer"),
     ("Anisotropic", "mapped", "`alpha_u`, `alpha_v` of metals along the UV map; its rotation is not carried"),
     ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),

@@ -147,7 +147,7 @@ class Lobe:
     Attributes
     ----------
     kind : str
-        "diffuse", "glossy", "glass", "refraction", "transparent", "translucent", "metal".
+        "diffuse", "glossy", "glass", "transparent" or "translucent".
     colour, roughness, ior
     normal
     name : str

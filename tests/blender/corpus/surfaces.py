@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from corpus.stage import image, node_of, plane, principled, shader, stage, three, tiles
+from corpus.stage import image, light, node_of, plane, principled, shader, stage, three, tiles
 
 
 def diffuse(folder):
@@ -294,6 +294,20 @@ def mixes(folder):
     three([plain, fresnel, glow])
 
 
+def translucent(folder):
+    stage()
+    half, tree, mix = shader("half", "ShaderNodeMixShader", Fac=0.5)
+    front = node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.6, 1))
+    through = node_of(tree, "ShaderNodeBsdfTranslucent", Color=(0.8, 0.3, 0.2, 1))
+    tree.links.new(front.outputs[0], mix.inputs[1])
+    tree.links.new(through.outputs[0], mix.inputs[2])
+    whole, _, _ = shader("curtain", "ShaderNodeBsdfTranslucent", Color=(0.3, 0.7, 0.4, 1))
+    light("POINT", "Bulb", (0.9, 1.2, 1.0), 60.0, shadow_soft_size=0.1)
+    for x, material in ((-1.0, half), (0.9, whole)):
+        curtain = plane("Curtain", (x, 0.0, 1.0), 1.6, material)
+        curtain.rotation_euler = (1.57, 0.0, 0.2)
+
+
 def vertex_colours(folder):
     stage()
     material = principled("painted", Roughness=0.8)
@@ -424,6 +438,7 @@ CASES = (
     roughness_image,
     metallic_image,
     mixes,
+    translucent,
     vertex_colours,
     mapped_images,
     procedural,
