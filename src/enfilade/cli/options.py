@@ -90,27 +90,35 @@ def decorated(*decorators: Callable[[Command], Command]) -> Callable[[Command], 
 
 
 _file = click.Path(path_type=Path)
-path_options = decorated(
-    click.argument("scene", type=_file),
-    click.option(
-        "--path",
-        "path_file",
-        type=_file,
-        help="The camera path: nerfstudio's camera_path.json, or keyed poses.  [default: that of a file that "
-        "Blender imports]",
-    ),
-    click.option(
-        "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
-    ),
-    click.option(
-        "--frames",
-        metavar="RANGES",
-        help="Frames, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
-    ),
-    click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
-)
+
+
+def _path_options(*, is_required: bool) -> Callable[[Command], Command]:
+    """Scene and camera path; a file that Blender imports has a path of its own."""
+    own = "" if is_required else "  [default: that of a file that Blender imports]"
+    return decorated(
+        click.argument("scene", type=_file),
+        click.option(
+            "--path",
+            "path_file",
+            type=_file,
+            required=is_required,
+            help=f"The camera path: nerfstudio's camera_path.json, or keyed poses.{own}",
+        ),
+        click.option(
+            "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
+        ),
+        click.option(
+            "--frames",
+            metavar="RANGES",
+            help="Frames, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
+        ),
+        click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
+    )
+
+
+path_options = _path_options(is_required=True)
 job_options = decorated(
-    path_options,
+    _path_options(is_required=False),
     click.option(
         "--method",
         default="decoupled",
