@@ -4,6 +4,8 @@
 # make bench   set up, compare enfilade's methods with baselines on the generated scenes (BENCH=--quick: ten minutes)
 # make judge   set up ColorVideoVDP in .venv-judge, for the bench (two minutes, 1.7 GB)
 # make case-studies   set up, reproduce the paper's experiments, write studies/cases/README.md (PRESET=small: ten minutes)
+# make blender set up, install Blender as the Python module bpy in .venv-blender (374 MB to load; two minutes)
+# make addon   write dist/enfilade-addon.zip, an extension of Blender 4.2 and newer
 # make check   set up, check formatting, lint, types and import rules
 # make setup   create .venv with the locked versions; installs system libraries by apt if they are missing
 # make lock    update requirements.lock from pyproject.toml
@@ -13,7 +15,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 DEMO ?= runs/demo
 .DEFAULT_GOAL := help
-.PHONY: help setup judge python libraries browser demo test validate-metric bench case-studies check format lock clean
+.PHONY: help setup judge blender addon python libraries browser demo test validate-metric bench case-studies check format lock clean
 
 help:
 	@sed -n 's/^# //p' Makefile
@@ -48,6 +50,14 @@ bench: setup
 judge:
 	@test -e .venv-judge/.ready || sh studies/bench/colorvideovdp/setup.sh .venv-judge
 
+blender: setup
+	$(BIN)/enfilade doctor --install-blender
+
+addon: python
+	@mkdir -p dist
+	@cd blender_addon && "$$(sh ../setup/python.sh)" -m zipfile -c ../dist/enfilade-addon.zip blender_manifest.toml __init__.py command.py
+	@echo "dist/enfilade-addon.zip"
+
 case-studies: setup
 	$(BIN)/python -m studies.cases --preset $(or $(PRESET),full) $(CASES)
 
@@ -65,5 +75,5 @@ lock: setup
 	@sh setup/lock.sh $(VENV)
 
 clean:
-	rm -rf $(VENV) .venv-judge build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
+	rm -rf $(VENV) .venv-judge .venv-blender build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache tests/failed
 	find src tests studies -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -8,13 +8,10 @@ import sys
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from types import SimpleNamespace
 
 import click
-import numpy as np
 import pytest
 
-from enfilade.camera import load_path
 from enfilade.cli import main
 from enfilade.settings import SECTIONS
 from studies.__main__ import main as studies
@@ -150,61 +147,3 @@ def test_examples_run(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert len(list((tmp_path / "runs").glob("*/video.mp4"))) == 5
     assert "mean-error" in done.stdout
-
-
-class Matrix(np.ndarray):
-    """As much of Blender's as the script asks for."""
-
-    @staticmethod
-    def of(rows):
-        return np.array(rows, np.float64).view(Matrix)
-
-    @staticmethod
-    def Translation(place):  # noqa: N802  (its name there)
-        made = Matrix.of(np.eye(4))
-        made[:3, 3] = place
-        return made
-
-    def decompose(self):
-        return self[:3, 3], self[:3, :3], None
-
-    def to_matrix(self):
-        return self
-
-    def to_4x4(self):
-        made = Matrix.of(np.eye(4))
-        made[:3, :3] = self
-        return made
-
-
-def test_the_script_for_blender_writes_a_camera_path(tmp_path, monkeypatch):
-    # A level camera that walks along Blender's +y: in the turned world along -z, as it looks.
-    camera = SimpleNamespace(calc_matrix_camera=lambda _, x, y: Matrix.of(np.diag([2.0 * y / x, 2.0, -1, 0])))
-
-    def frame_set(number):
-        camera.matrix_world = Matrix.of([[1, 0, 0, 2], [0, 0, -1, number], [0, 1, 0, 1.6], [0, 0, 0, 1]])
-
-    size = {"resolution_x": 1282, "resolution_y": 963, "resolution_percentage": 50}
-    render = SimpleNamespace(**size, fps=30, fps_base=1.001)
-    scene = SimpleNamespace(render=render, camera=camera, frame_start=5, frame_end=8, frame_set=frame_set)
-    for name, members in {
-        "bpy": {
-            "context": SimpleNamespace(scene=scene, evaluated_depsgraph_get=lambda: None),
-            "path": SimpleNamespace(abspath=lambda name: name.replace("//", f"{tmp_path}/")),
-        },
-        "mathutils": {"Matrix": Matrix},
-        "bpy_extras": {},
-        "bpy_extras.io_utils": {  # what Blender 4.2 says of -Z and Y
-            "axis_conversion": lambda **_: Matrix.of([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
-        },
-    }.items():
-        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**members))
-    script = re.search(r"```python\n(import json.*?)```", (ROOT / "docs/formats.md").read_text(), re.DOTALL)
-    exec(script[1], {})  # noqa: S102
-    path = load_path(tmp_path / "camera_path.json")
-    assert (path.width, path.height, path.numbers) == (640, 480, (1, 2, 3, 4))
-    assert path.fps == pytest.approx(29.97, abs=1e-3)
-    for number, seen in enumerate(path.cameras, 5):
-        assert np.allclose(seen.eye, (2, 1.6, -number))
-        assert np.allclose(seen.world_from_camera[:3, :3], np.eye(3))
-        assert seen.fov_deg == pytest.approx(2 * np.degrees(np.arctan(0.5)))

@@ -16,7 +16,7 @@ import pytest
 
 from enfilade import files
 from enfilade.errors import NoSpaceError, RunFolderError
-from enfilade.files import json_bytes, read_json, sweep, unwritable, whole_file, write_json
+from enfilade.files import json_bytes, read_json, sweep, unwritable, whole_file, whole_folder, write_json
 from enfilade.images import write_exr
 
 ROOM = 20_000  # bytes
@@ -150,3 +150,27 @@ def test_only_folders_need_not_be_flushed_where_the_file_system_can_not(tmp_path
     with pytest.raises(RunFolderError, match=os.strerror(number)):
         write_json(tmp_path / "other.json", {})
     assert not Path(tmp_path / "other.json").exists()
+
+
+def test_a_folder_appears_whole_or_not_at_all(tmp_path):
+    out = tmp_path / "parts" / "scene"
+    with whole_folder(out) as beside:
+        (beside / "meshes").mkdir()
+        (beside / "meshes" / "a.ply").touch()
+        assert not out.exists()
+    assert (out / "meshes" / "a.ply").exists()
+    with pytest.raises(ZeroDivisionError), whole_folder(out) as beside:
+        (beside / f"{1 // 0}").touch()
+    assert [entry.name for entry in out.iterdir()] == ["meshes"]
+    with whole_folder(out):
+        pass
+    assert list(out.iterdir()) == []
+    assert [entry.name for entry in out.parent.iterdir()] == ["scene"]
+
+
+def test_folders_of_killed_processes_are_swept(tmp_path):
+    left = tmp_path / f".scene.writing-{socket.gethostname()}-4194400-00000000"
+    (left / "meshes").mkdir(parents=True)
+    (left / "meshes" / "a.ply").touch()
+    assert sweep(tmp_path) == [left]
+    assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from enfilade.api import compare, plan, render, report
+    from enfilade.api import compare, import_scene, plan, render, report
     from enfilade.camera import Camera, CameraPath, load_path
     from enfilade.methods.base import Method
     from enfilade.scene.opener import Scene
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _PLACES = {
     "render": "enfilade.api",
     "plan": "enfilade.api",
+    "import_scene": "enfilade.api",
     "compare": "enfilade.api",
     "report": "enfilade.api",
     "Camera": "enfilade.camera",
@@ -43,6 +44,7 @@ __all__ = [
     "Section",
     "Settings",
     "compare",
+    "import_scene",
     "load_path",
     "option",
     "plan",

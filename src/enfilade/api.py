@@ -1,7 +1,8 @@
-"""The public functions: render, plan, compare, report."""
+"""The public functions: render, plan, import_scene, compare, report."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from enfilade.methods.base import Method
     from enfilade.runs.job import Job
     from enfilade.runs.plan import Plan
+    from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.opener import Scene
     from enfilade.settings import Settings
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
 def render(
     scene: File | Scene,
-    path: File | CameraPath,
+    path: File | CameraPath | None,
     out: File,
     *,
     method: str | Method | type[Method] = "decoupled",
@@ -39,16 +41,18 @@ def render(
     Parameters
     ----------
     scene
-        A Mitsuba 3 scene in XML, or a :class:`Scene`.
+        A Mitsuba 3 scene in XML, a :class:`Scene`, or a .blend, glTF, USD, FBX or OBJ file, which Blender
+        imports into the run folder.
     path
-        A camera path file (see docs/formats.md), or a :class:`CameraPath`.
+        A camera path file (see docs/formats.md), or a :class:`CameraPath`; None: that of the imported file.
     out
         The run folder. With the same arguments the call continues where it stopped.
     method
         ``decoupled``, ``paper``, ``reference``, or a method of your own, whose class worker processes can
         import.
     settings
-        A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``.
+        A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``. Exposure and view of an
+        imported file stand below tables; a :class:`Settings` replaces them.
     device
         ``cpu``, ``gpu``, or ``auto``: the GPU where there is one.
     executor
@@ -79,13 +83,14 @@ def render(
     from enfilade.runs.executor import Workers
     from enfilade.runs.render import render as render_job
 
-    job = _job(scene, path, method, settings)
-    return render_job(job, Path(out), monitor or Silence(), Workers(executor, workers))
+    monitor = monitor or Silence()
+    job = _job(scene, path, method, settings, Path(out), monitor)
+    return render_job(job, Path(out), monitor, Workers(executor, workers))
 
 
 def plan(
     scene: File | Scene,
-    path: File | CameraPath,
+    path: File | CameraPath | None,
     *,
     method: str | Method | type[Method] = "decoupled",
     settings: Settings | Tables | None = None,
@@ -108,7 +113,64 @@ def plan(
     activate(device)
     from enfilade.runs.plan import plan as plan_job
 
-    return plan_job(_job(scene, path, method, settings), monitor or Silence())
+    monitor = monitor or Silence()
+    with tempfile.TemporaryDirectory(prefix="enfilade-plan-") as run:
+        return plan_job(_job(scene, path, method, settings, Path(run), monitor), monitor)
+
+
+def import_scene(
+    source: File,
+    out: File,
+    *,
+    settings: Tables | None = None,
+    size: tuple[int, int] | None = None,
+    frames: tuple[int, int] | None = None,
+    monitor: Monitor | None = None,
+) -> ImportedScene:
+    """Import a file by Blender, in a process of its own, as a scene folder for :func:`render`.
+
+    Parameters
+    ----------
+    source
+        A .blend, glTF, USD, FBX or OBJ file. Scripts in it are not run.
+    out
+        The scene folder. An existing one is replaced.
+    settings
+        Tables of the sections ``blender`` and ``limits``, such as ``{"blender": {"camera": "Walk"}}``.
+    size
+        Width and height of the images, pixels; None: the file's own.
+    frames
+        First and last; None: the file's own.
+    monitor
+
+    Returns
+    -------
+    ImportedScene
+        Its folder, and what was mapped, baked, approximated and not carried over.
+
+    Raises
+    ------
+    SceneError
+        There is no Blender; the file is missing, damaged or too large; or part of it is not carried over, and
+        ``[blender] strict`` is set.
+    RunFolderError, NoSpaceError
+        The folder can't be written.
+    """
+    from enfilade.runs.source import choices_of
+    from enfilade.scene.blender.importer import import_file
+    from enfilade.settings import BlenderSettings, LimitSettings, Settings
+
+    chosen = Settings.from_tables(settings or {}, (BlenderSettings, LimitSettings))
+    blender = chosen[BlenderSettings]
+    return import_file(
+        Path(source),
+        Path(out),
+        choices_of(blender, size, frames),
+        chosen[LimitSettings],
+        monitor or Silence(),
+        program=blender.program,
+        is_strict=blender.strict,
+    )
 
 
 def compare(
@@ -185,23 +247,35 @@ def report(
 
 def _job(
     scene: File | Scene,
-    path: File | CameraPath,
+    path: File | CameraPath | None,
     method: str | Method | type[Method],
     settings: Settings | Tables | None,
+    run: Path,
+    monitor: Monitor,
 ) -> Job:
     from enfilade.camera import CameraPath, load_path
+    from enfilade.errors import CameraPathError
     from enfilade.methods.opener import name_of, open_method
     from enfilade.runs.job import Job
+    from enfilade.runs.source import imported_into
+    from enfilade.scene.blender.source import is_importable
     from enfilade.scene.opener import Scene
-    from enfilade.settings import SECTIONS, Settings
+    from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Settings
 
     name = name_of(method)
-    if not isinstance(settings, Settings):
-        kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
-        settings = Settings.from_tables(settings or {}, kinds)
+    kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
+    chosen = settings if isinstance(settings, Settings) else Settings.from_tables(settings or {}, kinds)
+    if not isinstance(scene, Scene) and is_importable(Path(scene)):
+        blender, limits = chosen[BlenderSettings], chosen[LimitSettings]
+        imported = imported_into(run, Path(scene), blender, limits, monitor)
+        scene, path = imported.scene_file, path or imported.checked_path()
+        if not isinstance(settings, Settings):
+            chosen = Settings.from_tables(imported.tables_under(settings or {}), kinds)
+    if path is None:
+        raise CameraPathError(f"{scene} needs a camera path: path is None")
     return Job(
         scene=scene if isinstance(scene, Scene) else Scene(Path(scene)),
         path=path if isinstance(path, CameraPath) else load_path(Path(path)),
-        settings=settings,
+        settings=chosen,
         method=name,
     )

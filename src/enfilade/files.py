@@ -11,6 +11,7 @@ import json
 import os
 import re
 import secrets
+import shutil
 import socket
 import stat
 import time
@@ -23,7 +24,7 @@ from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 
 __all__ = [
     "MARK", "flush", "is_full", "is_passing", "json_bytes", "read_json", "sweep", "unwritable", "whole_file",
-    "write_json",
+    "whole_folder", "write_json",
 ]  # fmt: skip
 
 MARK = ".writing-"  # in the name of every temporary file
@@ -56,8 +57,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     RunFolderError, NoSpaceError
         The folder or the file can't be written, or the disk is full. No temporary file is left.
     """
-    writer = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
-    temporary = file.with_name(f".{file.stem}{MARK}{writer}{file.suffix}")
+    temporary = _beside(file)
     try:
         if not file.parent.is_dir():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -73,8 +73,50 @@ def whole_file(file: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Write a folder under a temporary name, and rename it when the block ends without an error.
+
+    Parameters
+    ----------
+    folder
+        The final name. An existing folder is replaced.
+
+    Yields
+    ------
+    Path
+        An empty folder beside the final one.
+
+    Raises
+    ------
+    RunFolderError, NoSpaceError
+        A folder or a file can't be written, or the disk is full. No temporary folder is left.
+    """
+    temporary, old = _beside(folder), _beside(folder)
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
+        for place in (*temporary.rglob("*"), temporary):
+            flush(place)
+        if folder.exists():
+            folder.rename(old)
+        temporary.rename(folder)
+        flush(folder.parent)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    finally:
+        for place in (temporary, old):
+            shutil.rmtree(place, ignore_errors=True)
+
+
+def _beside(final: Path) -> Path:
+    """A temporary name of this process, in the same folder and with the same suffix."""
+    writer = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
+    return final.with_name(f".{final.stem}{MARK}{writer}{final.suffix}")
+
+
 def sweep(folder: Path) -> list[Path]:
-    """Remove abandoned temporary files in a folder and those in it; returns them, sorted.
+    """Remove abandoned temporary files and folders in a folder and those in it; returns them, sorted.
 
     A file is abandoned if its process on this host has ended, or if nothing was written to it for a day.
     """
@@ -82,14 +124,14 @@ def sweep(folder: Path) -> list[Path]:
     for file in sorted(folder.rglob(f".*{MARK}*")):
         with suppress(FileNotFoundError):  # its writer has just renamed it
             if _is_abandoned(file):
-                file.unlink()
+                shutil.rmtree(file) if file.is_dir() else file.unlink()
                 removed.append(file)
     return removed
 
 
 def _is_abandoned(file: Path) -> bool:
     status = file.lstat()
-    if not stat.S_ISREG(status.st_mode):
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         return False
     writer = WRITER.search(file.name)
     if writer and writer["host"] == socket.gethostname() and not Path("/proc", writer["pid"]).exists():

@@ -13,7 +13,8 @@ from typing import Any
 
 from enfilade import __version__
 from enfilade.device import INSTALL_LLVM, LLVM_MINIMUM, NO_GPU, Choice, activate, load, why_no_gpu
-from enfilade.errors import DeviceError
+from enfilade.errors import DeviceError, SceneError
+from enfilade.scene.blender.find import SCRIPT, find_blender
 
 _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)(.*?)(?:;.*extra\s*==\s*['\"]([^'\"]+)['\"].*)?$")
 
@@ -67,7 +68,7 @@ def examine(choice: Choice = "auto") -> list[Check]:
         checks += _devices(choice)
     if all(c.is_ok for c in checks if c.name == "av"):
         checks += _codecs()
-    return checks
+    return [*checks, _blender()]
 
 
 def _packages() -> Iterator[Check]:
@@ -134,6 +135,18 @@ def _codecs() -> Iterator[Check]:
         is_there = codec.encoder in codecs_available
         remedy = "" if is_there else "pip install --force-reinstall --only-binary :all: av"
         yield Check(f"codec {name}", codec.encoder if is_there else "", name == "h264", remedy)
+
+
+def _blender() -> Check:
+    """Blender, which only files of its own and of other formats need."""
+    try:
+        found = find_blender()
+    except SceneError as error:
+        return Check("Blender", "", False, str(error))
+    form = "module bpy, " if found.is_module else ""
+    told = "; ".join(filter(None, (f"{found.version}, {form}{found.program}", found.note)))
+    missing = "" if SCRIPT.is_file() else f"its scripts are missing ({SCRIPT}): pip install . once more"
+    return Check("Blender", told, False, missing)
 
 
 def _library_file(stem: str) -> str:

@@ -310,6 +310,7 @@ class VideoSettings(Section):
     quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
     ocio: str = option("", "An OpenColorIO configuration for the view, in place of sRGB.", is_path=True)
     view: str = option("", "The view of that configuration.")
+    look: str = option("", "A look of that configuration, applied before the view.")
     display: str = option("", "Its display, one for sRGB, Rec.1886 or Rec.709; none: the first of these.")
 
 
@@ -365,12 +366,35 @@ class LimitSettings(Section):
         least=512, most=10_000_000,
     )  # fmt: skip
     preflight_s: float = option(600.0, "Its time limit, seconds.", least=0.1, most=86_400.0)
+    import_mb: int = option(
+        16_384, "Memory of the process in which Blender imports a file, MB.", least=512, most=10_000_000
+    )
+    import_s: float = option(1800.0, "Its time limit, seconds.", least=0.1, most=604_800.0)
+    import_instances: int = option(1_000_000, "Most instances of an imported file.", least=1)
+    import_triangles: int = option(50_000_000, "Most triangles of an imported file.", least=1)
+
+
+@dataclass(frozen=True)
+class BlenderSettings(Section):
+    """Import of .blend, glTF, USD, FBX and OBJ files by Blender."""
+
+    table = "blender"
+
+    program: str = option(
+        "", "Blender, or a Python with the module bpy, in place of the one that is found.", is_path=True
+    )
+    scene: str = option("", "Name of the scene of the file; none: the active one.")
+    view_layer: str = option("", "Name of the view layer; none: the first that is rendered.")
+    camera: str = option("", "Name of the camera; none: the scene's, with its markers.")
+    bake_px: int = option(1024, "Largest side of a baked texture, pixels.", least=16, most=8192)
+    bake_samples: int = option(16, "Samples of a baked pixel.", least=1, most=4096)
+    strict: bool = option(False, "Refuse files of which something is not carried over.")
 
 
 SECTIONS: tuple[type[Section], ...] = (
     TraceSettings, SamplingSettings, ReferenceSettings, ViewingSettings, KeyframeSettings, WarpSettings,
     MetricSettings, MaskSettings, AntialiasSettings, DecoupledSettings, VideoSettings, OutputSettings,
-    LimitSettings,
+    LimitSettings, BlenderSettings,
 )  # fmt: skip
 
 

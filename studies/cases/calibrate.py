@@ -9,7 +9,14 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.options import check_png, job_of, output_options, path_options, settings_options
+from enfilade.cli.jobs import job_of
+from enfilade.cli.options import (
+    check_png,
+    choose_device,
+    output_options,
+    path_options,
+    settings_options,
+)
 
 
 @click.group("calibrate", short_help="Calibrate scene-dependent settings by the metric.")
@@ -75,7 +82,8 @@ def threshold(
     check_png("--plot", plot)
     if folder is not None:
         mark_resumable(ctx)
-    job = job_of(ctx, method="paper", **inputs)
+    choose_device(inputs.pop("device"))
+    job = job_of(ctx, run=None, quiet=quiet, method="paper", **inputs)
     from enfilade.cli.progress import watch
     from studies.cases.threshold import calibrate_job
 

@@ -42,6 +42,26 @@ def test_cuts_are_detected(write):
     assert load_path(write(document(POSES[:1]))).cuts == frozenset()
 
 
+def test_marked_cuts_replace_detection(write):
+    eyes = np.array([(0.1 * i + 40 * (i >= 12), 1, 5) for i in range(20)])
+    poses = look_at(eyes, eyes - (0, 0, 1))
+    assert load_path(write(document(poses, cuts=[3, 9]))).cuts == {2, 8}
+    assert load_path(write(document(poses, cuts=[]))).cuts == frozenset()
+    for wrong in (3, [1], [21], [2.5], ["2"]):
+        with pytest.raises(CameraPathError, match=r"walk.json: cuts is"):
+            load_path(write(document(poses, cuts=wrong)))
+
+
+def test_frames_are_numbered_from_the_first_one(write):
+    file = write(document(first_frame=101, cuts=[4]))
+    assert load_path(file).numbers == (101, 102, 103, 104, 105)
+    chosen = load_path(file, frames=(102, 103, 105))
+    assert (chosen.numbers, chosen.cuts) == ((102, 103, 105), {2})
+    np.testing.assert_array_equal(chosen.cameras[2].world_from_camera, POSES[4])
+    with pytest.raises(CameraPathError, match="frame 1 is not on the path; it has 101-105"):
+        load_path(file, frames=(1,))
+
+
 @pytest.mark.parametrize("value", [0, 0.009, 10_001, True, "24", [24], float("nan"), float("inf"), 10**400])
 def test_malformed_numbers(write, value):
     with pytest.raises(CameraPathError, match=r"walk.json: fps is .*; expected a number from 0.01 to 10000"):

@@ -1,9 +1,11 @@
 import json
+import os
 
 import pytest
 from click.testing import CliRunner
 
 from enfilade.cli import main
+from support.fake_blender import write_program
 
 SCENE = """<scene version="3.0.0">
   <integrator type="path"/>
@@ -39,6 +41,16 @@ def scene(tmp_path):
     file = tmp_path / "scene.xml"
     file.write_text(SCENE)
     return file
+
+
+@pytest.fixture
+def blender_path(tmp_path, monkeypatch):
+    """A program on PATH that stands for Blender, and does what its file says."""
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    write_program(folder / "blender")
+    monkeypatch.setenv("PATH", str(folder), prepend=os.pathsep)
+    return folder
 
 
 @pytest.fixture

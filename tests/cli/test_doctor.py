@@ -63,3 +63,21 @@ def test_every_check_has_a_name_and_a_finding_or_a_remedy(device):
     for check in examine(device):
         assert check.name
         assert check.found or check.remedy
+
+
+def test_blender_is_optional(run, monkeypatch, tmp_path, blender_path):
+    checks = {check.name: check for check in examine()}
+    assert checks["Blender"].found == f"4.5.1, {blender_path}/blender"
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setattr("enfilade.scene.blender.find.environment_folder", lambda: tmp_path / "none")
+    check = next(check for check in examine() if check.name == "Blender")
+    assert (check.found, check.is_required) == ("", False)
+    assert "--install-blender" in check.remedy
+
+
+def test_blender_is_installed_first(run, monkeypatch):
+    steps = []
+    monkeypatch.setattr("enfilade.scene.blender.install.install", lambda _: steps.append("install"))
+    monkeypatch.setattr(installation, "examine", lambda _: steps.append("examine") or [])
+    assert run("doctor", "--install-blender").exit_code == 0
+    assert steps == ["install", "examine"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from enfilade.errors import SettingsError
-from enfilade.images.view import open_view, view_identity
+from enfilade.images.view import files_of_view, open_view, view_identity
 from enfilade.settings import VideoSettings
 
 CONFIG = """ocio_profile_version: 2
@@ -85,6 +85,30 @@ def test_a_configuration_that_lacks_something(tmp_path):
         open_view(VideoSettings(ocio=config(tmp_path, "P3 HDR")), 0.0)
     with pytest.raises(SettingsError, match=r"OpenColorIO can't use|no colour space"):
         open_view(VideoSettings(ocio=config(tmp_path, linear="acescg")), 0.0)
+
+
+LOOK = """looks:
+  - !<Look> {name: Dark, process_space: raw, transform: !<MatrixTransform> {offset: [-0.1, -0.1, -0.1, 0]}}
+  - !<Look> {name: Mapped, process_space: raw, transform: !<FileTransform> {src: half.spi1d}}
+colorspaces"""
+HALF = "Version 1\nFrom 0.0 1.0\nLength 2\nComponents 1\n{\n0.0\n0.5\n}\n"
+
+
+def test_a_look_comes_before_the_view(tmp_path):
+    pytest.importorskip("PyOpenColorIO")
+    file = Path(config(tmp_path))
+    file.write_text(file.read_text().replace("colorspaces", LOOK))
+    (tmp_path / "half.spi1d").write_text(HALF)
+    linear = np.full((1, 1, 3), 0.5, np.float32)
+    dark = VideoSettings(ocio=str(file), view="Raw", look="Dark")
+    np.testing.assert_allclose(open_view(dark, 0.0).encode(linear), linear - 0.1, atol=1e-6)
+    assert view_identity(dark) != view_identity(VideoSettings(ocio=str(file), view="Raw"))
+    assert files_of_view(dark) == [file]
+    mapped = VideoSettings(ocio=str(file), view="Raw", look="Mapped")
+    np.testing.assert_allclose(open_view(mapped, 0.0).encode(linear), linear / 2, atol=1e-3)
+    assert files_of_view(mapped) == [file, tmp_path / "half.spi1d"]
+    with pytest.raises(SettingsError, match="no look 'Punchy'; it has: Dark, Mapped"):
+        open_view(VideoSettings(ocio=str(file), look="Punchy"), 0.0)
 
 
 def test_opencolorio_that_is_not_installed(tmp_path, monkeypatch):

@@ -27,6 +27,7 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.lock import Lock
 from enfilade.runs.statistics import statistics
 from enfilade.settings import VideoSettings
+from support.fake_blender import NOTE, RESULT
 from support.synthetic_runs import synthetic_run
 
 
@@ -41,6 +42,27 @@ def written(folder, tmp_path, **terms):
     notes = Notes()
     text = write_report(folder, out=tmp_path / "report.html", monitor=notes, **terms).read_text()
     return notes, text, data_of(text)
+
+
+def test_what_blender_did_not_carry_over_is_listed(copied, tmp_path):
+    """The importer's notes lie beside the scene that the job names."""
+    scene = tmp_path / "scene"
+    scene.mkdir()
+    job = json.loads((copied / "job.json").read_text())
+    (copied / "job.json").write_text(json.dumps({**job, "scene": {"file": str(scene / "scene.xml")}}))
+    assert "Imported from" not in written(copied, tmp_path)[1]
+    lost = [{"kind": "not-carried", **NOTE, "object": f"<b>{name}</b>"} for name in ("Sofa", "Chair")]
+    table = {**RESULT, "source": "shot.blend", "notes": [*lost, {"kind": "mapped", **NOTE}]}
+    (scene / "import.json").write_text(json.dumps(table))
+    text = written(copied, tmp_path)[1]
+    section = re.search(r'aria-labelledby="import-heading">(.*?)</section>', text, re.DOTALL)[1]
+    assert "Imported from shot.blend" in section
+    assert re.findall("<h3>(.*?)</h3>", section) == ["Not carried over"]
+    assert "&lt;b&gt;Sofa&lt;/b&gt; / Noise Texture, &lt;b&gt;Chair&lt;/b&gt; / Noise Texture" in section
+    (scene / "import.json").write_text("{")
+    notes, text, _ = written(copied, tmp_path)
+    assert "import.json is damaged" in notes[0]
+    assert "Imported from" not in text
 
 
 def data_of(text):

@@ -51,7 +51,7 @@ def test_a_renderer_that_does_not_exist(scene, name):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("room.blend", "mitsuba-blender add-on .*docs/formats.md"),
+        ("room.blend", "import it by `enfilade import`"),
         ("walk.json", "a camera path is given by --path"),
         ("room", r"is not a scene in Mitsuba's XML format \(\.xml\)$"),
     ],

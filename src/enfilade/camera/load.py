@@ -30,8 +30,9 @@ def load_path(
     size
         Width and height of the images, pixels; the file's own by default.
     frames
-        Numbers of the selected frames, rising; the first camera of the file is frame 1. A selection is a path
-        of its own: in ``1,3,5`` the frame after 1 is 3, and motion vectors lead from one to the other.
+        Numbers of the selected frames, rising; the first camera is frame 1, or what the file says. A
+        selection is a path of its own: in ``1,3,5`` the frame after 1 is 3, and motion vectors lead from one
+        to the other.
     fps
         Frames per second in place of the file's, from 0.01 to 10000. Keyed poses are sampled at this rate; a
         nerfstudio path keeps its frames and plays faster or slower.
@@ -83,10 +84,11 @@ def _image_size(document: JsonObject, size: tuple[int, int] | None) -> tuple[int
 def _select(document: JsonObject, path: CameraPath, numbers: tuple[int, ...]) -> CameraPath:
     if not numbers or any(b <= a for a, b in pairwise(numbers)):
         raise document.error("select at least one frame, and each once, in rising order")
+    first, last = path.numbers[0], path.numbers[-1]
     for number in numbers:
-        if not 1 <= number <= len(path):
-            raise document.error(f"frame {number} is not on the path; it has 1-{len(path)}")
-    cameras = tuple(path.cameras[number - 1] for number in numbers)
-    # a cut moves to the first selected frame at or after it; index n is frame number n + 1
-    cuts = {bisect_left(numbers, cut + 1) for cut in path.cuts} - {0, len(numbers)}
+        if not first <= number <= last:
+            raise document.error(f"frame {number} is not on the path; it has {first}-{last}")
+    cameras = tuple(path.cameras[number - first] for number in numbers)
+    # a cut moves to the first selected frame at or after it
+    cuts = {bisect_left(numbers, cut + first) for cut in path.cuts} - {0, len(numbers)}
     return CameraPath(cameras, numbers, path.fps, frozenset(cuts))

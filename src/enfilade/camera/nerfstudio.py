@@ -1,8 +1,10 @@
 """nerfstudio's ``camera_path.json``: a camera for every frame.
 
 Source: ``get_path_from_json`` in nerfstudio/cameras/camera_paths.py, and the export of its viewer. Poses are
-row-major 4x4 matrices from camera to world in OpenGL axes, ``fov`` is vertical, in degrees. Other keys, of
-radiance fields (``crop``, ``render_time``) and of the viewer (``keyframes``), are ignored.
+row-major 4x4 matrices from camera to world in OpenGL axes, ``fov`` is vertical, in degrees. Two keys are
+additions of ours: ``first_frame`` is the number of the first frame, ``cuts`` lists the frames that begin a
+shot, counted from 1. Other keys, of radiance fields (``crop``, ``render_time``) and of the viewer
+(``keyframes``), are ignored.
 """
 
 from __future__ import annotations
@@ -17,9 +19,11 @@ from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
 from enfilade.errors import CameraPathError
 
+FRAME_NUMBER = (-1_000_000.0, 1_000_000.0)
+
 
 def read_nerfstudio(document: JsonObject, size: tuple[int, int], fps: float | None = None) -> CameraPath:
-    """Cameras of all frames, with detected cuts; `fps` replaces the file's frame rate."""
+    """Cameras of all frames, with the file's cuts or detected ones; `fps` replaces the file's frame rate."""
     frames = document.objects("camera_path", "frame")
     for entry in (document, *frames):
         kind = entry.values.get("camera_type", "perspective")
@@ -28,9 +32,21 @@ def read_nerfstudio(document: JsonObject, size: tuple[int, int], fps: float | No
     if fps is None and "seconds" in document and "fps" not in document:
         fps = len(frames) / document.number("seconds", (len(frames) / FPS[1], len(frames) / FPS[0]))
     cameras = tuple(_camera(frame, size) for frame in frames)
-    cuts = find_cuts(np.stack([camera.world_from_camera for camera in cameras]))
-    numbers = tuple(range(1, len(cameras) + 1))
+    if "cuts" in document:
+        cuts = _marked_cuts(document, len(cameras))
+    else:
+        cuts = find_cuts(np.stack([camera.world_from_camera for camera in cameras]))
+    first = int(document.number("first_frame", FRAME_NUMBER, whole=True, default=1))
+    numbers = tuple(range(first, first + len(cameras)))
     return CameraPath(cameras, numbers, fps or document.number("fps", FPS), cuts)
+
+
+def _marked_cuts(document: JsonObject, count: int) -> frozenset[int]:
+    listed = document.values["cuts"]
+    if not isinstance(listed, list):
+        raise document.error(f"cuts is {shorten(listed)}; expected a list of frames")
+    marked = document.array("cuts", (len(listed),), within=(2.0, float(max(count, 2))), whole=True)
+    return frozenset(int(number) - 1 for number in marked)
 
 
 def _camera(frame: JsonObject, size: tuple[int, int]) -> Camera:

@@ -17,13 +17,23 @@ if TYPE_CHECKING:
 
 @click.command("doctor", short_help="Check the installation, with remedies for missing parts.")
 @device_option
+@click.option(
+    "--install-blender",
+    "is_blender_wanted",
+    is_flag=True,
+    help="First install Blender, as the module bpy in an environment of its own (374 MB).",
+)
 @json_option
 @debug_option
 @click.pass_context
-def command(ctx: click.Context, /, *, device: Choice, as_json: bool) -> None:
+def command(ctx: click.Context, /, *, device: Choice, is_blender_wanted: bool, as_json: bool) -> None:
     """List the installed requirements, the variant that will run, and remedies for missing parts."""
     from enfilade.installation import examine
 
+    if is_blender_wanted:
+        from enfilade.scene.blender.install import install
+
+        install(lambda line: click.echo(line, err=True))
     checks = examine(device)
     missing = [check for check in checks if check.is_required and not check.is_ok]
     if as_json:

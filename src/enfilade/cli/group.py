@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import keyword
 import shlex
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +13,7 @@ import click
 from enfilade import __version__
 from enfilade.errors import EnfiladeError, InputError
 
-COMMANDS = ("render", "work", "farm", "encode", "plan", "compare", "report", "doctor")
+COMMANDS = ("render", "import", "work", "farm", "encode", "plan", "compare", "report", "doctor")
 FAILURE = 1
 WRONG_INPUT = 2
 INTERRUPTED = 130
@@ -47,7 +48,7 @@ class EnfiladeGroup(click.Group):
 
     def __init__(self, *, modules: Mapping[str, str] | None = None, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self._modules = modules or {name: f"enfilade.cli.{name}" for name in COMMANDS}
+        self._modules = modules or {name: f"enfilade.cli.{_module(name)}" for name in COMMANDS}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands, in the order of use."""
@@ -81,6 +82,10 @@ class EnfiladeGroup(click.Group):
                 raise
             kind = WrongInput if isinstance(error, InputError) else Failure
             raise kind(_message(error)) from error
+
+
+def _module(name: str) -> str:
+    return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def mark_resumable(ctx: click.Context) -> None:

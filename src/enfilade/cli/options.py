@@ -14,6 +14,7 @@ import click
 from enfilade.device import Choice, activate
 from enfilade.errors import SettingsError
 from enfilade.settings import (
+    BlenderSettings,
     DecoupledSettings,
     LimitSettings,
     OutputSettings,
@@ -27,9 +28,7 @@ from enfilade.settings import (
 )
 
 if TYPE_CHECKING:
-    from enfilade.methods.base import Method
     from enfilade.runs.executor import Workers
-    from enfilade.runs.job import Job
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -48,6 +47,14 @@ FLAGS: dict[str, tuple[type[Section], str]] = {  # flags of single settings
     "--layers": (OutputSettings, "layers"),
     "--allow": (LimitSettings, "allow"),
 }
+IMPORT_FLAGS: dict[str, tuple[type[Section], str]] = {
+    "--scene": (BlenderSettings, "scene"),
+    "--view-layer": (BlenderSettings, "view_layer"),
+    "--camera": (BlenderSettings, "camera"),
+    "--blender": (BlenderSettings, "program"),
+    "--strict": (BlenderSettings, "strict"),
+}
+ALL_FLAGS = FLAGS | IMPORT_FLAGS
 VIDEO_FLAGS = ("--exposure-ev", "--codec", "--video-quality", "--ocio", "--view", "--display")
 COMMON = (ViewingSettings, VideoSettings, OutputSettings, LimitSettings)  # read by every run
 
@@ -83,27 +90,35 @@ def decorated(*decorators: Callable[[Command], Command]) -> Callable[[Command], 
 
 
 _file = click.Path(path_type=Path)
-path_options = decorated(
-    click.argument("scene", type=_file),
-    click.option(
-        "--path",
-        "path_file",
-        type=_file,
-        required=True,
-        help="The camera path: nerfstudio's camera_path.json, or keyed poses.",
-    ),
-    click.option(
-        "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
-    ),
-    click.option(
-        "--frames",
-        metavar="RANGES",
-        help="Frames, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
-    ),
-    click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
-)
+
+
+def _path_options(*, is_required: bool) -> Callable[[Command], Command]:
+    """Scene and camera path; a file that Blender imports has a path of its own."""
+    own = "" if is_required else "  [default: that of a file that Blender imports]"
+    return decorated(
+        click.argument("scene", type=_file),
+        click.option(
+            "--path",
+            "path_file",
+            type=_file,
+            required=is_required,
+            help=f"The camera path: nerfstudio's camera_path.json, or keyed poses.{own}",
+        ),
+        click.option(
+            "--size", type=Size(), help="Width and height of the images, pixels.  [default: the path's]"
+        ),
+        click.option(
+            "--frames",
+            metavar="RANGES",
+            help="Frames, both ends included: 1-250, 1,5,9 or 1-250:2.  [default: all]",
+        ),
+        click.option("--fps", type=float, help="Frames per second of the video.  [default: the path's]"),
+    )
+
+
+path_options = _path_options(is_required=True)
 job_options = decorated(
-    path_options,
+    _path_options(is_required=False),
     click.option(
         "--method",
         default="decoupled",
@@ -150,7 +165,7 @@ def settings_options(*flags: str, default: str = "") -> Callable[[Command], Comm
     Parameters
     ----------
     flags
-        Of :data:`FLAGS`.
+        Of :data:`ALL_FLAGS`.
     default
         Shown in help in place of the settings' own defaults.
     """
@@ -175,12 +190,14 @@ def settings_options(*flags: str, default: str = "") -> Callable[[Command], Comm
 
 
 def _setting_option(flag: str, default: str) -> Callable[[Command], Command]:
-    kind, name = FLAGS[flag]
+    kind, name = ALL_FLAGS[flag]
     field = next(f for f in fields(kind) if f.name == name)
+    # `is_flag=False` would make click take a value such as -1 for an option
+    terms = {"is_flag": True} if isinstance(field.default, bool) else {"type": _type_of(field)}
     return click.option(
         flag,
         f"{kind.table}__{name}",
-        type=_type_of(field),
+        **terms,
         help=f"{field.metadata['help']}  [default: {default or _shown(field.default)}]",
         expose_value=False,
         callback=lambda ctx, _, value: _keep(ctx, flag, value),
@@ -188,7 +205,7 @@ def _setting_option(flag: str, default: str) -> Callable[[Command], Command]:
 
 
 def _keep(ctx: click.Context, key: str, value: Any) -> None:
-    if value not in (None, ()):
+    if value is not None and value is not False and value != ():
         ctx.meta.setdefault(_META, {})[key] = value
 
 
@@ -220,7 +237,7 @@ def tables_of(ctx: click.Context, kinds: Iterable[type[Section]]) -> dict[str, d
     for text in given.get("set", ()):
         section, name, value = _assignment(text)
         tables.setdefault(section, {})[name] = value
-    for flag, (kind, name) in FLAGS.items():
+    for flag, (kind, name) in ALL_FLAGS.items():
         if flag in given:
             tables.setdefault(kind.table, {})[name] = given[flag]
     _make_absolute(tables, Path(), kinds)
@@ -274,55 +291,23 @@ def given_in(ctx: click.Context, kind: type[Section]) -> set[str]:
     return set(tables_of(ctx, (kind,)).get(kind.table, {}))
 
 
-def job_of(
-    ctx: click.Context,
-    *,
-    scene: Path,
-    path_file: Path,
-    method: str,
-    size: tuple[int, int] | None,
-    frames: str | None,
-    fps: float | None,
-    device: Choice,
-) -> Job:
-    """The job that a command describes.
+def assigned(ctx: click.Context) -> dict[str, str]:
+    """Flags and assignments of this command, as typed, with the tables of their settings."""
+    given = ctx.meta.get(_META, {})
+    named = {flag: kind.table for flag, (kind, _) in ALL_FLAGS.items() if flag in given}
+    return named | {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
+
+
+def choose_device(device: Choice) -> None:
+    """Activate a device; a note says why ``auto`` is not the GPU that is there.
 
     Raises
     ------
-    InputError
-        A setting, the path or the selection of frames is wrong; a flag has no effect with the method.
     DeviceError
         The device is not there.
     """
     if note := activate(device).note:
         click.echo(f"note    rendered on the CPU: {note}", err=True)
-    from enfilade.camera import load_path, parse_frames
-    from enfilade.methods.opener import open_method
-    from enfilade.runs.job import Job
-    from enfilade.scene.opener import Scene
-    from enfilade.settings import SECTIONS
-
-    opened = open_method(method)
-    settings = settings_of(ctx, dict.fromkeys([*SECTIONS, *opened.settings]))
-    _check_effect(ctx, opened)
-    selected = None if frames is None else parse_frames(frames)
-    path = load_path(path_file, size=size, frames=selected, fps=fps)
-    return Job(scene=Scene(scene), path=path, settings=settings, method=method)
-
-
-def _check_effect(ctx: click.Context, method: Method) -> None:
-    """Refuse flags and assignments for sections that the method does not read; a file may have them."""
-    given = ctx.meta.get(_META, {})
-    kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
-    read = {kind.table for kind in kinds}
-    named = {flag: kind.table for flag, (kind, _) in FLAGS.items() if flag in given}
-    named |= {f"--set {text}": _assignment(text)[0] for text in given.get("set", ())}
-    for flag, table in named.items():
-        if table not in read:
-            raise SettingsError(
-                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "
-                "out, or choose another method"
-            )
 
 
 def workers_of(executor: str, workers: int | None, threads: int) -> Workers:

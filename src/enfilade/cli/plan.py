@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.options import FLAGS, check_png, job_of, job_options, output_options, settings_options
+from enfilade.cli.jobs import job_of
+from enfilade.cli.options import (
+    FLAGS,
+    check_png,
+    choose_device,
+    job_options,
+    output_options,
+    settings_options,
+)
 from enfilade.settings import MaskSettings
 
 if TYPE_CHECKING:
@@ -26,15 +34,30 @@ LISTED = 12  # keyframes
 @output_options
 @debug_option
 @click.pass_context
-def command(ctx: click.Context, /, *, plot: Path | None, as_json: bool, quiet: bool, **inputs: Any) -> None:
-    """Analyze the path through SCENE, and forecast the cost of rendering by dry runs of a small excerpt."""
+def command(
+    ctx: click.Context,
+    /,
+    *,
+    plot: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **inputs: Any,
+) -> None:
+    """Analyze the path through SCENE, and forecast the cost of rendering by dry runs of a small excerpt.
+
+    A .blend, glTF, USD, FBX or OBJ file is imported by Blender for this; `enfilade import` keeps the scene.
+    """
     check_png("--plot", plot)
-    job = job_of(ctx, **inputs)
+    choose_device(inputs.pop("device"))
+    import tempfile
+
     from enfilade.cli.progress import watch
     from enfilade.runs.plan import plan
 
-    with watch(quiet=quiet) as monitor:
-        made = plan(job, monitor, has_preflight=True).to_dict()
+    with tempfile.TemporaryDirectory(prefix="enfilade-plan-") as run:
+        job = job_of(ctx, run=Path(run), quiet=quiet, **inputs)
+        with watch(quiet=quiet) as monitor:
+            made = plan(job, monitor, has_preflight=True).to_dict()
     if as_json:
         click.echo(json.dumps(made, indent=2))
     else:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
+from enfilade.cli.jobs import job_of
 from enfilade.cli.options import (
     FLAGS,
-    job_of,
+    choose_device,
     job_options,
     output_options,
     settings_options,
@@ -66,9 +67,14 @@ def command(
     quiet: bool,
     **inputs: Any,
 ) -> None:
-    """Render a walkthrough of SCENE (Mitsuba 3 XML) into frames, a video and a report of the cost."""
+    """Render a walkthrough of SCENE into frames, a video and a report of the cost.
+
+    SCENE is Mitsuba 3's XML. A .blend, glTF, USD, FBX or OBJ file is imported by Blender into the run folder
+    first, with its camera, exposure and view; `--set blender.camera=NAME` and the like choose from it.
+    """
     mark_resumable(ctx)
-    job = job_of(ctx, **inputs)
+    choose_device(inputs.pop("device"))
+    job = job_of(ctx, run=folder, quiet=quiet, **inputs)
     from enfilade.cli.progress import watch
     from enfilade.runs.render import prepare, render
 

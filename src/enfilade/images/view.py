@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
 
-__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "open_view", "view_identity"]
+__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "files_of_view", "open_view", "view_identity"]
 
 BT709_TRANSFER = 1  # ITU-T H.273, table 3
 SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
@@ -45,8 +46,8 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     Parameters
     ----------
     settings
-        ``ocio``, ``display`` and ``view`` count. By default the display is the first one for sRGB, Rec.1886
-        or Rec.709, and the view its default one; wide-gamut and HDR displays are not supported.
+        ``ocio``, ``display``, ``view`` and ``look`` count. By default the display is the first one for sRGB,
+        Rec.1886 or Rec.709, and the view its default one; wide-gamut and HDR displays are not supported.
     exposure_ev
         Stops, before the transform.
 
@@ -58,8 +59,8 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
     """
     gain = np.float32(2.0**exposure_ev)
     if not settings.ocio:
-        for name, value in (("view", settings.view), ("display", settings.display)):
-            if value:
+        for name in ("view", "display", "look"):
+            if value := getattr(settings, name):
                 raise SettingsError(f"[video] {name} = {value!r} needs a configuration: set [video] ocio too")
         return View(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
     processor, transfer = _open_ocio(settings)
@@ -83,6 +84,12 @@ def view_identity(settings: VideoSettings) -> dict[str, str]:
     return {"opencolorio": str(PyOpenColorIO.GetVersion()), "processor": str(processor.getCacheID())}
 
 
+def files_of_view(settings: VideoSettings) -> list[Path]:
+    """The configuration of OpenColorIO, and the tables of the view; errors as above."""
+    processor, _ = _open_ocio(settings)
+    return [Path(settings.ocio), *map(Path, processor.getProcessorMetadata().getFiles())]
+
+
 def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
     """OpenColorIO's processor for a view, and the transfer of its display."""
     file = settings.ocio
@@ -98,8 +105,16 @@ def _open_ocio(settings: VideoSettings) -> tuple[Any, int]:
         views, view = list(config.getViews(display)), settings.view or config.getDefaultView(display)
         if view not in views:
             raise SettingsError(f"{file} has no view {view!r} of {display!r}; it has: {', '.join(views)}")
-        linear, forward = _linear_rec709(config, file), PyOpenColorIO.TRANSFORM_DIR_FORWARD
-        processor = config.getProcessor(linear, display, view, forward)
+        looks = [look.getName() for look in config.getLooks()]
+        if settings.look and settings.look not in looks:
+            raise SettingsError(f"{file} has no look {settings.look!r}; it has: {', '.join(looks) or 'none'}")
+        pipeline = PyOpenColorIO.LegacyViewingPipeline()
+        pipeline.setDisplayViewTransform(
+            PyOpenColorIO.DisplayViewTransform(src=_linear_rec709(config, file), display=display, view=view)
+        )
+        pipeline.setLooksOverrideEnabled(bool(settings.look))
+        pipeline.setLooksOverride(settings.look)
+        processor = pipeline.getProcessor(config)
     except (PyOpenColorIO.Exception, PyOpenColorIO.ExceptionMissingFile) as error:
         raise SettingsError(f"OpenColorIO can't use {file}: {error}") from error
     return processor, transfer

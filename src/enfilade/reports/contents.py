@@ -8,13 +8,14 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from enfilade import __version__
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
 from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import TRACED_COLUMNS, percent, psnr_text, seconds, spoken
+from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.notes import TITLES, NoteGroup, NoteKind, grouped
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -62,12 +63,13 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         "difference": _difference(film.difference, summary, reference),
         "noise_note": "" if film.difference is None else _sentence(film.difference["noise_note"]),
         "stages": _stages(run),
+        "imported": run.imported,
+        "import_notes": [] if run.imported is None else _import_notes(run.imported),
         "settings": _settings(run),
         "identity": _identity(run),
         "columns": panels,
         "numbers": run.numbers,
         "data": json.dumps(_data(run, film, charted)).replace("<", "\\u003c"),
-        "version": __version__,
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     }
 
@@ -160,6 +162,17 @@ def _difference(
             ("", seconds(other), "the reference; comparable on the same machine"),
         ]
     return rows
+
+
+def _import_notes(imported: ImportedScene) -> list[tuple[str, list[NoteGroup]]]:
+    """Parts of the imported file that are not as they were, under the titles of their kinds."""
+    groups = grouped(imported.notes)
+    titled = [
+        (title, [group for group in groups if group.kind is kind])
+        for kind, title in TITLES.items()
+        if kind is not NoteKind.MAPPED
+    ]
+    return [(title, found) for title, found in titled if found]
 
 
 def _sentence(note: str) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from enfilade import __version__
 from enfilade.errors import SettingsError
 from enfilade.files import whole_file
 from enfilade.images.view import open_view
@@ -19,7 +21,7 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.identity import RUN_FILE
 from enfilade.runs.statistics import statistics
 
-__all__ = ["LEAST_MB", "PAGE", "write_report"]
+__all__ = ["LEAST_MB", "PAGE", "write_page", "write_report"]
 
 PAGE = "report.html"  # in a run folder
 MB = 1_000_000
@@ -85,20 +87,41 @@ def write_report(
     notes = [*shown.notes, *film.notes]
     if dropped := shown.summary["dropped_samples"]:
         notes.append(f"{dropped} samples were NaN or infinite and were left out")
+    if shown.video.ocio:
+        notes.append(
+            f"the video has the view {shown.video.view} of {shown.video.ocio}; quality and scores assume the "
+            "sRGB curve, clipped at white"
+        )
     for note in notes:
         monitor.message(note)
     variables = contents(shown, film, None if source is None else _summary(source))
-    parts = {
-        name: (files("enfilade.reports") / TEMPLATES / name).read_text()
-        for name in ("report.css", "report.js")
-    }
-    text = _environment().get_template("report.html.j2").render(
-        variables, notes=notes, parts=parts, references=[str(of.resolve()) for of in references]
-    )  # fmt: skip
+    variables |= {"notes": notes, "references": [str(of.resolve()) for of in references]}
     file = run / PAGE if out is None else Path(out)
+    write_page(file, "report", variables)
+    return file
+
+
+def write_page(file: Path, name: str, variables: Mapping[str, Any]) -> None:
+    """Write a page from a template, ``NAME.html.j2``, with ``report.css`` and ``NAME.js`` inside.
+
+    Parameters
+    ----------
+    file
+    name
+    variables
+        Of the template; ``parts`` and ``version`` are added.
+
+    Raises
+    ------
+    RunFolderError, NoSpaceError
+        The file can't be written.
+    """
+    folder = files("enfilade.reports") / TEMPLATES
+    parts = {part: (folder / part).read_text() for part in ("report.css", f"{name}.js")}
+    template = _environment().get_template(f"{name}.html.j2")
+    text = template.render(variables, parts=parts, version=__version__)
     with whole_file(file) as beside:
         beside.write_text(text, encoding="utf-8")
-    return file
 
 
 def _summary(reference: Path) -> dict[str, Any] | None:

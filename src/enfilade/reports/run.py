@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.comparison import CompareOptions
-from enfilade.errors import ImageError, RunFolderError
+from enfilade.errors import ImageError, RunFolderError, SceneError
 from enfilade.files import read_json
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
@@ -21,6 +21,8 @@ from enfilade.runs.job import JOB_FILE
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import holder_of
 from enfilade.runs.statistics import statistics
+from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.process import RESULT_FILE
 from enfilade.settings import VideoSettings, ViewingSettings
 
 __all__ = ["DeliveredFrame", "ReportedRun"]
@@ -72,6 +74,8 @@ class ReportedRun:
     holder : dict or None
         The command that writes the run, see :func:`~enfilade.runs.lock.holder_of`.
     last_result : datetime
+    imported : ImportedScene or None
+        What Blender's importer says of the scene, if it was imported.
     notes : list of str
         Damage.
 
@@ -89,7 +93,8 @@ class ReportedRun:
         self.numbers: tuple[int, ...] = tuple(path["frames"])
         self._starts = {self.numbers[0], *path["cuts"]}
         self.there = tuple(i for i, number in enumerate(self.numbers) if self._run.line(FRAMES, number))
-        self.viewing_settings, self.video = _settings(folder)
+        job = _job(folder)
+        self.viewing_settings, self.video = _settings(job, folder)
         self.viewing = CompareOptions(viewing=self.viewing_settings).conditions(
             tuple(path["size"]), path["fps"]
         )
@@ -100,6 +105,7 @@ class ReportedRun:
         there = {self.numbers[i] for i in self.there}
         lost = [str(n) for n in self.numbers if self._run.recorded(FRAMES, n) and n not in there]
         self.notes = list(self._run.notes)
+        self.imported = self._imported(job)
         if lost:
             self.notes.append(f"the files of these frames are missing or damaged: {', '.join(lost)}")
 
@@ -126,6 +132,17 @@ class ReportedRun:
         known = None if provenance is None else provenance.astype(np.uint8)
         return DeliveredFrame(number, color.astype(np.float32), known, self._flow(index, layers))
 
+    def _imported(self, job: dict[str, Any]) -> ImportedScene | None:
+        """The imported scene of the job; None where it was not imported, or is not there."""
+        folder = Path(str(job.get("scene", {}).get("file", ""))).parent
+        if not (folder / RESULT_FILE).is_file():
+            return None
+        try:
+            return ImportedScene.read(folder)
+        except SceneError as error:
+            self.notes.append(str(error))
+            return None
+
     def _flow(self, index: int, layers: dict[str, Any]) -> Flow | None:
         if "forward" not in layers or "backward" not in layers:
             return None
@@ -139,13 +156,18 @@ class ReportedRun:
         )
 
 
-def _settings(folder: Path) -> tuple[ViewingSettings, VideoSettings]:
+def _job(folder: Path) -> dict[str, Any]:
+    """The job file, unchecked."""
+    found = read_json(folder / JOB_FILE)
+    return found if isinstance(found, dict) else {}
+
+
+def _settings(job: dict[str, Any], folder: Path) -> tuple[ViewingSettings, VideoSettings]:
     """Settings of viewing and video, which not every method has in its identity."""
-    file = folder / JOB_FILE
     try:
-        tables = read_json(file)["settings"]
+        tables = job["settings"]
         return ViewingSettings.from_table(tables["viewing"]), VideoSettings.from_table(tables["video"])
     except (KeyError, TypeError) as error:
         raise RunFolderError(
-            f"{file} is damaged ({error!r}); run the command that made the run again"
+            f"{folder / JOB_FILE} is damaged ({error!r}); run the command that made the run again"
         ) from error

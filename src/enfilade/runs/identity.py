@@ -12,11 +12,13 @@ from enfilade.errors import RunFolderError
 from enfilade.files import MARK, is_full, read_json, unwritable
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import LOCK_FILE
+from enfilade.scene.blender.process import RESULT_FILE as IMPORT_FILE
 
-__all__ = ["FORMAT", "RUN_FILE", "check_place", "check_same", "digest_of", "identity_of"]
+__all__ = ["FORMAT", "RUN_FILE", "SCENE_FOLDER", "check_place", "check_same", "digest_of", "identity_of"]
 
 FORMAT = 4  # of the folder; another number is refused
 RUN_FILE = "run.json"
+SCENE_FOLDER = "scene"  # of a run, if its scene was imported by Blender
 SHOWN_DIFFERENCES, SHOWN_LETTERS = 12, 80
 ABSENT = object()
 
@@ -39,7 +41,8 @@ def check_place(folder: Path) -> None:
         raise RunFolderError(
             f"can't make a run in {folder}: {error.strerror}; choose another --out"
         ) from error
-    foreign = [name for name in names if name != LOCK_FILE and MARK not in name]
+    own = {LOCK_FILE, SCENE_FOLDER} if (folder / SCENE_FOLDER / IMPORT_FILE).is_file() else {LOCK_FILE}
+    foreign = [name for name in names if name not in own and MARK not in name]
     if foreign and RUN_FILE not in names and LEDGER_FILE not in names:
         raise RunFolderError(
             f"{folder} is not empty and holds no run (it has {', '.join(foreign[:3])}); choose another --out"

@@ -17,14 +17,14 @@ from typing import Any
 from enfilade.device import active
 from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import Renderer
+from enfilade.scene.blender.source import SUFFIXES
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
 __all__ = ["Scene"]
 
 ADVICE = {
-    ".blend": "export it with the mitsuba-blender add-on (File > Export > Mitsuba) and give the XML file: "
-    "docs/formats.md",
     ".json": "a camera path is given by --path",
+    **dict.fromkeys(SUFFIXES, "import it by `enfilade import`, and give the scene.xml that it writes"),
 }
 
 

@@ -1,0 +1,100 @@
+"""The job that `render` and `plan` are given: scene, camera path, method and settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from enfilade.cli.options import COMMON, assigned, tables_of
+from enfilade.errors import SettingsError
+from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Section, Settings
+
+if TYPE_CHECKING:
+    from enfilade.methods.base import Method
+    from enfilade.runs.job import Job
+    from enfilade.scene.blender.imported import ImportedScene
+
+__all__ = ["job_of"]
+
+
+def job_of(
+    ctx: click.Context,
+    *,
+    run: Path | None,
+    quiet: bool,
+    scene: Path,
+    path_file: Path | None,
+    method: str,
+    size: tuple[int, int] | None,
+    frames: str | None,
+    fps: float | None,
+) -> Job:
+    """The job that a command describes; a file of Blender is imported.
+
+    Parameters
+    ----------
+    ctx
+    run
+        The run folder, for the imported scene; None: nothing is imported.
+    quiet
+        Whether no progress of the import is shown.
+    scene, path_file, method, size, frames, fps
+        As typed.
+
+    Raises
+    ------
+    InputError
+        A setting, the path or the selection of frames is wrong; a flag has no effect; the scene can't be
+        imported.
+    """
+    from enfilade.camera import load_path, parse_frames
+    from enfilade.methods.opener import open_method
+    from enfilade.runs.job import Job
+    from enfilade.scene.blender.source import is_importable
+    from enfilade.scene.opener import Scene
+
+    opened = open_method(method)
+    kinds = tuple(dict.fromkeys([*SECTIONS, *opened.settings]))
+    tables = tables_of(ctx, kinds)
+    settings = Settings.from_tables(tables, kinds)
+    is_imported = run is not None and is_importable(scene)
+    _check_effect(ctx, opened, scene, is_imported=is_imported)
+    selected = None if frames is None else parse_frames(frames)
+    path = None if path_file is None else load_path(path_file, size=size, frames=selected, fps=fps)
+    if run is not None and is_imported:
+        imported = _imported(run, scene, settings, size, quiet=quiet)
+        scene, settings = imported.scene_file, Settings.from_tables(imported.tables_under(tables), kinds)
+        path = path or load_path(imported.checked_path(), size=size, frames=selected, fps=fps)
+    if path is None:
+        raise click.UsageError("Missing option '--path'.", ctx)
+    return Job(scene=Scene(scene), path=path, settings=settings, method=method)
+
+
+def _imported(
+    run: Path, source: Path, settings: Settings, size: tuple[int, int] | None, *, quiet: bool
+) -> ImportedScene:
+    from enfilade.cli.progress import watch
+    from enfilade.runs.source import imported_into
+
+    with watch(quiet=quiet) as monitor:
+        blender, limits = settings[BlenderSettings], settings[LimitSettings]
+        return imported_into(run, source, blender, limits, monitor, size=size)
+
+
+def _check_effect(ctx: click.Context, method: Method, scene: Path, *, is_imported: bool) -> None:
+    """Refuse flags and assignments for sections that nothing reads; a file may have them."""
+    own = BlenderSettings.table
+    kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
+    read = {kind.table for kind in kinds}
+    for flag, table in assigned(ctx).items():
+        if table == own and not is_imported:
+            raise SettingsError(
+                f"{flag} has no effect on {scene}, which Blender does not import; leave it out"
+            )
+        if table not in read | {own}:
+            raise SettingsError(
+                f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "
+                "out, or choose another method"
+            )

@@ -1,0 +1,160 @@
+"""Two renderers' images of one scene, compared object by object without their noise.
+
+Each image is given in two halves of independent noise: what both halves share is the image, and their
+difference is the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.records import F32, U32
+
+__all__ = ["ImagePair", "ObjectDifference", "compare_objects"]
+
+F64 = npt.NDArray[np.float64]
+LUMINANCE = np.array((0.2126, 0.7152, 0.0722))  # Rec. ITU-R BT.709-6
+LEAST_PIXELS = 48  # of an object: the statistics of fewer say little
+HIGHLIGHT_SHARE = 0.02  # brightest pixels of an object
+DARKEST = 0.01  # of the mean of all pixels: differences of darker objects are relative to this
+SIGMAS = 2.0  # of the stated noise
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePair:
+    """A frame by a reference renderer and by the one under test, each in two halves.
+
+    Attributes
+    ----------
+    number : int
+    reference, test : tuple of two (H, W, 3) float32
+        Linear Rec.709.
+    shape_index : (H, W) uint32
+        Of the object at the centre of each pixel; 0: none.
+    """
+
+    number: int
+    reference: tuple[F32, F32]
+    test: tuple[F32, F32]
+    shape_index: U32
+
+
+@dataclass(frozen=True)
+class ObjectDifference:
+    """How an object differs between two renderers.
+
+    Attributes
+    ----------
+    name : str
+    shape_index : int
+        0: everything.
+    pixel_percent : float
+        Of all pixels.
+    color_percent, noise_percent : float
+        Mean absolute difference of the mean colour's channels, percent of the mean, and the noise of that
+        number (two standard deviations).
+    brightness_percent : float
+        Difference of mean luminance, percent.
+    contrast_percent : float
+        Difference of the standard deviation of luminance, percent of the mean.
+    highlight_percent : float
+        Difference of the luminance of the brightest 2 % of the pixels, percent of the mean.
+    """
+
+    name: str
+    shape_index: int
+    pixel_percent: float
+    color_percent: float
+    noise_percent: float
+    brightness_percent: float
+    contrast_percent: float
+    highlight_percent: float
+
+    @property
+    def excess_percent(self) -> float:
+        """Difference of colour beyond the noise: the order in which objects are listed."""
+        return max(self.color_percent - self.noise_percent, 0.0)
+
+
+def compare_objects(pairs: Sequence[ImagePair], names: Sequence[str]) -> list[ObjectDifference]:
+    """Differences of all pixels together, and of each object with enough of them.
+
+    Parameters
+    ----------
+    pairs
+        Frames of one scene.
+    names
+        Of objects 1, 2, ...
+
+    Returns
+    -------
+    list of ObjectDifference
+        Everything first, then objects, that with the largest difference first.
+    """
+    index = np.concatenate([pair.shape_index.ravel() for pair in pairs])
+    images = [
+        np.concatenate([half.reshape(-1, 3) for half in halves]).astype(np.float64)
+        for halves in zip(*((*pair.reference, *pair.test) for pair in pairs), strict=True)
+    ]
+    floor = DARKEST * float(images[0].mean() + images[1].mean()) / 2.0
+    whole = _difference("everything", 0, np.arange(len(index)), len(index), images, floor)
+    found = [
+        _difference(name, number, pixels, len(index), images, floor)
+        for number, name in enumerate(names, 1)
+        if len(pixels := np.flatnonzero(index == number)) >= LEAST_PIXELS
+    ]
+    return [whole, *sorted(found, key=lambda of: of.excess_percent, reverse=True)]
+
+
+def _difference(
+    name: str,
+    number: int,
+    pixels: npt.NDArray[np.intp],
+    total: int,
+    images: Iterable[F64],
+    floor: float,
+) -> ObjectDifference:
+    ref_a, ref_b, test_a, test_b = (image[pixels] for image in images)
+    reference, test = (ref_a + ref_b) / 2.0, (test_a + test_b) / 2.0
+    mean = max(float((reference @ LUMINANCE).mean()), floor, 1e-9)
+    noise = np.sqrt(_variance_of_mean(ref_a - ref_b) + _variance_of_mean(test_a - test_b))
+    bright_ref, bright_test = ref_a @ LUMINANCE, test_a @ LUMINANCE
+    halves = (bright_ref, ref_b @ LUMINANCE), (bright_test, test_b @ LUMINANCE)
+    levels, contrasts, highlights = zip(*(_statistics(*half) for half in halves), strict=True)
+
+    def percent(value: float) -> float:
+        return 100.0 * value / mean
+
+    return ObjectDifference(
+        name=name,
+        shape_index=number,
+        pixel_percent=100.0 * len(pixels) / total,
+        color_percent=percent(float(np.abs(test.mean(axis=0) - reference.mean(axis=0)).mean())),
+        noise_percent=percent(SIGMAS * float(noise.mean())),
+        brightness_percent=percent(levels[1] - levels[0]),
+        contrast_percent=percent(contrasts[1] - contrasts[0]),
+        highlight_percent=percent(highlights[1] - highlights[0]),
+    )
+
+
+def _variance_of_mean(difference: F64) -> F64:
+    """Variance of the mean of (A + B) / 2 by channel, from A - B (N, 3) of independent pixels."""
+    result: F64 = (difference**2).sum(axis=0) / 4.0 / len(difference) ** 2
+    return result
+
+
+def _statistics(first: F64, second: F64) -> tuple[float, float, float]:
+    """Mean, standard deviation and highlights of luminance in two halves (N,), without the bias of noise."""
+    mean = float(first.mean() + second.mean()) / 2.0
+    covariance = float(((first - first.mean()) * (second - second.mean())).mean())
+    # Choose the brightest pixels by one half, and measure them in the other.
+    count = max(round(HIGHLIGHT_SHARE * len(first)), 1)
+    highlights = [
+        float(measured[np.argpartition(chosen, -count)[-count:]].mean())
+        for chosen, measured in ((first, second), (second, first))
+    ]
+    return mean, float(np.sqrt(max(covariance, 0.0))), sum(highlights) / 2.0

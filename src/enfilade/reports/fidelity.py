@@ -1,0 +1,109 @@
+"""The page of ``enfilade import --check``: Cycles beside the imported scene, object by object."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade.comparison.objects import ImagePair, ObjectDifference, compare_objects
+from enfilade.images.stills import encode_webp
+from enfilade.images.view import View, open_view
+from enfilade.records import F32, U8, U32
+from enfilade.reports.page import write_page
+from enfilade.reports.tables import seconds
+from enfilade.runs.fidelity import CheckedFrame, ImportCheck
+from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.notes import TITLES, NoteKind, grouped
+from enfilade.settings import Settings, VideoSettings, ViewingSettings
+
+__all__ = ["CHECK_PAGE", "differences_of", "write_check"]
+
+CHECK_PAGE = "check.html"  # in an imported scene folder
+LISTED = 40  # objects
+WEBP_QUALITY = 92
+
+
+def differences_of(check: ImportCheck) -> list[ObjectDifference]:
+    """Everything first, then objects, that with the largest difference of colour first."""
+    pairs = [ImagePair(of.number, of.cycles, of.imported, of.shape_index) for of in check.frames]
+    return compare_objects(pairs, check.names)
+
+
+def write_check(imported: ImportedScene, check: ImportCheck, differences: Sequence[ObjectDifference]) -> Path:
+    """Write the page into the scene folder.
+
+    Parameters
+    ----------
+    imported
+    check
+    differences
+        See :func:`differences_of`.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    SettingsError
+        The view of the file is not available.
+    RunFolderError, NoSpaceError
+        The page can't be written.
+    """
+    settings = Settings.from_tables(imported.tables_under({}))
+    view = open_view(settings[VideoSettings], settings[ViewingSettings].exposure_ev)
+    everything, *objects = differences
+    listed = objects[:LISTED]
+    frames = [_frame(of, view) for of in check.frames]
+    boxes = [[_box(of.shape_index, object_.shape_index) for of in check.frames] for object_ in listed]
+    height, width = check.frames[0].shape_index.shape
+    notes = [group for group in grouped(imported.notes) if group.kind is not NoteKind.MAPPED]
+    variables = {
+        "imported": imported,
+        "view_name": settings[VideoSettings].view or "sRGB",
+        "spp": check.spp,
+        "size": (width, height),
+        "numbers": [of.number for of in check.frames],
+        "everything": everything,
+        "objects": listed,
+        "left_out": len(objects) - len(listed),
+        "costs": [
+            (name, seconds(of.wall_s), seconds(of.cpu_s))
+            for name, of in (("Cycles", check.cycles), ("Mitsuba", check.imported))
+        ],
+        "notes": [(TITLES[group.kind], group) for group in notes],
+        "data": json.dumps({"frames": frames, "boxes": boxes}).replace("<", "\\u003c"),
+    }
+    file = imported.folder / CHECK_PAGE
+    write_page(file, "check", variables)
+    return file
+
+
+def _frame(of: CheckedFrame, view: View) -> dict[str, Any]:
+    """Both pictures, and the map of their difference."""
+    pictures = [_displayed(halves, view) for halves in (of.cycles, of.imported)]
+    difference = np.abs(pictures[0].astype(np.int16) - pictures[1]).astype(np.uint8)
+    named = zip(("cycles", "imported", "difference"), (*pictures, difference), strict=True)
+    encoded = {name: base64.b64encode(encode_webp(p, quality=WEBP_QUALITY)).decode() for name, p in named}
+    return {"number": of.number, **encoded}
+
+
+def _displayed(halves: tuple[F32, F32], view: View) -> U8:
+    shown: U8 = (view.encode((halves[0] + halves[1]) * np.float32(0.5)) * 255.0 + 0.5).astype(np.uint8)
+    return shown
+
+
+def _box(index: U32, number: int) -> list[float] | None:
+    """Left, top, width and height of an object, percent of the picture; None where it is not."""
+    rows, columns = np.nonzero(index == number)
+    if not len(rows):
+        return None
+    height, width = index.shape
+    left, top = columns.min() / width, rows.min() / height
+    sides = (columns.max() + 1) / width - left, (rows.max() + 1) / height - top
+    return [round(100.0 * float(side), 2) for side in (left, top, *sides)]

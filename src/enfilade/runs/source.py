@@ -1,0 +1,110 @@
+"""A file that Blender imports as the scene of a run: imported once, into the run folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from enfilade.errors import RunFolderError, SceneError
+from enfilade.files import sweep
+from enfilade.monitor import Monitor
+from enfilade.runs.identity import RUN_FILE, SCENE_FOLDER, check_place
+from enfilade.runs.lock import Lock
+from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.importer import check_strict, import_file
+from enfilade.scene.blender.notes import NoteKind, grouped
+from enfilade.scene.blender.source import SOURCE_FILE, Choices, Source, check_source
+from enfilade.settings import BlenderSettings, LimitSettings
+
+__all__ = ["choices_of", "imported_into"]
+
+
+def choices_of(
+    settings: BlenderSettings,
+    size: tuple[int, int] | None = None,
+    frames: tuple[int, int] | None = None,
+) -> Choices:
+    """The choices of an import that are settings, with the size of the images and the frames."""
+    return Choices(
+        settings.scene,
+        settings.view_layer,
+        settings.camera,
+        size,
+        frames,
+        settings.bake_px,
+        settings.bake_samples,
+    )
+
+
+def imported_into(
+    run: Path,
+    source: Path,
+    settings: BlenderSettings,
+    limits: LimitSettings,
+    monitor: Monitor,
+    *,
+    size: tuple[int, int] | None = None,
+) -> ImportedScene:
+    """The scene of a file in a run folder; imported when the run begins, and kept.
+
+    Parameters
+    ----------
+    run
+        The run folder; made if it is not there.
+    source
+    settings, limits
+    monitor
+    size
+        Width and height of the images, pixels; None: the file's own.
+
+    Raises
+    ------
+    SceneError
+        The file can't be imported.
+    RunFolderError, NoSpaceError
+        The file or the choices are not those of the run; or the folder holds something else, or can't be
+        written.
+    """
+    folder, choices = run / SCENE_FOLDER, choices_of(settings, size)
+    if (folder / SOURCE_FILE).is_file() and _is_kept(run, source, choices):
+        imported = ImportedScene.read(folder)
+        if settings.strict:
+            check_strict(imported)
+        return imported
+    check_source(source)
+    check_place(run)
+    lock = Lock(run)
+    try:
+        sweep(run)
+        imported = import_file(
+            source, folder, choices, limits, monitor, program=settings.program, is_strict=settings.strict
+        )
+    finally:
+        lock.release()
+    monitor.message(imported.summary)
+    for group in grouped(imported.notes_of(NoteKind.NOT_CARRIED)):
+        monitor.message(f"not carried over: {group.listed}: {group.what}; {group.effect}")
+    return imported
+
+
+def _is_kept(run: Path, source: Path, choices: Choices) -> bool:
+    """Whether the imported scene of a run is that of the file; a run that has begun is bound to it.
+
+    Raises
+    ------
+    SceneError
+        The file is missing.
+    RunFolderError
+        The run has begun, and the file or the choices are others.
+    """
+    if not source.is_file():
+        raise SceneError(
+            f"there is no file {source}; the run has its scene: `enfilade work {run}` continues without it"
+        )
+    changes = Source.read(run / SCENE_FOLDER).differences(source, choices)
+    if changes and (run / RUN_FILE).exists():
+        listed = "".join(f"\n  {change}" for change in changes)
+        raise RunFolderError(
+            f"{run} holds a run of another import:{listed}\nChoose another --out, or delete {run} to begin "
+            "anew"
+        )
+    return not changes

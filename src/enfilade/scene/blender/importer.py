@@ -1,0 +1,176 @@
+"""Import of a file into a scene folder: written beside, checked, renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from enfilade.camera import load_path
+from enfilade.errors import CameraPathError, SceneError, SettingsError
+from enfilade.files import read_json, whole_folder, write_json
+from enfilade.images.view import files_of_view
+from enfilade.monitor import Monitor
+from enfilade.scene.blender.find import Blender, find_blender
+from enfilade.scene.blender.imported import SETTINGS_FILE, ImportedScene, SourceView
+from enfilade.scene.blender.notes import Note, NoteKind, grouped
+from enfilade.scene.blender.process import RESULT_FILE, run_job
+from enfilade.scene.blender.source import Choices, Source, check_source
+from enfilade.settings import LimitSettings, VideoSettings
+
+__all__ = ["check_strict", "import_file", "job_table"]
+
+COLORS = "colormanagement"  # folder of the configuration of OpenColorIO, in Blender and in the scene folder
+CONFIG = "config.ocio"
+SHOWN = 8  # parts that are not carried over, in the message of --strict
+
+
+def import_file(
+    source: Path,
+    out: Path,
+    choices: Choices,
+    limits: LimitSettings,
+    monitor: Monitor,
+    *,
+    program: str = "",
+    is_strict: bool = False,
+) -> ImportedScene:
+    """Import a file of Blender, or of a format that Blender reads, into a scene folder.
+
+    Parameters
+    ----------
+    source
+    out
+        The scene folder. An existing one is replaced when the import has succeeded.
+    choices
+    limits
+    monitor
+    program
+        See :func:`~enfilade.scene.blender.find.find_blender`.
+    is_strict
+        Whether a part that is not carried over is an error.
+
+    Raises
+    ------
+    SceneError
+        There is no Blender; the file is missing, damaged, refused, or too large; or a part of it is not
+        carried over, and that is an error.
+    RunFolderError, NoSpaceError
+        The folder can't be written.
+    """
+    check_source(source)
+    blender = find_blender(program)
+    if blender.note:
+        monitor.message(blender.note)
+    before, began = Source.of(source, choices), time.monotonic()
+    cpu_began = _cpu_of_children()
+    with whole_folder(out) as beside:
+        run_job(blender, job_table("export", source, beside, choices, limits), limits, monitor)
+        imported = _with_view(ImportedScene.read(beside), blender)
+        _check(imported, limits)
+        if is_strict:
+            check_strict(imported)
+        wall_s, cpu_s = time.monotonic() - began, _cpu_of_children() - cpu_began
+        replace(before, wall_s=round(wall_s, 2), cpu_s=round(cpu_s, 2)).write(beside)
+    return replace(imported, folder=out)
+
+
+def job_table(task: str, source: Path, out: Path, choices: Choices, limits: LimitSettings) -> dict[str, Any]:
+    """A job of the importer; the part that its tasks have in common."""
+    folders = [folder for folder in limits.allow.split(os.pathsep) if folder]
+    named = {name: value or None for name, value in asdict(choices).items()}
+    bounds = {
+        "instances": limits.import_instances,
+        "triangles": limits.import_triangles,
+        "seconds": limits.import_s,
+    }
+    files = {"source": str(source.resolve()), "out": str(out.resolve())}
+    return {"task": task, **files, **named, "limits": bounds, "library_folders": folders}
+
+
+def check_strict(imported: ImportedScene) -> None:
+    """Refuse a scene of which a part was not carried over.
+
+    Raises
+    ------
+    SceneError
+    """
+    lost = grouped(imported.notes_of(NoteKind.NOT_CARRIED))
+    if not lost:
+        return
+    lines = [f"\n  {group.listed}: {group.what}; {group.effect}" for group in lost[:SHOWN]]
+    more = f"\n  and {len(lost) - SHOWN} more" if len(lost) > SHOWN else ""
+    raise SceneError(
+        f"--strict refuses {imported.source}, of which this is not carried over:{''.join(lines)}{more}"
+    )
+
+
+def _check(imported: ImportedScene, limits: LimitSettings) -> None:
+    """Refuse a result that is no scene of Mitsuba, or has no valid camera path."""
+    from enfilade.scene.mitsuba.files import check_scene
+
+    try:
+        check_scene(imported.scene_file, limits)
+        if imported.path_file is not None:
+            load_path(imported.path_file)
+    except CameraPathError as error:
+        raise SceneError(f"{imported.source}: its camera can't be used: {error}") from error
+    except SceneError as error:
+        raise SceneError(f"{imported.source} was imported as a scene that can't be used: {error}") from error
+
+
+def _with_view(imported: ImportedScene, blender: Blender) -> ImportedScene:
+    """Write the settings that come from the file, with Blender's view transform if it can be used."""
+    video, problem = _video(imported.view, blender, imported.folder)
+    notes = imported.notes
+    if problem:
+        view = imported.view
+        name = view.view_transform + ("" if view.look == "None" else f", look {view.look}")
+        what = f"view transform {name} on {view.display}: {problem}"
+        effect = "the video has the standard sRGB view: highlights clip, and contrast and saturation differ"
+        notes = (*notes, Note(NoteKind.NOT_CARRIED, imported.scene, "Color Management", what, effect))
+        result = imported.folder / RESULT_FILE
+        write_json(result, {**read_json(result), "notes": [note.to_json() for note in notes]})
+    tables: dict[str, dict[str, Any]] = {"viewing": {"exposure_ev": imported.exposure_ev}, "video": video}
+    (imported.folder / SETTINGS_FILE).write_text(_toml(tables), encoding="utf-8")
+    return replace(imported, notes=notes)
+
+
+def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, str], str]:
+    """Settings of the video for a view, whose files are copied; or none, and why."""
+    if view.is_standard:
+        return {}, ""
+    config = blender.color_config()
+    if config is None:
+        return {}, f"{blender.program} has no {CONFIG} where it is expected"
+    look = "" if view.look == "None" else view.look
+    chosen = VideoSettings(ocio=str(config), display=view.display, view=view.view_transform, look=look)
+    try:
+        files = files_of_view(chosen)
+    except SettingsError as error:
+        return {}, str(error)
+    for file in files:
+        copy = folder / COLORS / file.relative_to(config.parent)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copy)
+    named = {"display": view.display, "view": view.view_transform, "look": look}
+    return {"ocio": f"{COLORS}/{CONFIG}", **named}, ""
+
+
+def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Tables of numbers and strings; JSON's strings are TOML's."""
+    lines = ["# Settings of the imported file, for --settings."]
+    for name, table in tables.items():
+        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _cpu_of_children() -> float:
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera of every frame, as nerfstudio's ``camera_path.json``.
+
+Blender's cameras look along -z with y up, as the file wants; the world stays Blender's, with z up.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Selection, View
+
+MM = 1000.0
+
+
+def read_views(selection: Selection, notes: Notes) -> list[View]:
+    """The views of all frames; empty without a perspective camera."""
+    views = []
+    for frame in range(selection.frames[0], selection.frames[1] + 1):
+        selection.scene.frame_set(frame)
+        camera = selection.scene.camera
+        if camera is None:
+            return []
+        if camera.type != "CAMERA" or camera.data.type != "PERSP":
+            kind = camera.data.type.lower() if camera.type == "CAMERA" else camera.type.lower()
+            effect = "there is no camera path of the file: give one"
+            notes.add("not-carried", camera.name, "Camera", f"a camera of the kind {kind}", effect)
+            return []
+        views.append(_view(camera, selection))
+    _note_lenses(views, selection, notes)
+    return views
+
+
+def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
+    """Content of ``camera_path.json``.
+
+    Beside nerfstudio's keys, a frame may have ``principal_point`` (shares of width and height, from the
+    left and the top), ``aperture_radius`` and ``focus_distance`` (scene units); the path has ``cuts``
+    (numbers of frames, from 1, that begin a shot), ``shutter`` (share of a frame) and ``first_frame``, the
+    number of its first frame in Blender.
+    """
+    render = selection.scene.render
+    cuts = [i for i in range(2, len(views) + 1) if views[i - 1].name != views[i - 2].name]
+    frames = [{"camera_to_world": view.pose.tolist(), "fov": view.fov_deg, **view.lens} for view in views]
+    return {
+        "camera_type": "perspective",
+        "render_width": selection.size[0],
+        "render_height": selection.size[1],
+        "fps": render.fps / render.fps_base,
+        "first_frame": selection.frames[0],
+        "cuts": cuts,
+        **({"shutter": render.motion_blur_shutter} if render.use_motion_blur else {}),
+        "camera_path": frames,
+    }
+
+
+def _view(camera: Any, selection: Selection) -> View:
+    graph = bpy.context.evaluated_depsgraph_get()
+    evaluated = camera.evaluated_get(graph)
+    place, rotation, _scale = evaluated.matrix_world.decompose()
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = np.array(rotation.to_matrix()), np.array(place)
+    width, height = selection.size
+    render = selection.scene.render
+    projection = np.array(
+        evaluated.calc_matrix_camera(
+            graph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
+        )
+    )
+    lens: dict[str, Any] = {}
+    if max(abs(projection[0, 2]), abs(projection[1, 2])) > 1e-7:
+        lens["principal_point"] = [0.5 * (1.0 - projection[0, 2]), 0.5 * (1.0 + projection[1, 2])]
+    data = evaluated.data
+    if data.dof.use_dof:
+        lens["aperture_radius"] = 0.5 * data.lens / MM / max(data.dof.aperture_fstop, 1e-3)
+        lens["focus_distance"] = _focus(evaluated, graph)
+    return View(camera.name, pose, projection, lens)
+
+
+def _focus(camera: Any, graph: Any) -> float:
+    """Distance of the focus along the optical axis, scene units."""
+    target = camera.data.dof.focus_object
+    if target is None:
+        return float(camera.data.dof.focus_distance)
+    place = target.evaluated_get(graph).matrix_world.translation
+    axis = -(camera.matrix_world.to_3x3().col[2]).normalized()
+    return float(abs((place - camera.matrix_world.translation).dot(axis)))
+
+
+def _note_lenses(views: list[View], selection: Selection, notes: Notes) -> None:
+    for name in dict.fromkeys(view.name for view in views):
+        lenses = [view.lens for view in views if view.name == name]
+        if any("principal_point" in lens for lens in lenses):
+            what, effect = (
+                "in the camera path; used where the renderer has it",
+                "else the picture is framed without the shift",
+            )
+            notes.add("approximated", name, "Lens shift", what, effect)
+        if any("aperture_radius" in lens for lens in lenses):
+            what = "in the camera path; used where the renderer has lenses"
+            notes.add("not-carried", name, "Depth of field", what, "else everything is in focus")
+    render = selection.scene.render
+    if render.use_motion_blur:
+        notes.add(
+            "not-carried", selection.scene.name, "Motion blur", "in the camera path", "frames are sharp"
+        )
+    if render.pixel_aspect_x != render.pixel_aspect_y:
+        what, effect = "pixels are taken as square", "the picture is stretched"
+        notes.add("not-carried", selection.scene.name, "Pixel aspect", what, effect)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated scene as a renderer sees it: meshes after modifiers, with all their instances.
+
+Blender hands the scene of a render, rather than that of its viewport, to render engines only. This module
+is one which renders nothing: visibility, modifiers and levels of subdivision are those of renders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+
+from enfilade_blender.failure import ExportError
+from enfilade_blender.job import Limits
+from enfilade_blender.mesh_data import read_mesh
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
+
+ENGINE = "ENFILADE_EXPORT"
+SURFACES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
+NOT_CARRIED = {
+    "CURVES": "hair curves",
+    "POINTCLOUD": "a point cloud",
+    "VOLUME": "a volume",
+    "GREASEPENCIL": "grease pencil",
+    "GPENCIL": "grease pencil",
+}
+RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
+
+
+class _Engine(bpy.types.RenderEngine):  # type: ignore[misc]
+    bl_idname = ENGINE
+    bl_label = "enfilade export"
+    bl_use_preview = False
+    visit: Callable[[Any], None] | None = None
+    error: Exception | None = None
+    is_done = False
+
+    def render(self, depsgraph: Any) -> None:
+        """Visit the scene; Blender swallows errors of engines, so they are kept."""
+        try:
+            if _Engine.visit is not None:
+                _Engine.visit(depsgraph)
+                _Engine.is_done = True
+        except (ExportError, MemoryError) as error:
+            _Engine.error = error
+
+
+def evaluate(selection: Selection, limits: Limits, notes: Notes) -> Evaluated:
+    """Evaluate the selection at its first frame.
+
+    Raises
+    ------
+    ExportError
+        There are more instances or triangles than the limits allow.
+    """
+    selection.scene.frame_set(selection.frames[0])
+    result = Evaluated()
+    _Engine.visit = lambda graph: _read(graph, result, limits, notes)
+    _Engine.error, _Engine.is_done = None, False
+    bpy.utils.register_class(_Engine)
+    try:
+        _render(selection)
+    finally:
+        bpy.utils.unregister_class(_Engine)
+    if _Engine.error is not None:
+        raise _Engine.error
+    if not _Engine.is_done:
+        raise RuntimeError("the evaluated scene was not read; the error is printed above")
+    return result
+
+
+def _render(selection: Selection) -> None:
+    """Render nothing, in 8x8 pixels, by a camera of our own where there is none."""
+    scene, render = selection.scene, selection.scene.render
+    before = (
+        render.engine,
+        render.resolution_x,
+        render.resolution_y,
+        render.use_compositing,
+        render.use_sequencer,
+    )
+    camera, own = scene.camera, None
+    if camera is None:
+        own = bpy.data.objects.new("enfilade camera", bpy.data.cameras.new("enfilade camera"))
+        scene.collection.objects.link(own)
+        scene.camera = own
+    render.engine, render.resolution_x, render.resolution_y = ENGINE, 8, 8
+    render.use_compositing = render.use_sequencer = False
+    for layer in scene.view_layers:
+        layer.use = layer == selection.view_layer
+    bpy.ops.render.render(scene=scene.name)
+    render.engine, render.resolution_x, render.resolution_y, render.use_compositing, render.use_sequencer = (
+        before
+    )
+    scene.camera = camera
+    if own is not None:
+        bpy.data.objects.remove(own)
+
+
+def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
+    _check_generated(graph, limits)
+    by_key: dict[Any, Placed | None] = {}
+    for instance in graph.object_instances:
+        obj = instance.object
+        result.instances += 1
+        if result.instances > limits.instances:
+            raise _too_many(limits, instance.parent.name if instance.parent else obj.name)
+        if not instance.show_self:
+            continue
+        matrix = np.array(instance.matrix_world, np.float64)
+        if obj.type == "LIGHT":
+            result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))
+        elif obj.type in NOT_CARRIED:
+            what = f"{NOT_CARRIED[obj.type]} can't be exported"
+            notes.add("not-carried", obj.name, "Object", what, "it is missing from the picture")
+        elif obj.type in SURFACES:
+            key = (_name(instance), obj.name_full, obj.data.as_pointer() if obj.data else 0)
+            if key not in by_key:
+                by_key[key] = _place(instance, graph, notes)
+            placed = by_key[key]
+            if placed is not None:
+                placed.matrices.append(matrix)
+                result.triangles += len(placed.mesh)
+        if result.triangles > limits.triangles:
+            raise ExportError(
+                f"the scene has more than {limits.triangles} triangles",
+                obj.name,
+                "lower its levels of subdivision or its number of instances, or raise the limit",
+            )
+    result.placed = [placed for placed in by_key.values() if placed is not None]
+
+
+def _check_generated(graph: Any, limits: Limits) -> None:
+    """Refuse too many instances of geometry nodes before Blender lists them, which takes 400 bytes each."""
+    total = 0
+    for obj in graph.objects:
+        if not hasattr(obj, "evaluated_geometry") or all(m.type != "NODES" for m in obj.modifiers):
+            continue
+        geometry = obj.evaluated_geometry()  # owns the points
+        points = geometry.instances_pointcloud()
+        total += len(points.points) if points is not None else 0
+        if total > limits.instances:
+            raise _too_many(limits, obj.name)
+
+
+def _too_many(limits: Limits, name: str) -> ExportError:
+    what, advice = (
+        f"the scene has more than {limits.instances} instances",
+        "reduce its scattered objects, or raise the limit",
+    )
+    return ExportError(what, name, advice)
+
+
+def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
+    obj = instance.object
+    _note_object(obj, notes)
+    mesh = read_mesh(obj, graph)
+    if mesh is None or len(mesh) == 0:
+        return None
+    slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)
+    return Placed(_name(instance), mesh, slots, is_instance=instance.is_instance)
+
+
+def _name(instance: Any) -> str:
+    obj = instance.object
+    return (
+        f"{instance.parent.name}: {obj.name}" if instance.is_instance and instance.parent else str(obj.name)
+    )
+
+
+def _note_object(obj: Any, notes: Notes) -> None:
+    hidden = [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]
+    if hidden:
+        what = f"hidden from {', '.join(hidden)} rays in Blender"
+        notes.add("not-carried", obj.name, "Ray visibility", what, "it is visible to all rays")
+    if getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False):
+        notes.add("not-carried", obj.name, "Shadow catcher or holdout", "an ordinary object", "it is visible")
+    for system in getattr(obj, "particle_systems", ()):
+        if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+            what = "hair can't be exported"
+            notes.add(
+                "not-carried", obj.name, f"Particles {system.name}", what, "it is missing from the picture"
+            )

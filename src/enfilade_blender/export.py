@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports a Blender file: scene, meshes, textures, camera path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from enfilade_blender.camera import camera_path, read_views
+from enfilade_blender.evaluate import evaluate
+from enfilade_blender.job import Job
+from enfilade_blender.lights import emitters, note_seen, split_suns
+from enfilade_blender.limits import check_size
+from enfilade_blender.motion import note_motion
+from enfilade_blender.notes import Notes, report_progress
+from enfilade_blender.open_file import open_source
+from enfilade_blender.records import Selection
+from enfilade_blender.run import write_json
+from enfilade_blender.scene_xml import Element, plugin, write_scene
+from enfilade_blender.shapes import Shapes
+from enfilade_blender.world import environment
+
+
+def export(job: Job) -> dict[str, Any]:
+    """Write the scene's folder; content of ``import.json``.
+
+    Raises
+    ------
+    ExportError
+        The file can't be opened, or passes a limit.
+    """
+    notes = Notes()
+    report_progress(0.0, "open")
+    selection = open_source(job)
+    check_size(selection, job.limits)
+    report_progress(0.05, "cameras")
+    note_motion(selection, notes)
+    views = read_views(selection, notes)
+    if views:
+        write_json(job.out / "camera_path.json", camera_path(views, selection))
+    report_progress(0.1, "meshes")
+    evaluated = evaluate(selection, job.limits, notes)
+    report_progress(0.3, "materials")
+    shapes = Shapes(job, selection, views, notes)
+    elements = shapes.write(evaluated.placed)
+    report_progress(0.9, "lights")
+    lamps, sun = split_suns(evaluated.lamps, notes)
+    note_seen(lamps, sun, views, selection.size, notes)
+    identifiers = shapes.identifiers
+    for lamp in lamps:
+        elements += emitters(lamp, identifiers, notes)
+    elements += environment(selection, sun, job.out, notes)
+    write_scene(job.out / "scene.xml", [_integrator(selection, shapes.has_glass), *elements])
+    counts = {
+        "objects": len(evaluated.placed),
+        "instances": evaluated.instances,
+        "triangles": evaluated.triangles,
+        "materials": shapes.material_count,
+        "textures": len(shapes.textures),
+    }
+    return {**_facts(job, selection), "counts": counts, "notes": notes.to_list()}
+
+
+def _facts(job: Job, selection: Selection) -> dict[str, Any]:
+    scene = selection.scene
+    view = scene.view_settings
+    return {
+        "format": "enfilade-import",
+        "version": 1,
+        "blender": bpy.app.version_string.split()[0],
+        "source": job.source.name,
+        "scene": scene.name,
+        "camera": scene.camera.name if scene.camera else None,
+        "fps": scene.render.fps / scene.render.fps_base,
+        "frames": list(selection.frames),
+        "size": list(selection.size),
+        "exposure_ev": view.exposure,
+        "view": {
+            "display": scene.display_settings.display_device,
+            "view_transform": view.view_transform,
+            "look": view.look,
+        },
+    }
+
+
+def _integrator(selection: Selection, has_glass: bool) -> Element:
+    """A path tracer with the file's limit of bounces.
+
+    Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
+    smaller one; glass needs further bounces.
+    """
+    cycles = selection.scene.cycles
+    bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
+    if has_glass:
+        bounces = min(cycles.max_bounces, bounces + 4)
+    return plugin("integrator", "path", max_depth=bounces + 2)

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's lights as emitters of Mitsuba.
+
+Cycles' lamps do not block light, and the camera does not see them. Mitsuba's have neither property.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.materials.mapping import spot_ramp
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp, View
+from enfilade_blender.scene_xml import Element, Identifiers, plugin
+
+Colour = tuple[float, float, float]
+FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
+TINY = 1e-5
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A sun that is a disc of the environment.
+
+    Attributes
+    ----------
+    name : str
+    direction : (3,) float64
+        Towards the sun.
+    irradiance : tuple
+        On a surface that faces it.
+    angle : float
+        Diameter, radians.
+    """
+
+    name: str
+    direction: np.ndarray
+    irradiance: Colour
+    angle: float
+
+
+def point_intensity(power: float) -> float:
+    """Radiant intensity of a point or spot light of a power in Blender's watts."""
+    return power / (4.0 * math.pi)
+
+
+def sphere_radiance(power: float, radius: float) -> float:
+    """Radiance of a point light with a radius."""
+    return power / (4.0 * math.pi**2 * radius**2)
+
+
+def area_radiance(power: float, area: float) -> float:
+    """Radiance of an area light, Lambertian."""
+    return power / (math.pi * area)
+
+
+def lamp_colour(data: Any) -> Colour:
+    """Colour times power (or strength), with temperature and exposure, of a light's settings."""
+    scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    tint = data.temperature_color if getattr(data, "use_temperature", False) else (1.0, 1.0, 1.0)
+    r, g, b = (float(c) * float(t) * scale for c, t in zip(data.color, tint, strict=True))
+    return r, g, b
+
+
+def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]:
+    """Lamps that are emitters of their own, and the brightest sun that has a disc."""
+    soft = [
+        lamp
+        for lamp in lamps
+        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp.data)) > 0
+    ]
+    if not soft:
+        return lamps, None
+    brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp.data)))
+    for lamp in soft:
+        if lamp is not brightest:
+            what, effect = "a sun beside a brighter one has no disc", "its shadows have sharp edges"
+            notes.add("approximated", lamp.name, "Angle", what, effect)
+    direction = _axis(brightest.matrix)
+    sun = Sun(brightest.name, direction, lamp_colour(brightest.data), float(brightest.data.angle))
+    return [lamp for lamp in lamps if lamp is not brightest], sun
+
+
+def note_seen(
+    lamps: list[Lamp], sun: Sun | None, views: list[View], size: tuple[int, int], notes: Notes
+) -> None:
+    """Note lamps and a sun in the field of view of a frame: Cycles does not show them to the camera."""
+    what = "the lamp is seen where nothing hides it"
+    for lamp in lamps:
+        data, place = lamp.data, lamp.matrix[:3, 3]
+        has_shape = data.type == "AREA" or (data.type == "POINT" and data.shadow_soft_size > TINY)
+        lit = [v for v in views if data.type != "AREA" or (place - v.pose[:3, 3]) @ _axis(lamp.matrix) > 0.0]
+        if has_shape and any(_is_in(view, place, size) for view in lit):
+            notes.add("approximated", lamp.name, "Light", what, "a bright shape where Cycles shows none")
+    if sun is not None and any(_is_in(view, view.pose[:3, 3] + sun.direction, size) for view in views):
+        notes.add("approximated", sun.name, "Sun", what, "a bright disc in the sky where Cycles shows none")
+
+
+def _is_in(view: View, place: np.ndarray, size: tuple[int, int]) -> bool:
+    x, y, depth = view.pixels(place[None], size)[0]
+    return bool(depth > 0.0 and 0.0 <= x <= size[0] and 0.0 <= y <= size[1])
+
+
+def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
+    """Elements of one lamp; none for a dark one."""
+    data, name = lamp.data, lamp.name
+    colour = lamp_colour(data)
+    if max(colour) <= 0.0:
+        return []
+    _note_unusual(lamp, notes)
+    if data.type == "SUN":
+        sun = plugin("emitter", "directional", irradiance=colour)
+        sun.append(_vector("direction", -_axis(lamp.matrix)))
+        return [sun]
+    if data.type == "AREA":
+        return [_area(lamp, colour, identifiers)]
+    if data.type == "SPOT":
+        return [_spot(lamp, colour, notes)]
+    radius = float(data.shadow_soft_size)
+    place = lamp.matrix[:3, 3]
+    if radius <= TINY:
+        emitter = plugin("emitter", "point", intensity=_scaled(colour, point_intensity(1.0)))
+        emitter.append(_vector("position", place, tag="point"))
+        return [emitter]
+    light = plugin("emitter", "area", radiance=_scaled(colour, sphere_radiance(1.0, radius)))
+    shape = plugin("shape", "sphere", light, plugin("bsdf", "null"), radius=radius)
+    shape.append(_vector("center", place, tag="point"))
+    shape.set("id", identifiers.unique(name))
+    return [shape]
+
+
+def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
+    data = lamp.data
+    is_round = data.shape in ("DISK", "ELLIPSE")
+    width = float(data.size)
+    height = width if data.shape in ("SQUARE", "DISK") else float(data.size_y)
+    axes = lamp.matrix @ np.diag([0.5 * width, 0.5 * height, 1.0, 1.0])
+    area = float(np.linalg.norm(np.cross(axes[:3, 0], axes[:3, 1]))) * (math.pi if is_round else 4.0)
+    radiance = _scaled(colour, area_radiance(1.0, max(area, 1e-12)))
+    if not getattr(data, "normalize", True):
+        radiance = _scaled(radiance, area)
+    matrix = axes @ FORWARD
+    matrix[:3, 2] /= max(np.linalg.norm(matrix[:3, 2]), 1e-12)
+    light = plugin("emitter", "area", radiance=radiance)
+    shape = plugin(
+        "shape", "disk" if is_round else "rectangle", light, plugin("bsdf", "null"), to_world=matrix
+    )
+    shape.set("id", identifiers.unique(lamp.name))
+    return shape
+
+
+def _spot(lamp: Lamp, colour: Colour, notes: Notes) -> Element:
+    data = lamp.data
+    outer, inner = spot_ramp(0.5 * float(data.spot_size), float(data.spot_blend))
+    if data.shadow_soft_size > TINY:
+        what, effect = f"its radius of {data.shadow_soft_size:.3g} is left out", "shadows have sharp edges"
+        notes.add("approximated", lamp.name, "Radius", what, effect)
+    matrix = lamp.matrix @ FORWARD
+    matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
+    return plugin(
+        "emitter", "spot", intensity=_scaled(colour, point_intensity(1.0)), to_world=matrix,
+        cutoff_angle=math.degrees(outer), beam_width=math.degrees(inner),
+    )  # fmt: skip
+
+
+def _note_unusual(lamp: Lamp, notes: Notes) -> None:
+    data = lamp.data
+    if data.use_nodes and data.node_tree is not None and len(data.node_tree.nodes) > 2:
+        notes.add("not-carried", lamp.name, "Nodes", "its nodes are left out", "light has no pattern")
+    if data.type == "AREA" and getattr(data, "spread", math.pi) < math.pi - 1e-3:
+        what, effect = "its spread is left out", "light reaches all directions"
+        notes.add("not-carried", lamp.name, "Spread", what, effect)
+    if not data.use_shadow:
+        notes.add(
+            "not-carried", lamp.name, "Shadow", "it casts shadows", "shadows are where Blender has none"
+        )
+
+
+def _axis(matrix: np.ndarray) -> np.ndarray:
+    axis: np.ndarray = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    return axis
+
+
+def _scaled(colour: Colour, scale: float) -> Colour:
+    return colour[0] * scale, colour[1] * scale, colour[2] * scale
+
+
+def _vector(name: str, values: np.ndarray, tag: str = "vector") -> Element:
+    x, y, z = (f"{value:.9g}" for value in values)
+    return Element(tag, name=name, x=x, y=y, z=z)

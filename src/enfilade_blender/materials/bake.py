@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes what has no counterpart in Mitsuba: Cycles evaluates a node's output over the mesh, into a texture.
+
+A value of images and colour corrections alone is baked once over the unit square of texture coordinates.
+Any other is baked for each object, over texture coordinates that are made for it; then all textures of the
+material are, since a mesh has one set of coordinates in Mitsuba.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.image_files import F32
+from enfilade_blender.job import Job
+from enfilade_blender.materials.bake_scene import BakeScene
+from enfilade_blender.materials.graph import upstream
+from enfilade_blender.materials.textures import Textures
+from enfilade_blender.materials.values import (
+    AttributeValue,
+    Constant,
+    ImageValue,
+    NormalMap,
+    Output,
+    Procedural,
+    ProceduralNormal,
+    Shader,
+    Texture,
+    Value,
+    replaced,
+    values_of,
+)
+from enfilade_blender.notes import Notes
+from enfilade_blender.ply import Mesh
+from enfilade_blender.records import Placed, Selection, View
+
+BAKED_UV = "enfilade"
+SMALLEST = 64  # pixels
+PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
+UNIFORM = 2e-3  # standard deviation below which a texture is a constant
+CONSTANT_PX = 8
+
+
+class Bakery:
+    """Bakes procedural values.
+
+    Parameters
+    ----------
+    job, selection, views, textures, notes
+    """
+
+    def __init__(
+        self, job: Job, selection: Selection, views: list[View], textures: Textures, notes: Notes
+    ) -> None:
+        self._job, self._selection, self._views = job, selection, views
+        self._textures, self._notes = textures, notes
+        self._of_uv: dict[Any, Value] = {}
+        self._scene: BakeScene | None = None
+
+    def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
+        """A shader without procedural values, its mesh, and whether it is this object's own."""
+        wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
+        uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
+        if not wanted and len(uv_maps) <= 1:
+            return shader, mesh, False
+        if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
+            uv_map = next(iter(uv_maps), "")
+            return replaced(shader, lambda value: self._over_uv(value, material, uv_map)), mesh, False
+        size = self._resolution(placed, mesh)
+        with self._stage().mesh(mesh, placed) as canvas:
+            mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
+            own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, size))
+        return own, mesh, True
+
+    def _stage(self) -> BakeScene:
+        if self._scene is None:
+            self._scene = BakeScene(self._job.bake_samples)
+        return self._scene
+
+    def _over_uv(self, value: Any, material: Any, uv_map: str) -> Any:
+        if not isinstance(value, Procedural):
+            return value
+        key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
+        if key not in self._of_uv:
+            sizes = [max(image.size) for image in _images(value.output)]
+            size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
+            with self._stage().square(uv_map) as canvas:
+                pixels, _ = canvas.bake(value.output, material, size)
+            self._of_uv[key] = self._stored(
+                pixels, None, value, material.name, uv_map, "the unit square of UV"
+            )
+        return self._of_uv[key]
+
+    def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
+        if isinstance(value, Constant | AttributeValue | Texture):
+            return value
+        if isinstance(value, ImageValue) and self._textures.is_missing(value):
+            return Constant((0.5, 0.5, 0.5))
+        is_normal = isinstance(value, ProceduralNormal)
+        pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
+        if is_normal:
+            file = self._textures.write(f"{placed.name} normal", np.clip(pixels, 0.0, 1.0), raw=True)
+            self._note(value.output, material.name, placed.name, size)
+            return NormalMap(Texture(file, BAKED_UV, (0.5, 0.5, 1.0), raw=True), 1.0)
+        return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV, placed.name)
+
+    def _stored(
+        self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str, where: str
+    ) -> Value:
+        """A baked value: a constant where it is uniform, else a file."""
+        inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
+        mean = inside.mean(axis=0)
+        colour = (float(mean[0]), float(mean[1]), float(mean[2]))
+        if inside.std(axis=0).max() <= UNIFORM * max(1.0, float(mean.max())):
+            return Constant(colour)
+        output = value.output
+        is_data = output.socket.type != "RGBA" or pixels.max() > 1.0
+        file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
+        self._note(output, name, where, len(pixels))
+        if isinstance(value, Procedural) and value.is_of_view:
+            effect = "as seen along the normal from all directions"
+            self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
+        return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
+
+    def _note(self, output: Output, name: str, where: str, size: int) -> None:
+        what = f"baked to {size}x{size} pixels over {where}"
+        self._notes.add(
+            "baked",
+            name,
+            f"{output.node.name}: {output.socket.name}",
+            what,
+            "detail is limited to its pixels",
+        )
+
+    def _resolution(self, placed: Placed, mesh: Mesh) -> int:
+        """A power of two, by the object's largest size in the views of the path."""
+        local = np.concatenate([mesh.positions.min(axis=0), mesh.positions.max(axis=0)]).reshape(2, 3)
+        nearest = 0.0
+        for matrix in placed.matrices[:64]:
+            low, high = (matrix[:3, :3] @ point + matrix[:3, 3] for point in local)
+            centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+            for view in self._views[:: max(len(self._views) // 64, 1)]:
+                distance = max(float(np.linalg.norm(view.pose[:3, 3] - centre)) - radius, 0.25 * radius, 1e-6)
+                focal = 0.5 * view.projection[1, 1] * self._selection.size[1]
+                nearest = max(nearest, 2.0 * radius / distance * focal)
+        wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
+        power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
+        return int(min(power, self._job.bake_px))
+
+
+def _images(output: Output) -> list[Any]:
+    """Images that an output depends on."""
+    nodes = [found.node for found in upstream(output) if found.node.type == "TEX_IMAGE"]
+    return [node.image for node in nodes if node.image is not None]
+
+
+def _uv_maps(value: Any) -> list[str]:
+    """UV map that a value looks images up by; empty for other values."""
+    if isinstance(value, ImageValue):
+        return [value.uv_map]
+    is_of_uv = isinstance(value, Procedural) and value.uv_map is not None and _images(value.output)
+    return [value.uv_map] if is_of_uv else []

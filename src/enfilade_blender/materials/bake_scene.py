@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene with one mesh, on which Cycles bakes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+import numpy as np
+
+from enfilade_blender.image_files import F32
+from enfilade_blender.materials.textures import linear_pixels
+from enfilade_blender.materials.values import Output
+from enfilade_blender.ply import Mesh
+from enfilade_blender.records import Placed
+
+MARGIN_PX = 8
+ISLAND_MARGIN = 0.01  # of the square
+SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
+TARGET = "enfilade target"
+
+
+class BakeScene:
+    """The scene; made once for a job.
+
+    Parameters
+    ----------
+    samples : int
+        Of Cycles, for a texel.
+    """
+
+    def __init__(self, samples: int) -> None:
+        scene = bpy.data.scenes.new("enfilade bake")
+        scene.render.engine = "CYCLES"
+        scene.cycles.samples, scene.cycles.use_denoising = samples, False
+        scene.cycles.use_adaptive_sampling = False
+        scene.render.bake.margin = MARGIN_PX
+        scene.render.bake.use_selected_to_active = False
+        scene.render.bake.normal_space = "TANGENT"
+        self._scene = scene
+
+    @contextmanager
+    def mesh(self, mesh: Mesh, placed: Placed) -> Iterator[Canvas]:
+        """A copy of a mesh, where its first copy is; the whole object spans its generated coordinates."""
+        data = _data(mesh)
+        low, high = placed.mesh.positions.min(axis=0), placed.mesh.positions.max(axis=0)
+        data.use_auto_texspace = False
+        data.texspace_location = 0.5 * (low + high)
+        data.texspace_size = np.maximum(0.5 * (high - low), 1e-6)
+        with self._canvas(data, placed.matrices[0]) as canvas:
+            yield canvas
+
+    @contextmanager
+    def square(self, uv_map: str) -> Iterator[Canvas]:
+        """The unit square, which is its own texture coordinates, by the name of a UV map."""
+        corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+        triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+        normals = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), (2, 3, 3))
+        uv = corners[triangles][..., :2]
+        name, slots = uv_map or "UVMap", np.zeros(2, np.int32)
+        with self._canvas(
+            _data(Mesh(corners, triangles, normals, {name: uv}, {}, slots, name)), np.eye(4)
+        ) as canvas:
+            yield canvas
+
+    @contextmanager
+    def _canvas(self, data: Any, matrix: np.ndarray) -> Iterator[Canvas]:
+        obj = bpy.data.objects.new("enfilade bake", data)
+        obj.matrix_world = matrix.T.tolist()
+        self._scene.collection.objects.link(obj)
+        before = bpy.context.window.scene
+        bpy.context.window.scene = self._scene
+        layer = self._scene.view_layers[0]
+        layer.objects.active = obj
+        obj.select_set(True)
+        try:
+            yield Canvas(obj)
+        finally:
+            bpy.context.window.scene = before
+            bpy.data.objects.remove(obj)
+            bpy.data.meshes.remove(data)
+
+
+class Canvas:
+    """An object to bake on."""
+
+    def __init__(self, obj: Any) -> None:
+        self._object = obj
+
+    def unwrap(self) -> F32:
+        """New texture coordinates without overlap, (N, 3, 2)."""
+        data = self._object.data
+        layer = data.uv_layers.new(name="enfilade")
+        data.uv_layers.active = layer
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.uv.smart_project(angle_limit=SMART_ANGLE, island_margin=ISLAND_MARGIN, scale_to_bounds=False)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        uv: F32 = np.empty(len(data.loops) * 2, np.float32)
+        data.uv_layers["enfilade"].uv.foreach_get("vector", uv)
+        return uv.reshape(-1, 3, 2)
+
+    def bake(
+        self, output: Output, material: Any, size: int, *, is_normal: bool = False
+    ) -> tuple[F32, np.ndarray]:
+        """Values of an output (size, size, 3), the first row on top, and the texels that the mesh covers."""
+        image = bpy.data.images.new(TARGET, size, size, alpha=True, float_buffer=True)
+        image.colorspace_settings.name = "Non-Color"
+        image.generated_color = (0.0, 0.0, 0.0, 0.0)
+        copy = material.copy()
+        _wire(copy.node_tree, output, image, is_normal=is_normal)
+        self._object.data.materials.clear()
+        self._object.data.materials.append(copy)
+        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=True)
+        rgba = linear_pixels(image)
+        groups = [node.node_tree for node in copy.node_tree.nodes if node.type == "GROUP"]
+        bpy.data.materials.remove(copy)
+        for group in groups:
+            if group.users == 0:
+                bpy.data.node_groups.remove(group)
+        bpy.data.images.remove(image)
+        return rgba[..., :3], rgba[..., 3] > 0.5
+
+
+def _data(mesh: Mesh) -> Any:
+    """A mesh of Blender, with normals, texture coordinates and colours."""
+    data = bpy.data.meshes.new("enfilade bake")
+    count = len(mesh)
+    data.vertices.add(len(mesh.positions))
+    data.vertices.foreach_set("co", mesh.positions.ravel())
+    data.loops.add(3 * count)
+    data.loops.foreach_set("vertex_index", mesh.triangles.ravel())
+    data.polygons.add(count)
+    data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    for name, uv in mesh.uvs.items():
+        layer = data.uv_layers.new(name=name)
+        layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
+        layer.active_render = name == mesh.active_uv
+    for name, colour in mesh.colours.items():
+        attribute = data.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
+        rgba = np.concatenate([colour, np.ones((count, 3, 1), np.float32)], axis=-1)
+        attribute.data.foreach_set("color", np.ascontiguousarray(rgba, np.float32).ravel())
+    data.update(calc_edges=True)
+    data.normals_split_custom_set(mesh.normals.reshape(-1, 3))
+    return data
+
+
+def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:
+    """Connect an output to the surface, and make an image the target of the bake."""
+    source = _exposed(tree, output.groups, output)
+    if is_normal:
+        shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        tree.links.new(source, shader.inputs["Normal"])
+    else:
+        shader = tree.nodes.new("ShaderNodeEmission")
+        tree.links.new(source, shader.inputs["Color"])
+    for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]:
+        tree.nodes.remove(node)
+    end = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(shader.outputs[0], end.inputs["Surface"])
+    target = tree.nodes.new("ShaderNodeTexImage")
+    target.image = image
+    for node in tree.nodes:
+        node.select = node == target
+    tree.nodes.active = target
+
+
+def _exposed(tree: Any, groups: tuple[Any, ...], output: Output) -> Any:
+    """The output's twin in a copied tree, led out of groups through new sockets of their copies."""
+    if not groups:
+        node = tree.nodes[output.node.name]
+        return next(socket for socket in node.outputs if socket.identifier == output.socket.identifier)
+    group = tree.nodes[groups[0].name]
+    group.node_tree = group.node_tree.copy()
+    inner = _exposed(group.node_tree, groups[1:], output)
+    item = group.node_tree.interface.new_socket("enfilade", in_out="OUTPUT", socket_type="NodeSocketColor")
+    ends = [node for node in group.node_tree.nodes if node.type == "GROUP_OUTPUT"]
+    end = next((node for node in ends if node.is_active_output), ends[0])
+    group.node_tree.links.new(inner, next(s for s in end.inputs if s.identifier == item.identifier))
+    return next(s for s in group.outputs if s.identifier == item.identifier)

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""BSDFs of Mitsuba for Blender's lobes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from enfilade_blender.materials import ggx, mapping
+from enfilade_blender.materials.textures import Textures
+from enfilade_blender.materials.values import (
+    AttributeValue,
+    Bump,
+    Constant,
+    ImageValue,
+    Lobe,
+    Normal,
+    NormalMap,
+    Texture,
+    Value,
+)
+from enfilade_blender.notes import Notes
+from enfilade_blender.scene_xml import Element, Property, colour, plugin
+
+SMOOTH = 1e-3  # alpha below which a surface is a mirror
+ALPHA_MIN = 0.01
+ROUGHEST_PLASTIC = 0.65  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
+WHITE = (1.0, 1.0, 1.0)
+NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
+TRANSMITTING = {
+    "principledthin",
+    "dielectric",
+    "roughdielectric",
+    "thindielectric",
+    "null",
+    "mask",
+    "twosided",
+}
+ALMOST = 0.995  # weights above are 1, below the rest 0
+
+
+@dataclass(frozen=True)
+class Context:
+    """What all functions of this module need: the material's name, textures and notes."""
+
+    owner: str
+    textures: Textures
+    notes: Notes
+
+
+def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
+    """BSDF of a closure with one lobe."""
+    builders = {
+        "diffuse": _diffuse_lobe,
+        "glossy": _glossy_lobe,
+        "glass": _glass_lobe,
+        "translucent": _translucent_lobe,
+    }
+    return with_normal(builders[lobe.kind](lobe, context), lobe.normal, context)
+
+
+def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) -> Element:
+    """Diffuse reflection below a dielectric interface.
+
+    A textured roughness is a blend of two constant ones. A colour attribute is below a layer: `roughplastic`
+    would ask for its mean.
+    """
+    if ior < 1.01:
+        return plugin("bsdf", "diffuse", reflectance=context.textures.colour(base))
+    if isinstance(base, AttributeValue):
+        diffuse = plugin("bsdf", "diffuse", reflectance=context.textures.colour(base))
+        return layered(diffuse, Constant((1.0,)), ior, roughness, WHITE, context)
+    if isinstance(roughness, Constant):
+        return _plastic_of(base, roughness.number, ior, context)
+    low, high, weight = _two_roughnesses(roughness, context)
+    return plugin(
+        "bsdf", "blendbsdf", *[_plastic_of(base, r, ior, context) for r in (low, high)], weight=weight
+    )
+
+
+def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
+    alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
+    if alpha < SMOOTH:
+        reflectance = context.textures.colour(base)
+        return plugin("bsdf", "plastic", int_ior=ior, ext_ior=1.0, diffuse_reflectance=reflectance)
+    alpha = max(alpha, ALPHA_MIN)
+    reflectance = context.textures.scaled(base, ggx.plastic_gain(round(alpha, 3), round(ior, 3)))
+    return plugin(
+        "bsdf", "roughplastic", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0,
+        diffuse_reflectance=reflectance,
+    )  # fmt: skip
+
+
+def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, Element | float]:
+    """Two roughnesses, and the share of the second; alpha is linear in between."""
+    if not isinstance(roughness, ImageValue | Texture):
+        return 0.5, 0.5, 0.5
+    if isinstance(roughness, ImageValue) and context.textures.is_missing(roughness):
+        return 0.5, 0.5, 0.5
+    pixels = context.textures.pixels(roughness).mean(axis=-1, keepdims=True)
+    low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
+    if high - low < 1e-2:
+        return low, high, 0.5
+    share = np.clip((pixels**2 - low**2) / (high**2 - low**2), 0.0, 1.0)
+    return low, high, context.textures.rewritten(roughness, share, "roughness")
+
+
+def two_sided(bsdf: Element) -> Element:
+    """The BSDF, whose opaque parts are seen from both sides."""
+    nested = [child for child in bsdf if child.tag == "bsdf"]
+    kinds = {element.get("type") for element in bsdf.iter("bsdf")}
+    if not kinds & TRANSMITTING:
+        return plugin("bsdf", "twosided", bsdf)
+    for child in nested:
+        index = list(bsdf).index(child)
+        bsdf.remove(child)
+        bsdf.insert(index, two_sided(child))
+    return bsdf
+
+
+def is_one(value: Value) -> bool:
+    """Whether a weight is 1 everywhere."""
+    return isinstance(value, Constant) and value.number >= ALMOST
+
+
+def is_zero(value: Value) -> bool:
+    """Whether a weight is 0 everywhere."""
+    return isinstance(value, Constant) and value.number <= 1.0 - ALMOST
+
+
+def _diffuse_lobe(lobe: Lobe, context: Context) -> Element:
+    if not is_zero(lobe.roughness):
+        what, effect = "the roughness of diffuse reflection is left out", "the surface is Lambertian"
+        context.notes.add("approximated", context.owner, lobe.name, what, effect)
+    return plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour))
+
+
+def _translucent_lobe(lobe: Lobe, context: Context) -> Element:
+    """Diffuse transmission alone: the thin principled BSDF without an interface."""
+    colour_value = context.textures.colour(lobe.colour)
+    return plugin(
+        "bsdf", "principledthin", base_color=colour_value, diff_trans=2.0, eta=NO_INTERFACE, roughness=0.5
+    )
+
+
+def _glossy_lobe(lobe: Lobe, context: Context) -> Element:
+    return conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
+
+
+def _glass_lobe(lobe: Lobe, context: Context) -> Element:
+    ior = (
+        lobe.ior.number if isinstance(lobe.ior, Constant) else float(np.mean(context.textures.mean(lobe.ior)))
+    )
+    return glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
+
+
+def glass_bsdf(
+    transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context
+) -> Element:
+    """Glass of two tints; of rough glass, energy that single scattering loses is restored."""
+    ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
+    alpha = _alpha(roughness, context)
+    scale = 1.0 if not isinstance(alpha, float) else 1.0 / ggx.kept_energy(round(alpha, 3))
+    tints: dict[str, Property] = {}
+    for name, value in (("specular_transmittance", transmitted), ("specular_reflectance", reflected)):
+        tint = colour(value.colour, scale) if isinstance(value, Constant) else context.textures.colour(value)
+        if tint != WHITE:
+            tints[name] = tint
+    if isinstance(alpha, float) and alpha < SMOOTH:
+        return plugin("bsdf", "dielectric", int_ior=ior, ext_ior=1.0, **tints)
+    return plugin(
+        "bsdf", "roughdielectric", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0, **tints
+    )
+
+
+def conductor_bsdf(
+    reflectance: Value, roughness: Value, extra: dict[str, Property], context: Context,
+    *, edge: tuple[float, float, float] | None,
+) -> Element:  # fmt: skip
+    """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
+    alpha = _alpha(roughness, context)
+    typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
+    optics: dict[str, Property] = {"material": "none"}
+    if isinstance(reflectance, Constant):
+        r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
+        gain = np.array([ggx.metal_scale(float(c), typical) for c in r])
+        if edge is not None:
+            eta, k = mapping.conductor_ior(r, np.array(edge))
+            optics = {"eta": _unbounded(eta), "k": _unbounded(k), "specular_reflectance": colour(gain)}
+        else:
+            optics["specular_reflectance"] = colour(r * gain)
+    else:
+        optics["specular_reflectance"] = context.textures.colour(reflectance)
+    if isinstance(alpha, float) and alpha < SMOOTH:
+        return plugin("bsdf", "conductor", **optics)
+    lobe: dict[str, Property] = extra or {"alpha": alpha}
+    return plugin("bsdf", "roughconductor", distribution="ggx", **lobe, **optics)
+
+
+def _alpha(roughness: Value, context: Context) -> float | Element:
+    """GGX alpha: the roughness squared, also of a texture."""
+    if isinstance(roughness, Constant):
+        alpha = min(max(roughness.number, 0.0), 1.0) ** 2
+        return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
+    if isinstance(roughness, ImageValue) and context.textures.is_missing(roughness):
+        return 0.25
+    if isinstance(roughness, ImageValue | Texture):
+        squared = np.maximum(context.textures.pixels(roughness).mean(axis=-1, keepdims=True) ** 2, ALPHA_MIN)
+        return context.textures.rewritten(roughness, squared, "alpha")
+    return 0.25
+
+
+def layered(
+    base: Element,
+    weight: Value,
+    ior: float,
+    roughness: Value,
+    tint: tuple[float, float, float],
+    context: Context,
+) -> Element:
+    """A dielectric layer over a BSDF, which is dimmed by what the layer reflects of uniform light.
+
+    A blend weighs the layer by its mean reflectance, which its own reflectance is divided by: the base is
+    dimmed by the rest, and no colour of it is scaled.
+    """
+    alpha = _alpha(roughness, context)
+    typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
+    mean = ggx.mean_reflectance(round(typical, 3), round(ior, 3))
+    if is_zero(weight) or mean < 1e-3:
+        return base
+    optics: dict[str, Property] = {
+        "eta": (ior,) * 3,
+        "k": (0.0,) * 3,
+        "specular_reflectance": colour(tint, 1.0 / mean),
+    }
+    if isinstance(alpha, float) and alpha < SMOOTH:
+        layer = plugin("bsdf", "conductor", **optics)
+    else:
+        layer = plugin("bsdf", "roughconductor", distribution="ggx", alpha=alpha, **optics)
+    return plugin("bsdf", "blendbsdf", base, layer, weight=context.textures.scaled_number(weight, mean))
+
+
+def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
+    """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
+    if normal is None or (isinstance(normal, NormalMap | Bump) and _is_void(normal, context)):
+        return bsdf
+    if isinstance(normal, NormalMap):
+        return plugin(
+            "bsdf",
+            "normalmap",
+            bsdf,
+            normalmap=_normal_texture(normal, context),
+            use_shadowing_function=False,
+        )
+    if isinstance(normal, Bump):
+        height = _height(normal, context)
+        return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
+    raise TypeError("procedural normals are baked before they are written")
+
+
+def _is_void(normal: NormalMap | Bump, context: Context) -> bool:
+    value = normal.image if isinstance(normal, NormalMap) else normal.height
+    if isinstance(value, Constant):
+        return True
+    return isinstance(value, ImageValue) and context.textures.is_missing(value)
+
+
+def _height(bump: Bump, context: Context) -> Element:
+    element = context.textures.number(bump.height)
+    if not isinstance(element, Element):
+        raise TypeError("a constant height is no bump map")
+    return element
+
+
+def _normal_texture(normal: NormalMap, context: Context) -> Element:
+    value = normal.image
+    if isinstance(value, ImageValue | Texture) and abs(normal.strength - 1.0) > 1e-3:
+        n = context.textures.pixels(value) * 2.0 - 1.0
+        n = np.concatenate(
+            [n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1
+        )
+        n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
+        return context.textures.rewritten(value, 0.5 * n + 0.5, f"normal {normal.strength:.3g}")
+    element = context.textures.colour(value)
+    if not isinstance(element, Element):
+        raise TypeError("a constant normal is no normal map")
+    return element
+
+
+def blend(
+    weight: Value, first: Callable[[], Element], second: Callable[[], Element], context: Context
+) -> Element:
+    """Two BSDFs by a weight; a BSDF without any weight is not built."""
+    if is_zero(weight):
+        return first()
+    if is_one(weight):
+        return second()
+    return plugin("bsdf", "blendbsdf", first(), second(), weight=context.textures.number(weight))
+
+
+def _unbounded(values: np.ndarray) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])

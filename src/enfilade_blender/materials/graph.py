@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads node trees into trees of shaders. Groups, reroutes and muted nodes are seen through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from enfilade_blender.materials import mapping, table
+from enfilade_blender.materials.values import (
+    IDENTITY,
+    Add,
+    AttributeValue,
+    Bump,
+    Constant,
+    Emission,
+    ImageValue,
+    Lobe,
+    Matrix3,
+    Mix,
+    Normal,
+    NormalMap,
+    Nothing,
+    Output,
+    Principled,
+    Procedural,
+    ProceduralNormal,
+    Shader,
+    Value,
+)
+from enfilade_blender.notes import Notes
+
+PLAIN_SPACES = ("sRGB", "Non-Color", "Linear Rec.709", "Raw", "Linear")
+PLAIN_SOURCES = ("FILE", "GENERATED")
+DIELECTRIC_IOR = 1.45
+
+
+class Graph:
+    """The node tree of one material.
+
+    Parameters
+    ----------
+    owner : str
+        Name of the material, for notes.
+    notes
+    """
+
+    def __init__(self, owner: str, notes: Notes) -> None:
+        self._owner, self._notes = owner, notes
+
+    def surface(self, tree: Any) -> Shader:
+        """Shader of the tree's active output."""
+        outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
+        outputs = [node for node in outputs if node.target in ("ALL", "CYCLES")] or outputs
+        if not outputs:
+            return Nothing()
+        output = next((node for node in outputs if node.is_active_output), outputs[0])
+        for name, effect in (
+            ("Volume", "the object is without it"),
+            ("Displacement", "the surface is smooth"),
+        ):
+            if output.inputs[name].is_linked:
+                self._notes.add("not-carried", self._owner, name, f"{name.lower()} is not exported", effect)
+        return self.shader(output.inputs["Surface"], ())
+
+    def shader(self, socket: Any, groups: tuple[Any, ...]) -> Shader:
+        """Shader that is linked to an input."""
+        found = follow(socket, groups)
+        if not isinstance(found, Output):
+            return Nothing()
+        node, inner = found.node, found.groups
+        if node.type == "BSDF_PRINCIPLED":
+            names = mapping.principled_names([s.name for s in node.inputs])
+            inputs = {new: self.value(node.inputs[old], inner) for new, old in names.items()}
+            return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
+        if node.type == "MIX_SHADER":
+            first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
+            ior = self._fresnel(node.inputs[0], inner)
+            if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
+                return Mix(Constant((0.5,)), first, second, ior, node.name)
+            return Mix(self.value(node.inputs[0], inner), first, second, None, node.name)
+        if node.type == "ADD_SHADER":
+            return Add(self.shader(node.inputs[0], inner), self.shader(node.inputs[1], inner), node.name)
+        if node.type in ("EMISSION", "BACKGROUND"):
+            return Emission(
+                self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)
+            )
+        return self._lobe(node, inner)
+
+    def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
+        """Value of an input."""
+        found = follow(socket, groups)
+        if not isinstance(found, Output):
+            return Constant(_numbers(found))
+        node = found.node
+        if node.type in ("RGB", "VALUE"):
+            return Constant(_numbers(found.socket))
+        if node.type == "LIGHT_PATH":
+            self._note_light_path(found)
+            return Constant((0.0,))
+        if node.type == "VERTEX_COLOR" and found.socket.name == "Color":
+            return AttributeValue(found, node.layer_name)
+        if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and found.socket.name == "Color":
+            return AttributeValue(found, node.attribute_name)
+        if node.type == "TEX_IMAGE" and node.image is None:
+            effect = "a mid grey is in its place"
+            self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
+            return Constant((0.5, 0.5, 0.5))
+        if node.type == "TEX_IMAGE" and (coordinates := image_coordinates(node, found.groups)):
+            return ImageValue(found, *coordinates)
+        return Procedural(found, *_dependence(found))
+
+    def normal(self, socket: Any, groups: tuple[Any, ...]) -> Normal:
+        """Normal of an input; None for the mesh's."""
+        found = follow(socket, groups)
+        if not isinstance(found, Output):
+            return None
+        node, inner = found.node, found.groups
+        if node.type == "NORMAL_MAP" and node.space == "TANGENT":
+            image, strength = (
+                self.value(node.inputs["Color"], inner),
+                self.value(node.inputs["Strength"], inner),
+            )
+            if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
+                return NormalMap(image, strength.number)
+        if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
+            height = self.value(node.inputs["Height"], inner)
+            strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))
+            if isinstance(height, Constant):
+                return None
+            is_plain = isinstance(height, ImageValue) or _is_of_uv(height)
+            if is_plain and isinstance(strength, Constant) and isinstance(distance, Constant):
+                return Bump(height, strength.number * distance.number * (-1.0 if node.invert else 1.0))
+        return ProceduralNormal(found)
+
+    def _lobe(self, node: Any, groups: tuple[Any, ...]) -> Shader:
+        kind = table.LOBES.get(node.type)
+        if kind is None:
+            what, effect = "this shader has no counterpart", "its surface is a neutral grey"
+            self._notes.add("not-carried", self._owner, f"{node.name} ({node.type})", what, effect)
+            return Lobe(
+                "diffuse", Constant((0.5, 0.5, 0.5)), Constant((0.0,)), Constant((1.0,)), None, node.name
+            )
+        if kind.note:
+            self._notes.add("approximated", self._owner, node.name, kind.note, kind.effect)
+
+        def named(name: str, default: tuple[float, ...]) -> Value:
+            return self.value(node.inputs[name], groups) if name in node.inputs else Constant(default)
+
+        colour = named("Base Color" if "Base Color" in node.inputs else "Color", (0.8, 0.8, 0.8))
+        normal = self.normal(node.inputs["Normal"], groups) if "Normal" in node.inputs else None
+        ior = named("IOR", (DIELECTRIC_IOR,))
+        return Lobe(kind.lobe, colour, named("Roughness", (0.0,)), ior, normal, node.name)
+
+    def _fresnel(self, socket: Any, groups: tuple[Any, ...]) -> float | None:
+        """IOR of a factor that is Fresnel's reflectance."""
+        found = follow(socket, groups)
+        if not isinstance(found, Output):
+            return None
+        node = found.node
+        if node.type == "FRESNEL":
+            ior = self.value(node.inputs["IOR"], found.groups)
+            return ior.number if isinstance(ior, Constant) else DIELECTRIC_IOR
+        if node.type == "LAYER_WEIGHT" and found.socket.name == "Fresnel":
+            blend = self.value(node.inputs["Blend"], found.groups)
+            share = blend.number if isinstance(blend, Constant) else 0.5
+            return 1.0 / max(1.0 - share, 1e-3)
+        return None
+
+    def _note_light_path(self, found: Output) -> None:
+        what = f"{found.socket.name} is taken as 0"
+        effect = "all rays see the material as diffuse light does"
+        self._notes.add("approximated", self._owner, found.node.name, what, effect)
+
+
+def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
+    """The output that feeds an input, as :class:`Output`; without one, the socket whose default holds."""
+    while True:
+        links = (
+            [link for link in socket.links if link.is_valid and not link.is_muted] if socket.is_linked else []
+        )
+        if not links:
+            return socket
+        source = links[0].from_socket
+        node = source.node
+        if node.type == "REROUTE":
+            socket = node.inputs[0]
+        elif node.mute:
+            inner = [link.from_socket for link in node.internal_links if link.to_socket == source]
+            if not inner:
+                return source
+            socket = inner[0]
+        elif node.type == "GROUP" and node.node_tree is not None:
+            ends = [n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"]
+            end = next((n for n in ends if n.is_active_output), ends[0] if ends else None)
+            if end is None:
+                return source
+            socket, groups = _by_identifier(end.inputs, source), (*groups, node)
+        elif node.type == "GROUP_INPUT" and groups:
+            socket, groups = _by_identifier(groups[-1].inputs, source), groups[:-1]
+        else:
+            return Output(source, groups)
+
+
+def image_coordinates(node: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] | None:
+    """UV map and affine map of an image texture, or None where a bitmap can't look it up so."""
+    image = node.image
+    is_plain = (
+        image is not None
+        and node.projection == "FLAT"
+        and image.source in PLAIN_SOURCES
+        and image.colorspace_settings.name in PLAIN_SPACES
+    )
+    if image is None:
+        return "", IDENTITY
+    return uv_coordinates(node.inputs["Vector"], groups) if is_plain else None
+
+
+def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] | None:
+    """UV map and affine map of coordinates, or None where they are not of a UV map."""
+    found = follow(socket, groups)
+    if not isinstance(found, Output):
+        return "", IDENTITY
+    node = found.node
+    if node.type == "UVMAP" and not node.from_instancer:
+        return node.uv_map, IDENTITY
+    if node.type == "TEX_COORD" and found.socket.name == "UV" and not node.from_instancer:
+        return "", IDENTITY
+    if node.type == "MAPPING" and not any(node.inputs[i].is_linked for i in (1, 2, 3)):
+        inner = uv_coordinates(node.inputs["Vector"], found.groups)
+        if inner is None or not node.inputs["Vector"].is_linked:
+            return None
+        location, rotation, scale = (tuple(node.inputs[i].default_value) for i in (1, 2, 3))
+        if node.vector_type == "VECTOR":
+            location = (0.0, 0.0, 0.0)
+        own = mapping.uv_matrix(node.vector_type, location, rotation, scale)
+        return inner[0], mapping.product(own, inner[1])
+    return None
+
+
+def upstream(output: Output) -> Iterator[Output]:
+    """An output and all outputs that it depends on."""
+    seen: set[Any] = set()
+    waiting = [output]
+    while waiting:
+        current = waiting.pop()
+        key = current.socket.as_pointer(), tuple(group.as_pointer() for group in current.groups)
+        if key in seen:
+            continue
+        seen.add(key)
+        yield current
+        for socket in current.node.inputs:
+            found = follow(socket, current.groups) if socket.enabled else socket
+            if isinstance(found, Output):
+                waiting.append(found)
+
+
+def _dependence(output: Output) -> tuple[str | None, bool]:
+    """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
+    is_of_uv, is_of_view, uv_maps = True, False, set()
+    for found in upstream(output):
+        node = found.node
+        is_of_view |= node.type in table.VIEW_NODES
+        if node.type == "TEX_IMAGE":
+            coordinates = image_coordinates(node, found.groups)
+            is_of_uv &= coordinates is not None and coordinates[1] == IDENTITY and node.extension == "REPEAT"
+            uv_maps.add(coordinates[0] if coordinates else "")
+        else:
+            is_of_uv &= node.type in table.COLOUR_NODES or node.type in ("TEX_COORD", "UVMAP")
+    is_of_uv &= len(uv_maps) <= 1
+    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view
+
+
+def _is_of_uv(value: Value) -> bool:
+    return isinstance(value, Procedural) and value.uv_map is not None
+
+
+def _by_identifier(sockets: Any, like: Any) -> Any:
+    return next(socket for socket in sockets if socket.identifier == like.identifier)
+
+
+def _numbers(socket: Any) -> tuple[float, ...]:
+    """Default of a socket: a number, or the first three of a colour or vector."""
+    value = getattr(socket, "default_value", 0.0)
+    if isinstance(value, int | float):
+        return (float(value),) if math.isfinite(value) else (0.0,)
+    return tuple(float(number) for number in value)[:3] if hasattr(value, "__len__") else (0.0,)

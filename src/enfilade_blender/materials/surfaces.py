@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces: a BSDF, its opacity, and the radiance that it emits, of a tree of shaders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from enfilade_blender.materials.bsdfs import (
+    Context,
+    is_one,
+    is_zero,
+    layered,
+    lobe_bsdf,
+    plastic_bsdf,
+    two_sided,
+)
+from enfilade_blender.materials.principled import principled_bsdf
+from enfilade_blender.materials.values import (
+    Add,
+    Constant,
+    Emission,
+    ImageValue,
+    Lobe,
+    Mix,
+    Nothing,
+    Principled,
+    Shader,
+    Texture,
+    Value,
+)
+from enfilade_blender.scene_xml import Element, plugin
+
+WHITE = Constant((1.0, 1.0, 1.0))
+BLACK = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Radiance:
+    """Emitted radiance: a colour or texture times a number."""
+
+    colour: Value
+    strength: float
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A surface of Mitsuba.
+
+    Attributes
+    ----------
+    bsdf : Element or None
+        None: black, of shaders that only emit.
+    opacity : Value
+        1 is opaque.
+    opacity_is_inverted : bool
+        Whether 1 minus the value is the opacity.
+    emitted : tuple of Radiance
+        Empty, or one.
+    """
+
+    bsdf: Element | None
+    opacity: Value = WHITE
+    opacity_is_inverted: bool = False
+    emitted: tuple[Radiance, ...] = ()
+
+    @property
+    def is_invisible(self) -> bool:
+        """Whether everything passes through the surface."""
+        return is_zero(self.opacity) and not self.opacity_is_inverted
+
+    def plain(self) -> Element:
+        """BSDF without its opacity, of one side; black where there is none."""
+        return self.bsdf if self.bsdf is not None else plugin("bsdf", "diffuse", reflectance=BLACK)
+
+    def element(self, context: Context) -> Element:
+        """BSDF with its opacity."""
+        bsdf = two_sided(self.plain())
+        if is_one(self.opacity):
+            return bsdf
+        opacity = context.textures.number(self.opacity)
+        if self.opacity_is_inverted:
+            opacity = inverted(self.opacity, context)
+        return plugin("bsdf", "mask", bsdf, opacity=opacity)
+
+    def radiance(self, context: Context) -> tuple[float, float, float] | Element | None:
+        """Emitted radiance, or None."""
+        if not self.emitted:
+            return None
+        (radiance,) = self.emitted
+        if isinstance(radiance.colour, Constant):
+            r, g, b = (c * radiance.strength for c in radiance.colour.colour)
+            return (r, g, b) if max(r, g, b) > 0.0 else None
+        if isinstance(radiance.colour, ImageValue) and context.textures.is_missing(radiance.colour):
+            return (0.5 * radiance.strength,) * 3
+        if abs(radiance.strength - 1.0) < 1e-3 or not isinstance(radiance.colour, ImageValue | Texture):
+            element = context.textures.colour(radiance.colour)
+            return element if isinstance(element, Element) else None
+        scaled = context.textures.pixels(radiance.colour) * radiance.strength
+        return context.textures.rewritten(radiance.colour, scaled, f"emission {radiance.strength:.3g}")
+
+
+def build(shader: Shader, context: Context) -> Surface:
+    """Surface of a shader whose procedural values are baked."""
+    if isinstance(shader, Nothing):
+        return Surface(None)
+    if isinstance(shader, Emission):
+        return Surface(None, emitted=_radiance(shader.colour, shader.strength, context))
+    if isinstance(shader, Lobe):
+        if shader.kind == "transparent":
+            return Surface(None, opacity=Constant((0.0,)))
+        return Surface(lobe_bsdf(shader, context))
+    if isinstance(shader, Principled):
+        inputs = shader.inputs
+        colour = inputs.get("Emission Color", WHITE)
+        strength = inputs.get("Emission Strength", Constant((0.0,)))
+        alpha = inputs.get("Alpha", WHITE)
+        return Surface(
+            principled_bsdf(shader, context), opacity=alpha, emitted=_radiance(colour, strength, context)
+        )
+    if isinstance(shader, Add):
+        return _sum(shader, context)
+    return _mix(shader, context)
+
+
+def inverted(value: Value, context: Context) -> float | Element:
+    """1 minus a value."""
+    if isinstance(value, Constant):
+        return 1.0 - value.number
+    if isinstance(value, ImageValue) and not context.textures.is_missing(value):
+        pixels = context.textures.pixels(value).mean(axis=-1, keepdims=True)
+        return context.textures.rewritten(value, 1.0 - pixels, "inverted")
+    return 0.5
+
+
+def _mix(mix: Mix, context: Context) -> Surface:
+    """A mix, by what its parts are: a cut-out, a coated surface, thin glass, a light, or two BSDFs."""
+    if is_zero(mix.factor) or is_one(mix.factor):
+        return build(mix.second if is_one(mix.factor) else mix.first, context)
+    if mix.fresnel_ior is not None and isinstance(mix.second, Lobe):
+        return _interface(mix.first, mix.second, mix.fresnel_ior, context)
+    first, second = build(mix.first, context), build(mix.second, context)
+    if first.is_invisible and not second.is_invisible:
+        return _cut_out(second, mix, context, is_inverted=False)
+    if second.is_invisible and not first.is_invisible:
+        return _cut_out(first, mix, context, is_inverted=True)
+    return _blended(first, second, mix, context)
+
+
+def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surface:
+    """Glossy over a shader by Fresnel's factor: over diffuse it is plastic, over transparent thin glass."""
+    if isinstance(below, Lobe) and below.kind == "diffuse":
+        return Surface(plastic_bsdf(below.colour, above.roughness, ior, context))
+    if isinstance(below, Lobe) and below.kind == "transparent":
+        tint = context.textures.colour(below.colour)
+        return Surface(
+            plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, specular_transmittance=tint)
+        )
+    surface = build(below, context)
+    tint = context.textures.mean(above.colour)
+    return replace(surface, bsdf=layered(surface.plain(), WHITE, ior, above.roughness, tint, context))
+
+
+def _cut_out(surface: Surface, mix: Mix, context: Context, *, is_inverted: bool) -> Surface:
+    if not is_one(surface.opacity):
+        what, effect = "two opacities; the outer one is kept", "the surface is less transparent"
+        context.notes.add("approximated", context.owner, mix.name, what, effect)
+    emitted = surface.emitted
+    if emitted and isinstance(mix.factor, Constant):
+        share = 1.0 - mix.factor.number if is_inverted else mix.factor.number
+        emitted = tuple(replace(part, strength=part.strength * share) for part in emitted)
+    elif emitted:
+        what, effect = "light is emitted where the surface is transparent, too", "the cut-out shines"
+        context.notes.add("approximated", context.owner, mix.name, what, effect)
+    return replace(surface, opacity=mix.factor, opacity_is_inverted=is_inverted, emitted=emitted)
+
+
+def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Surface:
+    factor = mix.factor if isinstance(mix.factor, Constant) else None
+    share = factor.number if factor else sum(context.textures.mean(mix.factor)) / 3.0
+    emitted = [replace(part, strength=part.strength * (1.0 - share)) for part in first.emitted]
+    emitted += [replace(part, strength=part.strength * share) for part in second.emitted]
+    if emitted and factor is None:
+        what, effect = "emission by the mean of a textured factor", "light is even over the surface"
+        context.notes.add("approximated", context.owner, mix.name, what, effect)
+    if first.bsdf is None and second.bsdf is None:
+        return Surface(None, emitted=_joined(emitted, mix, context))
+    parts = [part.plain() if is_one(part.opacity) else part.element(context) for part in (first, second)]
+    weight = context.textures.number(mix.factor)
+    bsdf = plugin("bsdf", "blendbsdf", *parts, weight=weight)
+    return Surface(bsdf, emitted=_joined(emitted, mix, context))
+
+
+def _sum(add: Add, context: Context) -> Surface:
+    first, second = build(add.first, context), build(add.second, context)
+    emitted = _joined([*first.emitted, *second.emitted], add, context)
+    if first.bsdf is None and not first.is_invisible:
+        return replace(second, emitted=emitted)
+    if second.bsdf is None and not second.is_invisible:
+        return replace(first, emitted=emitted)
+    what, effect = "a sum of two BSDFs is a mix of equal shares", "the surface is darker"
+    context.notes.add("approximated", context.owner, add.name, what, effect)
+    parts = [part.plain() for part in (first, second)]
+    return Surface(plugin("bsdf", "blendbsdf", *parts, weight=0.5), emitted=emitted)
+
+
+def _joined(emitted: list[Radiance], shader: Mix | Add, context: Context) -> tuple[Radiance, ...]:
+    """At most one radiance: constants are added, of textures the strongest is kept."""
+    lit = [part for part in emitted if part.strength > 0.0]
+    if len(lit) <= 1:
+        return tuple(lit)
+    if all(isinstance(part.colour, Constant) for part in lit):
+        total = [
+            sum(part.colour.colour[i] * part.strength for part in lit if isinstance(part.colour, Constant))
+            for i in range(3)
+        ]
+        return (Radiance(Constant(tuple(total)), 1.0),)
+    what, effect = "of two emissions the stronger is kept", "the surface shines less"
+    context.notes.add("approximated", context.owner, shader.name, what, effect)
+    return (max(lit, key=lambda part: part.strength * sum(context.textures.mean(part.colour))),)
+
+
+def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radiance, ...]:
+    if is_zero_exactly(strength) or is_zero_exactly(colour):
+        return ()
+    if isinstance(strength, Constant):
+        return (Radiance(colour, strength.number),)
+    if isinstance(colour, Constant) and max(colour.colour) - min(colour.colour) < 1e-6:
+        return (Radiance(strength, colour.number),)
+    effect = "the pattern of the emission's strength is lost"
+    context.notes.add(
+        "approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect
+    )
+    return (Radiance(colour, sum(context.textures.mean(strength)) / 3.0),)
+
+
+def is_zero_exactly(value: Value) -> bool:
+    """Whether a value is 0 everywhere; an emission of 0.001 is one."""
+    return isinstance(value, Constant) and max(value.colour) <= 0.0

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What becomes of each node and socket. The exporter reads these tables, and so does the documentation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LobeKind:
+    """A shader node that has one lobe.
+
+    Attributes
+    ----------
+    lobe : str
+        See :class:`enfilade_blender.materials.values.Lobe`.
+    becomes : str
+        Mitsuba's plugin.
+    note, effect : str
+        What is approximated, and what that means; empty where nothing is.
+    """
+
+    lobe: str
+    becomes: str
+    note: str = ""
+    effect: str = ""
+
+
+LOBES = {
+    "BSDF_DIFFUSE": LobeKind("diffuse", "`diffuse`"),
+    "BSDF_GLOSSY": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
+    "BSDF_ANISOTROPIC": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
+    "BSDF_METALLIC": LobeKind(
+        "glossy",
+        "`conductor` or `roughconductor`",
+        "the edge tint is left out",
+        "metal is darker at grazing angles",
+    ),
+    "BSDF_GLASS": LobeKind("glass", "`dielectric` or `roughdielectric`"),
+    "BSDF_REFRACTION": LobeKind(
+        "glass",
+        "`dielectric` or `roughdielectric`",
+        "glass, which also reflects",
+        "the surface has reflections",
+    ),
+    "BSDF_TRANSPARENT": LobeKind("transparent", "`mask`"),
+    "BSDF_TRANSLUCENT": LobeKind("translucent", "`principledthin`"),
+    "SUBSURFACE_SCATTERING": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "light does not spread below the surface"
+    ),
+    "BSDF_SHEEN": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
+    ),
+    "BSDF_VELVET": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
+    ),
+    "BSDF_TOON": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "light has no steps"),
+    "BSDF_HAIR": LobeKind("glossy", "`roughconductor`", "a glossy surface", "highlights of hair differ"),
+    "BSDF_HAIR_PRINCIPLED": LobeKind(
+        "diffuse", "`diffuse`", "diffuse reflection", "highlights of hair are missing"
+    ),
+}
+COLOUR_NODES = {  # functions of their inputs alone
+    "RGB", "VALUE", "MATH", "VECT_MATH", "MIX", "MIX_RGB", "VALTORGB", "CURVE_RGB", "CURVE_FLOAT",
+    "CURVE_VEC", "GAMMA", "BRIGHTCONTRAST", "HUE_SAT", "INVERT", "SEPRGB", "COMBRGB", "SEPARATE_COLOR",
+    "COMBINE_COLOR", "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
+}  # fmt: skip
+VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
+PRINCIPLED = (
+    (
+        "Base Color, Metallic 0",
+        "mapped",
+        "`diffuse` under a dielectric interface: `plastic` or `roughplastic`",
+    ),
+    ("Base Color, Metallic 1", "mapped", "`conductor` or `roughconductor`, of a fitted index of refraction"),
+    ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
+    ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
+    ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
+    ("Roughness, textured", "mapped", "`blendbsdf` of two plastics; `alpha` on metals"),
+    ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
+    ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
+    ("Alpha", "mapped", "`mask`"),
+    ("Emission Color, Emission Strength", "mapped", "`area` emitter; open meshes shine on both sides"),
+    ("Normal: Normal Map, Bump of images", "mapped", "`normalmap`, `bumpmap`"),
+    (
+        "Coat",
+        "mapped",
+        "`roughplastic` over rough plastics; else `blendbsdf` with a `roughconductor` of k = 0",
+    ),
+    ("Sheen", "approximated", "a rough dielectric layer"),
+    ("Anisotropic", "mapped", "`alpha_u`, `alpha_v` of metals along the UV map; its rotation is not carried"),
+    ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),
+    ("Diffuse Roughness", "not carried", "the surface is Lambertian"),
+    ("Subsurface", "approximated", "diffuse reflection of the base colour"),
+    ("Thin Film", "not carried", "no interference colours"),
+)
+INPUTS = (
+    ("Constants, RGB, Value", "mapped", "numbers"),
+    (
+        "Image Texture with UV Map and Mapping",
+        "mapped",
+        "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
+    ),
+    ("Colour attribute", "mapped", "`mesh_attribute`"),
+    ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
+    (
+        "Everything else: noise, ramps, Object and Generated coordinates",
+        "baked",
+        "a bitmap of each mesh, on UVs of its own",
+    ),
+    (
+        "Fresnel, Layer Weight below Glossy in a Mix Shader",
+        "mapped",
+        "`plastic`, `thindielectric` or a layer",
+    ),
+    ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
+    ("Light Path", "approximated", "0: all rays see one material"),
+    ("Missing image", "approximated", "a mid grey"),
+)
+LIGHTS = (
+    ("Point", "mapped", "`sphere` of its radius, which the camera sees; `point` for radius 0"),
+    (
+        "Spot",
+        "approximated",
+        "`spot`: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
+    ),
+    ("Area: square, rectangle, disk, ellipse", "mapped", "`rectangle` or `disk`; the camera sees it"),
+    ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
+    ("Sun with an angle", "mapped", "a disc in the environment map"),
+    ("World of one colour", "mapped", "`constant`"),
+    ("World of nodes: HDRI, sky", "baked", "`envmap`"),
+    ("Spread, light nodes, light linking", "not carried", "light is distributed as without them"),
+)
+OBJECTS = (
+    ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
+    (
+        "Collection, geometry nodes and particle instances",
+        "mapped",
+        "merged, or `instance` where they are many",
+    ),
+    ("Linked libraries", "mapped", "within the source's folder and the allowed ones"),
+    ("Animated objects", "not carried", "as in the first frame"),
+    ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
+    ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),
+)
+
+
+def markdown() -> str:
+    """The tables as a section of the documentation."""
+    parts = []
+    shaders = [
+        (name.removeprefix("BSDF_").replace("_", " ").capitalize(), _outcome(kind), _becomes(kind))
+        for name, kind in LOBES.items()
+    ]
+    shaders += [
+        (
+            "Mix shader",
+            "mapped",
+            "`blendbsdf`; with Transparent `mask`; with Fresnel `plastic` or `thindielectric`",
+        ),
+        (
+            "Add shader",
+            "approximated",
+            "an `area` emitter beside the other shader; else `blendbsdf` of equal shares",
+        ),
+        ("Emission", "mapped", "`area` emitter"),
+        ("Any other shader", "not carried", "a neutral grey"),
+    ]
+    sections = {
+        "Principled BSDF": PRINCIPLED, "Other shaders": shaders, "Inputs": INPUTS, "Lights and world": LIGHTS,
+        "Objects": OBJECTS,
+    }  # fmt: skip
+    for title, rows in sections.items():
+        parts.append(f"| {title} | outcome | in the exported scene |\n| --- | --- | --- |")
+        parts[-1] += "".join(f"\n| {what} | {how} | {becomes} |" for what, how, becomes in rows)
+    return "\n\n".join(parts) + "\n"
+
+
+def _outcome(kind: LobeKind) -> str:
+    return "approximated" if kind.note else "mapped"
+
+
+def _becomes(kind: LobeKind) -> str:
+    return f"{kind.becomes}: {kind.effect}" if kind.effect else kind.becomes

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of materials as numbers, colours and textures of Mitsuba; copies of image files."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.image_files import F32, srgb_from_linear, write_exr, write_png
+from enfilade_blender.materials.values import (
+    AttributeValue,
+    Constant,
+    ImageValue,
+    Procedural,
+    Texture,
+    Value,
+)
+from enfilade_blender.notes import Notes
+from enfilade_blender.scene_xml import Element, Identifiers, colour, plugin
+
+READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
+WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
+FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
+GREY = (0.5, 0.5, 0.5)  # of a missing image
+RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
+
+
+class Textures:
+    """Texture files of a scene.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the scene; files go into its folder ``textures``.
+    notes
+    """
+
+    def __init__(self, folder: Path, notes: Notes) -> None:
+        self._folder, self._notes = folder, notes
+        self._names = Identifiers()
+        self._files: dict[Any, str] = {}
+        (folder / "textures").mkdir(exist_ok=True)
+
+    def __len__(self) -> int:
+        return len(list((self._folder / "textures").iterdir()))
+
+    def colour(self, value: Value) -> tuple[float, float, float] | Element:
+        """A colour or a texture."""
+        if isinstance(value, Constant):
+            return value.colour
+        return self._texture(value)
+
+    def scaled(self, value: Value, scale: float) -> tuple[float, float, float] | Element:
+        """A colour times a number, which may pass 1."""
+        if isinstance(value, Constant):
+            return colour(value.colour, scale)
+        is_missing = isinstance(value, ImageValue) and self.is_missing(value)
+        if abs(scale - 1.0) < 0.01 or is_missing or not isinstance(value, ImageValue | Texture):
+            return self._texture(value)
+        return self.rewritten(value, self.pixels(value) * scale, f"times {scale:.3g}", raw=False)
+
+    def number(self, value: Value) -> float | Element:
+        """A number or a texture of numbers."""
+        if isinstance(value, Constant):
+            return value.number
+        return self._texture(value)
+
+    def scaled_number(self, value: Value, scale: float) -> float | Element:
+        """A number times another."""
+        if isinstance(value, Constant):
+            return value.number * scale
+        if not isinstance(value, ImageValue | Texture) or (
+            isinstance(value, ImageValue) and self.is_missing(value)
+        ):
+            return 0.5 * scale
+        grey = self.pixels(value).mean(axis=-1, keepdims=True)
+        return self.rewritten(value, grey * scale, f"grey times {scale:.3g}")
+
+    def mean(self, value: Value) -> tuple[float, float, float]:
+        """Mean linear colour of a value; mid grey of attributes."""
+        if isinstance(value, Constant):
+            return value.colour
+        if isinstance(value, Texture):
+            return value.mean
+        if isinstance(value, ImageValue) and not self.is_missing(value):
+            mean = self.pixels(value).reshape(-1, 3).mean(axis=0)
+            return float(mean[0]), float(mean[1]), float(mean[2])
+        return GREY
+
+    def pixels(self, value: ImageValue | Texture) -> F32:
+        """Linear values of a texture (H, W, 3), the first row on top."""
+        if isinstance(value, Texture):
+            import bpy
+
+            image = bpy.data.images.load(str(self._folder / value.file), check_existing=True)
+            image.colorspace_settings.name = "Non-Color" if value.raw else "sRGB"
+            return linear_pixels(image)[..., :3]
+        rgba = linear_pixels(value.image)
+        return np.repeat(rgba[..., 3:], 3, axis=-1) if value.output.socket.name == "Alpha" else rgba[..., :3]
+
+    def is_missing(self, value: ImageValue) -> bool:
+        """Whether an image has no pixels; this is noted."""
+        image = value.image
+        if image is not None and image.has_data:
+            return False
+        if image is not None and image.size[0] > 0 and len(image.pixels) > 0:  # loads it
+            return False
+        name = image.name if image is not None else "none"
+        file = image.filepath if image is not None else ""
+        what = f"the image {name} ({file}) is missing" if image is not None else "there is no image"
+        self._notes.add("approximated", name, value.output.node.name, what, "a mid grey is in its place")
+        return True
+
+    def write(self, name: str, image: F32, *, raw: bool) -> str:
+        """Write an image as PNG, or as OpenEXR where it has values above 1; its name in the scene.
+
+        Without `raw` the values of a PNG are sRGB, as Mitsuba expects.
+        """
+        if image.max(initial=0.0) > 1.0:
+            file = f"textures/{self._names.unique(name)}.exr"
+            write_exr(self._folder / file, np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float32))
+        else:
+            file = f"textures/{self._names.unique(name)}.png"
+            write_png(self._folder / file, image if raw else srgb_from_linear(image))
+        return file
+
+    def rewritten(self, value: ImageValue | Texture, image: F32, name: str, *, raw: bool = True) -> Element:
+        """A texture in the place of another, of other numbers (H, W, 1 or 3); colours are not `raw`."""
+        key = (value.file if isinstance(value, Texture) else value.image.name_full), name
+        if key not in self._files:
+            stem = Path(str(key[0])).stem
+            self._files[key] = self.write(f"{stem} {name}", image.astype(np.float32), raw=raw)
+        raw = raw or self._files[key].endswith(".exr")
+        if isinstance(value, Texture):
+            return bitmap(self._files[key], raw=raw, wrap="repeat", matrix=FLIP)
+        node = value.output.node
+        matrix = FLIP @ np.array(value.matrix)
+        return bitmap(self._files[key], raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix)
+
+    def _texture(self, value: Value) -> Element | Any:
+        if isinstance(value, Texture):
+            return bitmap(value.file, raw=value.raw, wrap="repeat", matrix=FLIP)
+        if isinstance(value, AttributeValue):
+            return plugin("texture", "mesh_attribute", name="vertex_color")
+        if isinstance(value, Procedural):
+            raise TypeError("procedural values are baked before they are written")
+        if not isinstance(value, ImageValue) or self.is_missing(value):
+            return plugin("texture", "srgb", color=GREY)
+        node = value.output.node
+        if node.extension == "CLIP":
+            effect = "beyond its border the image's last pixels continue"
+            self._notes.add(
+                "approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect
+            )
+        file, raw = self._file(value)
+        matrix = FLIP @ np.array(value.matrix)
+        smooth = node.interpolation != "Closest"
+        return bitmap(file, raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix, smooth=smooth)
+
+    def _file(self, value: ImageValue) -> tuple[str, bool]:
+        """Name of a value's file, and whether its numbers are linear."""
+        image, is_alpha = value.image, value.output.socket.name == "Alpha"
+        raw = is_alpha or image.colorspace_settings.name in RAW_SPACES
+        key = image.name_full, is_alpha
+        if key not in self._files:
+            name = Path(image.name).stem or "image"
+            if is_alpha:
+                self._files[key] = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
+            else:
+                self._files[key] = self._copied(image, name) or self.write(
+                    name, linear_pixels(image)[..., :3], raw=raw
+                )
+        return self._files[key], raw
+
+    def _copied(self, image: Any, name: str) -> str:
+        """Name of an unchanged copy of an image's file or packed bytes; empty where Mitsuba can't read it."""
+        import bpy
+
+        source = Path(bpy.path.abspath(image.filepath, library=image.library))
+        suffix = source.suffix.lower()
+        if image.source != "FILE" or image.is_dirty or suffix not in READABLE:
+            return ""
+        file = f"textures/{self._names.unique(name)}{suffix}"
+        if image.packed_file is not None:
+            (self._folder / file).write_bytes(image.packed_file.data)
+        elif source.is_file():
+            shutil.copyfile(source, self._folder / file)
+        else:
+            return ""
+        return file
+
+
+def bitmap(file: str, *, raw: bool, wrap: str, matrix: np.ndarray, smooth: bool = True) -> Element:
+    """A bitmap texture; `matrix` (3, 3) maps texture coordinates with v up to Mitsuba's."""
+    filter_type = "bilinear" if smooth else "nearest"
+    return plugin(
+        "texture", "bitmap", filename=file, raw=raw, wrap_mode=wrap, filter_type=filter_type, to_uv=matrix
+    )
+
+
+def linear_pixels(image: Any) -> F32:
+    """Linear RGBA of a Blender image (H, W, 4), the first row on top."""
+    width, height = image.size
+    values = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    pixels = values.reshape(height, width, image.channels)[::-1]
+    if image.channels < 4:
+        alpha = np.ones((height, width, 1), np.float32)
+        colour = pixels if image.channels == 3 else np.repeat(pixels[..., :1], 3, axis=-1)
+        pixels = np.concatenate([colour, alpha], axis=-1)
+    if not image.is_float and image.colorspace_settings.name not in RAW_SPACES:
+        pixels = np.concatenate([linear_from_srgb(pixels[..., :3]), pixels[..., 3:]], axis=-1)
+    return np.ascontiguousarray(pixels)
+
+
+def linear_from_srgb(encoded: F32) -> F32:
+    """IEC 61966-2-1, inverse."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A material as read from its nodes: a tree of shaders, whose inputs are values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Output:
+    """An output socket of a node, and the group nodes that it lies in, outermost first."""
+
+    socket: Any
+    groups: tuple[Any, ...] = ()
+
+    @property
+    def node(self) -> Any:
+        """Node of the socket."""
+        return self.socket.node
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One number, or three of a linear colour."""
+
+    numbers: tuple[float, ...]
+
+    @property
+    def number(self) -> float:
+        """The number, or the mean of the colour."""
+        return sum(self.numbers) / len(self.numbers)
+
+    @property
+    def colour(self) -> tuple[float, float, float]:
+        """The colour, or the number three times."""
+        r, g, b = self.numbers if len(self.numbers) == 3 else self.numbers * 3
+        return r, g, b
+
+
+@dataclass(frozen=True)
+class ImageValue:
+    """An output of an image texture that Mitsuba's bitmap can look up.
+
+    Attributes
+    ----------
+    output
+    uv_map : str
+        Empty: the active one.
+    matrix
+        Affine map of texture coordinates, of nodes of the type Mapping.
+    """
+
+    output: Output
+    uv_map: str
+    matrix: Matrix3
+
+    @property
+    def image(self) -> Any:
+        """Image of the node."""
+        return self.output.node.image
+
+
+@dataclass(frozen=True)
+class AttributeValue:
+    """A colour attribute of the mesh; an empty name is the active one."""
+
+    output: Output
+    name: str
+
+
+@dataclass(frozen=True)
+class Procedural:
+    """A value of nodes without counterpart, which is baked.
+
+    Attributes
+    ----------
+    output
+    uv_map : str or None
+        It depends on nothing but this UV map (empty: the active one), with a period of 1: one texture serves
+        all objects. None: it depends on more.
+    is_of_view : bool
+        It depends on the direction of view or the kind of ray, which a texture does not.
+    """
+
+    output: Output
+    uv_map: str | None = None
+    is_of_view: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A baked value: a file on the mesh's baked or own texture coordinates, with the mean of its texels."""
+
+    file: str
+    uv_map: str
+    mean: tuple[float, float, float]
+    raw: bool
+
+
+Value = Constant | ImageValue | AttributeValue | Procedural | Texture
+
+
+@dataclass(frozen=True)
+class NormalMap:
+    """Tangent-space normals of an image."""
+
+    image: Value
+    strength: float
+
+
+@dataclass(frozen=True)
+class Bump:
+    """Heights of an image, scene units for each unit of the image."""
+
+    height: Value
+    scale: float
+
+
+@dataclass(frozen=True)
+class ProceduralNormal:
+    """Normals of nodes without counterpart, which are baked."""
+
+    output: Output
+
+
+Normal = NormalMap | Bump | ProceduralNormal | None
+
+
+@dataclass(frozen=True)
+class Principled:
+    """Blender's Principled BSDF; `inputs` by names of Blender 4."""
+
+    inputs: dict[str, Value]
+    normal: Normal
+    name: str
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A closure with one lobe.
+
+    Attributes
+    ----------
+    kind : str
+        "diffuse", "glossy", "glass", "transparent" or "translucent".
+    colour, roughness, ior
+    normal
+    name : str
+        Of the node.
+    """
+
+    kind: str
+    colour: Value
+    roughness: Value
+    ior: Value
+    normal: Normal
+    name: str
+
+
+@dataclass(frozen=True)
+class Emission:
+    """Emitted radiance: colour times strength."""
+
+    colour: Value
+    strength: Value
+
+
+@dataclass(frozen=True)
+class Mix:
+    """A share of the second shader, the rest of the first; `fresnel_ior` where the share is Fresnel's."""
+
+    factor: Value
+    first: Shader
+    second: Shader
+    fresnel_ior: float | None
+    name: str
+
+
+@dataclass(frozen=True)
+class Add:
+    """The sum of two shaders."""
+
+    first: Shader
+    second: Shader
+    name: str
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """An empty socket: black."""
+
+
+Shader = Principled | Lobe | Emission | Mix | Add | Nothing
+
+
+def values_of(shader: Any) -> Iterator[Value | ProceduralNormal]:
+    """All values below a shader, those of normals included."""
+    if isinstance(shader, Value | ProceduralNormal):
+        yield shader
+    elif isinstance(shader, dict):
+        for value in shader.values():
+            yield from values_of(value)
+    elif hasattr(shader, "__dataclass_fields__"):
+        for field in fields(shader):
+            yield from values_of(getattr(shader, field.name))
+
+
+def replaced(shader: Any, change: Any) -> Any:
+    """The tree with every value and procedural normal replaced by ``change(value)``."""
+    if isinstance(shader, Value | ProceduralNormal):
+        return change(shader)
+    if isinstance(shader, dict):
+        return {name: replaced(value, change) for name, value in shader.items()}
+    if hasattr(shader, "__dataclass_fields__"):
+        changed = {field.name: replaced(getattr(shader, field.name), change) for field in fields(shader)}
+        return type(shader)(**changed)
+    return shader

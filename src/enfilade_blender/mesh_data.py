@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays of Blender's meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.ply import F32, Mesh
+
+
+def read_mesh(obj: Any, graph: Any) -> Mesh | None:
+    """Triangles of an evaluated object, with normals, UV maps and colours; None without a surface.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        Evaluated.
+    graph : bpy.types.Depsgraph
+    """
+    data = obj.to_mesh(preserve_all_data_layers=True, depsgraph=graph)
+    if data is None:
+        return None
+    data.calc_loop_triangles()
+    mesh = _arrays(data)
+    obj.to_mesh_clear()
+    return mesh
+
+
+def _arrays(data: Any) -> Mesh:
+    count = len(data.loop_triangles)
+    loops = _get(data.loop_triangles, "loops", np.int32, count * 3)
+    polygons = _get(data.loop_triangles, "polygon_index", np.int32, count)
+    slots = _get(data.polygons, "material_index", np.int32, len(data.polygons))
+    positions = _get(data.vertices, "co", np.float32, len(data.vertices) * 3).reshape(-1, 3)
+    normals = _get(data.corner_normals, "vector", np.float32, len(data.loops) * 3).reshape(-1, 3)
+    corners = _get(data.loops, "vertex_index", np.int32, len(data.loops))
+    uvs = {}
+    for layer in data.uv_layers:
+        uvs[layer.name] = _get(layer.uv, "vector", np.float32, len(data.loops) * 2).reshape(-1, 2)[loops]
+    colours = {}
+    for attribute in data.color_attributes:
+        per_corner = attribute.domain == "CORNER"
+        size = len(data.loops) if per_corner else len(data.vertices)
+        colour = _get(attribute.data, "color", np.float32, size * 4).reshape(-1, 4)[:, :3]
+        colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 3)
+    active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
+    active_colour = data.color_attributes.render_color_index if colours else -1
+    return Mesh(
+        positions=positions,
+        triangles=corners[loops].reshape(-1, 3),
+        normals=normals[loops].reshape(-1, 3, 3),
+        uvs={name: uv.reshape(-1, 3, 2) for name, uv in uvs.items()},
+        colours=colours,
+        materials=slots[polygons],
+        active_uv=active_uv,
+        active_colour=list(colours)[active_colour] if 0 <= active_colour < len(colours) else "",
+    )
+
+
+def _get(items: Any, name: str, kind: Any, size: int) -> Any:
+    values: F32 = np.empty(size, kind)
+    items.foreach_get(name, values)
+    return values

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opens a Blender file, or one that Blender imports, without its scripts; selects what is exported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from enfilade_blender.failure import ExportError
+from enfilade_blender.job import Job
+from enfilade_blender.records import Selection
+
+IMPORTERS: dict[str, Callable[..., Any]] = {
+    ".glb": lambda file: bpy.ops.import_scene.gltf(filepath=file),
+    ".gltf": lambda file: bpy.ops.import_scene.gltf(filepath=file),
+    ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
+    ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
+    ".usd": lambda file: bpy.ops.wm.usd_import(filepath=file),
+    ".usda": lambda file: bpy.ops.wm.usd_import(filepath=file),
+    ".usdc": lambda file: bpy.ops.wm.usd_import(filepath=file),
+    ".usdz": lambda file: bpy.ops.wm.usd_import(filepath=file),
+}
+DATA = (
+    "meshes",
+    "curves",
+    "materials",
+    "images",
+    "lights",
+    "cameras",
+    "worlds",
+    "objects",
+    "collections",
+    "scenes",
+)
+
+
+def open_source(job: Job) -> Selection:
+    """Open the source of a job.
+
+    Raises
+    ------
+    ExportError
+        It is missing, damaged, of an unknown kind, uses a library of another folder, or lacks the selection.
+    """
+    if not job.source.is_file():
+        raise ExportError("there is no such file", str(job.source), "check the path")
+    suffix = job.source.suffix.lower()
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    try:
+        if suffix == ".blend":
+            _check_is_blend(job.source)
+            bpy.ops.wm.open_mainfile(filepath=str(job.source), load_ui=False, use_scripts=False)
+            _check_libraries(job)
+        elif suffix in IMPORTERS:
+            _clear()
+            IMPORTERS[suffix](str(job.source))
+        else:
+            raise ExportError("unknown kind of file", str(job.source), f"give .blend, {', '.join(IMPORTERS)}")
+    except RuntimeError as error:  # of Blender's operators
+        reason = str(error).strip().removeprefix("Error: ").splitlines()[0]
+        raise ExportError(
+            f"Blender can't open it: {reason}", str(job.source), "open it in Blender, and save it again"
+        ) from error
+    return _select(job)
+
+
+def _check_is_blend(file: Path) -> None:
+    """Refuse files that Blender would read as an empty scene."""
+    with file.open("rb") as stream:
+        start = stream.read(7)
+    is_blend = start == b"BLENDER" or start[:4] == b"\x28\xb5\x2f\xfd" or start[:2] == b"\x1f\x8b"
+    if not is_blend:
+        raise ExportError(
+            "this is no .blend file", str(file), "check the path; the file may be cut off or damaged"
+        )
+
+
+def _clear() -> None:
+    """Remove everything, so that an importer's objects are alone."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def _check_libraries(job: Job) -> None:
+    folders = [job.source.resolve().parent, *(folder.resolve() for folder in job.library_folders)]
+    for library in bpy.data.libraries:
+        file = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
+        if not any(file.is_relative_to(folder) for folder in folders):
+            raise ExportError(
+                f"it links the library {file}, outside the allowed folders",
+                str(job.source),
+                f"allow {file.parent}, or make the linked data local in Blender",
+            )
+        if not file.is_file():
+            raise ExportError(
+                f"its library {file} is missing", str(job.source), "put the library there, or relink it"
+            )
+
+
+def _select(job: Job) -> Selection:
+    scene = _by_name(bpy.data.scenes, job.scene, "scene", job) if job.scene else bpy.context.scene
+    bpy.context.window.scene = scene
+    layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
+    layer = _by_name(scene.view_layers, job.view_layer, "view layer", job) if job.view_layer else layers[0]
+    bpy.context.window.view_layer = layer
+    if job.camera:
+        camera = _by_name(scene.objects, job.camera, "camera", job)
+        scene.camera = camera
+        for marker in scene.timeline_markers:
+            marker.camera = None
+    render = scene.render
+    share = render.resolution_percentage / 100.0
+    size = job.size or tuple(
+        max(2, round(n * share) // 2 * 2) for n in (render.resolution_x, render.resolution_y)
+    )
+    return Selection(scene, layer, job.frames or (scene.frame_start, scene.frame_end), size)
+
+
+def _by_name(items: Any, name: str, kind: str, job: Job) -> Any:
+    if name not in items:
+        names = ", ".join(sorted(item.name for item in items))
+        raise ExportError(f"it has no {kind} {name!r}", str(job.source), f"choose one of {names}")
+    return items[name]

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangle meshes, and binary PLY files of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with values at their corners.
+
+    Attributes
+    ----------
+    positions : (V, 3) float32
+    triangles : (N, 3) int32
+        Indices of positions.
+    normals : (N, 3, 3) float32
+        Unit normals of corners.
+    uvs : dict of (N, 3, 2) float32
+        Texture coordinates of corners by the name of the UV map; v points up.
+    colours : dict of (N, 3, 3) float32
+        Linear colours of corners by the name of the attribute.
+    materials : (N,) int32
+        Slots.
+    active_uv : str
+        UV map of nodes that name none; empty where there is none.
+    active_colour : str
+        Attribute of nodes that name none; empty where there is none.
+    """
+
+    positions: F32
+    triangles: I32
+    normals: F32
+    uvs: dict[str, F32]
+    colours: dict[str, F32]
+    materials: I32
+    active_uv: str = ""
+    active_colour: str = ""
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    def select(self, keep: npt.NDArray[np.bool_]) -> Mesh:
+        """The triangles of a mask (N,); positions that none of them uses are left out."""
+        used, triangles = np.unique(self.triangles[keep], return_inverse=True)
+        return replace(
+            self,
+            positions=self.positions[used],
+            triangles=triangles.reshape(-1, 3).astype(np.int32),
+            normals=self.normals[keep],
+            uvs={name: uv[keep] for name, uv in self.uvs.items()},
+            colours={name: colour[keep] for name, colour in self.colours.items()},
+            materials=self.materials[keep],
+        )
+
+    def transformed(self, matrix: npt.NDArray[np.float64]) -> Mesh:
+        """The mesh under an affine map (4, 4). A reflection turns the order of corners, too."""
+        linear = matrix[:3, :3]
+        positions = self.positions @ linear.T + matrix[:3, 3]
+        cofactors = np.stack([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
+        mirror = -1.0 if np.linalg.det(linear) < 0.0 else 1.0
+        normals = self.normals @ (mirror * cofactors).T
+        normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
+        moved = replace(self, positions=positions.astype(np.float32), normals=normals.astype(np.float32))
+        return moved.reversed() if mirror < 0.0 else moved
+
+    def reversed(self) -> Mesh:
+        """The same corners in opposite order; normals stay."""
+        return replace(
+            self,
+            triangles=self.triangles[:, ::-1],
+            normals=self.normals[:, ::-1],
+            uvs={name: uv[:, ::-1] for name, uv in self.uvs.items()},
+            colours={name: colour[:, ::-1] for name, colour in self.colours.items()},
+        )
+
+    def is_closed(self) -> bool:
+        """Whether every edge has two triangles, by positions."""
+        _, merged = np.unique(self.positions, axis=0, return_inverse=True)
+        corners = merged.reshape(-1)[self.triangles].astype(np.int64)
+        edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+        edges.sort(axis=1)
+        _, counts = np.unique(edges[:, 0] * (len(self.positions) + 1) + edges[:, 1], return_counts=True)
+        return bool((counts == 2).all())
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """One mesh of copies with the same maps."""
+    first = meshes[0]
+    bases = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+    return replace(
+        first,
+        positions=np.concatenate([mesh.positions for mesh in meshes]),
+        triangles=np.concatenate([m.triangles + base for m, base in zip(meshes, bases, strict=True)]).astype(
+            np.int32
+        ),
+        normals=np.concatenate([mesh.normals for mesh in meshes]),
+        uvs={name: np.concatenate([mesh.uvs[name] for mesh in meshes]) for name in first.uvs},
+        colours={name: np.concatenate([mesh.colours[name] for mesh in meshes]) for name in first.colours},
+        materials=np.concatenate([mesh.materials for mesh in meshes]),
+    )
+
+
+def write_ply(file: Path, mesh: Mesh, uv: str | None = None, colour: str | None = None) -> None:
+    """Write a mesh with normals, and one UV map and one colour attribute where they are named.
+
+    Corners of equal position, normal, coordinates and colour become one vertex.
+    """
+    columns = [mesh.positions[mesh.triangles].reshape(-1, 3), mesh.normals.reshape(-1, 3)]
+    names = ["x", "y", "z", "nx", "ny", "nz"]
+    if uv is not None:
+        columns.append(mesh.uvs[uv].reshape(-1, 2))
+        names += ["u", "v"]
+    if colour is not None:
+        columns.append(mesh.colours[colour].reshape(-1, 3))
+        names += ["r", "g", "b"]
+    corners = np.ascontiguousarray(np.concatenate(columns, axis=1), "<f4") + np.float32(0.0)  # no -0
+    first, index = _distinct_rows(corners)
+    faces = np.empty(len(mesh), np.dtype([("count", "u1"), ("index", "<i4", 3)]))
+    faces["count"], faces["index"] = 3, index.reshape(-1, 3)
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(first)}"]
+    header += [f"property float {name}" for name in names]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    with file.open("wb") as stream:
+        stream.write("\n".join(header).encode())
+        stream.write(corners[first].tobytes())
+        stream.write(faces.tobytes())
+
+
+def _distinct_rows(rows: F32) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Places of distinct rows of 32-bit numbers, and for each row the number of its equal among them.
+
+    Rows are sorted by a hash, which is checked: sorting the rows themselves takes ten times as long.
+    """
+    multipliers = np.random.default_rng(0).integers(0, 2**63, rows.shape[1], np.uint64) * 2 + 1
+    hashes = (rows.view(np.uint32).astype(np.uint64) * multipliers).sum(axis=1, dtype=np.uint64)
+    _, first, index = np.unique(hashes, return_index=True, return_inverse=True)
+    if not np.array_equal(rows[first][index.reshape(-1)], rows):  # two rows of one hash
+        _, first, index = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, index.reshape(-1)

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Records of what is exported: the selection of a file, views, and the evaluated scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.ply import Mesh
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What a job exports.
+
+    Attributes
+    ----------
+    scene : bpy.types.Scene
+    view_layer : bpy.types.ViewLayer
+    frames : tuple of int
+        First and last.
+    size : tuple of int
+        Width and height, pixels.
+    """
+
+    scene: Any
+    view_layer: Any
+    frames: tuple[int, int]
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera at a frame.
+
+    Attributes
+    ----------
+    name : str
+    pose : (4, 4) float64
+        Rigid, from camera to world.
+    projection : (4, 4) float64
+        OpenGL's.
+    lens : dict
+        Optional keys of the file.
+    """
+
+    name: str
+    pose: np.ndarray
+    projection: np.ndarray
+    lens: dict[str, Any]
+
+    @property
+    def fov_deg(self) -> float:
+        """Vertical field of view."""
+        return math.degrees(2.0 * math.atan(1.0 / self.projection[1, 1]))
+
+    def pixels(self, points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+        """Pixel coordinates and depth of points (N, 3) of the world, (N, 3)."""
+        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
+        depth = np.maximum(-local[:, 2], 1e-6)
+        x = (self.projection[0, 0] * local[:, 0] / depth - self.projection[0, 2] + 1.0) * 0.5 * size[0]
+        y = (1.0 - self.projection[1, 1] * local[:, 1] / depth + self.projection[1, 2]) * 0.5 * size[1]
+        return np.stack([x, y, -local[:, 2]], axis=-1)
+
+
+@dataclass(eq=False)
+class Placed:
+    """An object's mesh with the matrices of its copies.
+
+    Attributes
+    ----------
+    name : str
+        Of the object; of an instance, with that of its instancer.
+    mesh
+    slots : tuple
+        Materials (bpy) or None.
+    matrices : list of (4, 4) float64
+    is_instance : bool
+    """
+
+    name: str
+    mesh: Mesh
+    slots: tuple[Any, ...]
+    matrices: list[np.ndarray] = field(default_factory=list)
+    is_instance: bool = False
+
+
+@dataclass(eq=False)
+class Lamp:
+    """A light of the scene: its data and its matrix (4, 4) float64."""
+
+    name: str
+    data: Any
+    matrix: np.ndarray
+
+
+@dataclass(eq=False)
+class Evaluated:
+    """Objects and lights of a scene at one frame."""
+
+    placed: list[Placed] = field(default_factory=list)
+    lamps: list[Lamp] = field(default_factory=list)
+    instances: int = 0
+    triangles: int = 0

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders frames by Cycles on the CPU, as linear OpenEXR images: a rival, and the reference of a check."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import bpy
+
+from enfilade_blender.job import Job
+from enfilade_blender.notes import report_progress
+from enfilade_blender.open_file import open_source
+
+
+def render_frames(job: Job) -> dict[str, Any]:
+    """Render ``job.frame_list`` into ``cycles-NNNN.exr``; content of ``cycles.json``.
+
+    Data stays in memory from frame to frame. With ``job.unbiased`` the file's clamping, filtered glossy and
+    light threshold are off, and pixels are boxes. Limits of bounces stay the file's.
+    """
+    selection = open_source(job)
+    scene = selection.scene
+    render, cycles = scene.render, scene.cycles
+    render.engine, cycles.device = "CYCLES", "CPU"
+    render.use_persistent_data = True
+    render.resolution_x, render.resolution_y = selection.size
+    render.resolution_percentage = 100
+    render.use_compositing = render.use_sequencer = render.use_motion_blur = False
+    settings = render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
+    cycles.samples, cycles.seed = job.spp, job.seed
+    cycles.use_adaptive_sampling, cycles.use_denoising = False, job.denoise
+    if job.denoise:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+    if job.unbiased:
+        cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+        cycles.blur_glossy = cycles.light_sampling_threshold = 0.0
+        cycles.pixel_filter_type = "BOX"
+    for layer in scene.view_layers:
+        layer.use = layer == selection.view_layer
+    frames = job.frame_list or (selection.frames[0],)
+    seconds = []
+    for number, frame in enumerate(frames):
+        report_progress(number / len(frames), f"frame {frame}")
+        scene.frame_set(frame)
+        render.filepath = str(job.out / f"cycles-{frame:04d}.exr")
+        start = time.perf_counter(), time.process_time()
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        seconds.append(
+            {
+                "frame": frame,
+                "wall_s": time.perf_counter() - start[0],
+                "cpu_s": time.process_time() - start[1],
+            }
+        )
+    return {
+        "format": "enfilade-cycles",
+        "version": 1,
+        "blender": bpy.app.version_string,
+        "spp": job.spp,
+        "frames": seconds,
+    }

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes of the scene: a mesh for each object and material slot, with their BSDFs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.job import Job
+from enfilade_blender.materials.bake import Bakery
+from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.surfaces import Surface, build
+from enfilade_blender.materials.textures import Textures
+from enfilade_blender.materials.values import (
+    AttributeValue,
+    Constant,
+    ImageValue,
+    Lobe,
+    Shader,
+    Texture,
+    values_of,
+)
+from enfilade_blender.notes import Notes, report_progress
+from enfilade_blender.ply import Mesh, joined, write_ply
+from enfilade_blender.records import Placed, Selection, View
+from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, reference
+
+DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), Constant((0.0,)), Constant((1.0,)), None, "no material")
+GLASS = {"dielectric", "roughdielectric", "thindielectric"}
+FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
+INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
+BACK_OFFSET = 1e-4  # of the size of an open emitter: distance of its back
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The triangles of one slot of an object."""
+
+    name: str
+    mesh: Mesh
+    material: Any
+    placed: Placed
+
+
+class Shapes:
+    """Writes meshes, and collects elements.
+
+    Parameters
+    ----------
+    job, selection, notes
+    views : list of View
+        Whose distances choose the resolution of baked textures.
+
+    Attributes
+    ----------
+    textures : Textures
+    identifiers : Identifiers
+        Of shapes.
+    has_glass : bool
+    """
+
+    def __init__(self, job: Job, selection: Selection, views: list[View], notes: Notes) -> None:
+        self._out, self._notes = job.out, notes
+        self.textures = Textures(job.out, notes)
+        self.identifiers, self._bsdf_ids, self._files = Identifiers(), Identifiers(), Identifiers()
+        self._bakery = Bakery(job, selection, views, self.textures, notes)
+        self._shaders: dict[Any, Shader] = {}
+        self._shared: dict[Any, tuple[str, Any]] = {}
+        self._bsdfs: list[Element] = []
+        self.has_glass = False
+        (job.out / "meshes").mkdir(exist_ok=True)
+
+    @property
+    def material_count(self) -> int:
+        """Number of BSDFs."""
+        return len(self._bsdfs)
+
+    def write(self, placed: list[Placed]) -> list[Element]:
+        """Write all meshes; elements of BSDFs and shapes."""
+        shapes: list[Element] = []
+        total = sum(len(p.mesh) * len(p.matrices) for p in placed)
+        for number, item in enumerate(placed):
+            if number % 50 == 0:
+                report_progress(0.3 + 0.6 * number / len(placed), "materials")
+            copies = len(item.matrices)
+            is_instanced = (
+                total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
+            )
+            shapes += self._object(item, is_instanced=is_instanced)
+        return [*self._bsdfs, *shapes]
+
+    def _object(self, placed: Placed, *, is_instanced: bool) -> list[Element]:
+        parts = list(_parts(placed))
+        elements, instanced = [], []
+        for part in parts:
+            name = (
+                part.name
+                if len(parts) == 1
+                else f"{part.name}: {part.material.name if part.material else 'none'}"
+            )
+            shader, mesh, is_own = self._bakery.resolve(
+                self._shader(part.material), part.material, part.mesh, placed
+            )
+            bsdf, surface, uv, attribute = self._bsdf(shader, part, mesh, is_own=is_own)
+            if surface.is_invisible and not surface.emitted:
+                continue
+            radiance = surface.radiance(self._context(part.material))
+            mesh = _with_maps(mesh, uv, attribute)
+            if is_instanced and radiance is None:
+                instanced.append(self._shape(name, mesh, bsdf, None, uv, attribute))
+                continue
+            mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
+            elements.append(self._shape(name, mesh, bsdf, radiance, uv, attribute))
+            if radiance is not None and not mesh.is_closed():
+                elements.append(self._shape(f"{name} back", _back(mesh), bsdf, radiance, uv, attribute))
+        return elements + (self._instances(placed, instanced) if instanced else [])
+
+    def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
+        group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))
+        copies = []
+        for matrix in placed.matrices:
+            copy = plugin("shape", "instance", reference(group.get("id") or ""), to_world=matrix)
+            copies.append(named(copy, self.identifiers.unique(placed.name)))
+        return [group, *copies]
+
+    def _shape(
+        self, name: str, mesh: Mesh, bsdf: str, radiance: Any, uv: str | None, attribute: str | None
+    ) -> Element:
+        file = f"meshes/{self._files.unique(_file_name(name))}.ply"
+        write_ply(self._out / file, mesh, uv, attribute)
+        shape = plugin("shape", "ply", reference(bsdf), filename=file)
+        if radiance is not None:
+            shape.append(plugin("emitter", "area", radiance=radiance))
+        return named(shape, self.identifiers.unique(name))
+
+    def _shader(self, material: Any) -> Shader:
+        if material is None:
+            return DEFAULT
+        if material.name_full not in self._shaders:
+            if material.use_nodes and material.node_tree is not None:
+                shader = Graph(material.name, self._notes).surface(material.node_tree)
+            else:
+                shader = replace(DEFAULT, colour=Constant(tuple(material.diffuse_color)[:3]))
+            self._shaders[material.name_full] = shader
+        return self._shaders[material.name_full]
+
+    def _bsdf(
+        self, shader: Shader, part: _Part, mesh: Mesh, *, is_own: bool
+    ) -> tuple[str, Surface, str | None, str | None]:
+        """Id of a BSDF, its surface, and the UV map and attribute of the mesh that it reads."""
+        uv, attribute = _maps(shader, mesh)
+        material = part.material
+        key = (material.name_full if material else "", part.name if is_own else "")
+        if key not in self._shared:
+            surface = build(shader, self._context(material))
+            element = surface.element(self._context(material))
+            name = material.name if material else "no material"
+            identifier = self._bsdf_ids.unique(
+                f"material {name}: {part.name}" if is_own else f"material {name}"
+            )
+            self._bsdfs.append(named(element, identifier))
+            self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
+            self._shared[key] = identifier, surface
+        return (*self._shared[key], uv, attribute)
+
+    def _context(self, material: Any) -> Context:
+        return Context(material.name if material else "no material", self.textures, self._notes)
+
+
+def _parts(placed: Placed) -> Any:
+    """Parts of an object, in the order of slots."""
+    last = max(len(placed.slots) - 1, 0)
+    slots = np.clip(placed.mesh.materials, 0, last)
+    for slot in np.unique(slots):
+        mesh = placed.mesh if (slots == slot).all() else placed.mesh.select(slots == slot)
+        yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed)
+
+
+def _maps(shader: Shader, mesh: Mesh) -> tuple[str | None, str | None]:
+    """UV map and colour attribute that a shader reads; None for neither."""
+    uv = attribute = None
+    for value in values_of(shader):
+        if isinstance(value, ImageValue | Texture):
+            uv = value.uv_map or mesh.active_uv
+        if isinstance(value, AttributeValue):
+            attribute = value.name or mesh.active_colour
+    return uv, attribute
+
+
+def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:
+    """The mesh with the maps that its material reads; those that it lacks are 0, as in Cycles."""
+    uvs, colours = dict(mesh.uvs), dict(mesh.colours)
+    if uv is not None:
+        uvs.setdefault(uv, np.zeros((len(mesh), 3, 2), np.float32))
+    if attribute is not None:
+        colours.setdefault(attribute, np.zeros((len(mesh), 3, 3), np.float32))
+    return replace(mesh, uvs=uvs, colours=colours)
+
+
+def _back(mesh: Mesh) -> Mesh:
+    """The other side of an open emitter, a little behind it."""
+    size = float(np.ptp(mesh.positions, axis=0).max(initial=0.0))
+    back = mesh.reversed()
+    corners = back.positions[back.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    offsets = np.zeros_like(back.positions)
+    for corner in range(3):
+        np.add.at(offsets, back.triangles[:, corner], normals)
+    offsets /= np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-30)
+    return replace(back, positions=back.positions + offsets * size * BACK_OFFSET, normals=-back.normals)
+
+
+def _file_name(name: str) -> str:
+    """A name of a file: letters, digits and a few marks of any script."""
+    return "".join(c if c.isalnum() or c in " -_" else "_" for c in name)[:80]

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world: a constant emitter, or an environment map that Cycles renders of it, with the sun's disc."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from enfilade_blender.image_files import F32, write_exr
+from enfilade_blender.lights import Sun
+from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.textures import linear_pixels
+from enfilade_blender.materials.values import Constant, Emission, Nothing
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Selection
+from enfilade_blender.scene_xml import Element, plugin
+
+WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096
+SAMPLES = 16
+LOCAL_FROM_WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
+FILE = "textures/environment.exr"
+
+
+def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Notes) -> list[Element]:
+    """The world's emitter; none where it is black and without a sun."""
+    world = selection.scene.world
+    _note_world(selection, notes)
+    plain = _plain(world, notes)
+    if plain is not None and sun is None:
+        return [plugin("emitter", "constant", radiance=plain)] if max(plain) > 0.0 else []
+    if plain is not None:
+        image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
+    else:
+        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder)
+        what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
+        notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
+    if sun is not None:
+        image += sun_disc(sun, image.shape[1])
+    write_exr(folder / FILE, image)
+    return [plugin("emitter", "envmap", filename=FILE, to_world=np.linalg.inv(LOCAL_FROM_WORLD))]
+
+
+def sun_disc(sun: Sun, width: int) -> F32:
+    """Radiance (width / 2, width, 3) of a sun's disc, whose irradiance is that of the lamp.
+
+    Pixels at its edge hold the part of them that is covered, of 8x8 points.
+    """
+    half = max(0.5 * sun.angle, 2.0 * math.pi / width)
+    height, fine = width // 2, 8
+    toward = sun.direction
+    row = math.acos(float(np.clip(toward[2], -1.0, 1.0))) / math.pi * height
+    margin = half / math.pi * height + 2.0
+    rows = np.arange(max(int(row - margin), 0), min(int(row + margin) + 1, height))
+    v = (rows[:, None] + (np.arange(fine) + 0.5) / fine) / height * math.pi
+    u = (np.arange(width * fine) + 0.5) / (width * fine) * 2.0 * math.pi
+    polar, turn = v.reshape(-1)[:, None], u[None, :]
+    cosine = np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1]) + np.cos(polar) * toward[2]
+    inside = (cosine > math.cos(half)).reshape(len(rows), fine, width, fine).mean(axis=(1, 3))
+    solid_angle = 2.0 * (math.pi / height) ** 2 * np.sin((rows + 0.5) / height * math.pi) / 2.0
+    weight = float((inside * solid_angle[:, None] * _pixel_cosine(rows, width, toward)).sum())
+    image = np.zeros((height, width, 3), np.float32)
+    image[rows] = inside[..., None] * np.array(sun.irradiance) / max(weight, 1e-12)
+    return image
+
+
+def _pixel_cosine(rows: np.ndarray, width: int, toward: np.ndarray) -> np.ndarray:
+    polar = (rows[:, None] + 0.5) / (width // 2) * math.pi
+    turn = (np.arange(width)[None, :] + 0.5) / width * 2.0 * math.pi
+    cosine = np.sin(polar) * (np.sin(turn) * toward[0] + np.cos(turn) * toward[1]) + np.cos(polar) * toward[2]
+    positive: np.ndarray = np.maximum(cosine, 0.0)
+    return positive
+
+
+def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
+    """Radiance of a world of one colour; None for one with textures."""
+    if world is None:
+        return 0.0, 0.0, 0.0
+    if not world.use_nodes or world.node_tree is None:
+        r, g, b = world.color
+        return float(r), float(g), float(b)
+    output = next(
+        (node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output),
+        None,
+    )
+    if output is None:
+        return 0.0, 0.0, 0.0
+    shader = Graph(world.name, notes).shader(output.inputs["Surface"], ())
+    if isinstance(shader, Nothing):
+        return 0.0, 0.0, 0.0
+    if not isinstance(shader, Emission):
+        return None
+    colour, strength = shader.colour, shader.strength
+    if not (isinstance(colour, Constant) and isinstance(strength, Constant)):
+        return None
+    r, g, b = (c * strength.number for c in colour.colour)
+    return r, g, b
+
+
+def _rendered(world: Any, width: int, folder: Path) -> F32:
+    """Radiance of a world, from north at the left edge over east, zenith on top."""
+    images = [node.image for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT" and node.image]
+    width = min(max([width, *(image.size[0] for image in images)]), WIDTH_MAX)
+    if any(node.type == "TEX_SKY" for node in world.node_tree.nodes):
+        width = max(width, WIDTH_SUN)
+    scene = bpy.data.scenes.new("enfilade world")
+    scene.world = world
+    camera = bpy.data.cameras.new("enfilade world")
+    camera.type = "PANO"
+    (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
+    eye = bpy.data.objects.new("enfilade world", camera)
+    eye.rotation_euler = (math.pi / 2.0, 0.0, 0.0)  # looks north, +y
+    scene.collection.objects.link(eye)
+    scene.camera = eye
+    render = scene.render
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, width // 2, 100
+    settings = render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
+    render.filepath = str(folder / "textures" / "rendered.exr")
+    cycles = scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = SAMPLES, False, False
+    cycles.pixel_filter_type, cycles.sample_clamp_direct = "BOX", 0.0
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+    image = bpy.data.images.load(render.filepath)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = linear_pixels(image)[..., :3]
+    bpy.data.images.remove(image)
+    bpy.data.scenes.remove(scene)
+    (folder / "textures" / "rendered.exr").unlink()
+    return np.roll(pixels, -(width // 2), axis=1)
+
+
+def _note_world(selection: Selection, notes: Notes) -> None:
+    scene, world = selection.scene, selection.scene.world
+    if scene.render.film_transparent:
+        effect = "the world is seen where the film would be transparent"
+        notes.add("not-carried", scene.name, "Film: Transparent", "the background is opaque", effect)
+    if world is None or not world.use_nodes or world.node_tree is None:
+        return
+    if any(node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in world.node_tree.nodes):
+        notes.add("not-carried", world.name, "Volume", "the world's volume is left out", "there is no fog")

@@ -1,0 +1,1 @@
+"""Fidelity of scenes that are imported from Blender, against Cycles."""

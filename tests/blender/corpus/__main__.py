@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes files: ``python tests/blender/corpus FOLDER [NAME ...]``, in Blender's Python; ``--list`` names
+them."""
+
+import os
+import sys
+from pathlib import Path
+
+sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+from corpus import lights, objects, surfaces  # noqa: E402
+from corpus.stage import save  # noqa: E402
+
+CASES = {case.__name__: case for module in (surfaces, lights, objects) for case in module.CASES}
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--list":
+        sys.stdout.write(" ".join(CASES))
+        sys.exit()
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in sys.argv[2:] or CASES:
+        after = CASES[name](folder)
+        save(folder, name)
+        if after is not None:
+            after()
+    sys.stdout.flush()
+    os._exit(0)

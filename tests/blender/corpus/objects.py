@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of instances, modifiers, cameras, names and links."""
+
+import math
+from pathlib import Path
+
+import bpy
+
+from corpus.stage import (
+    add,
+    aim,
+    camera,
+    cube,
+    image,
+    new_file,
+    plane,
+    principled,
+    save,
+    sphere,
+    stage,
+    three,
+    tiles,
+)
+
+
+def instances(folder):
+    stage()
+    chair = cube(
+        "Chair",
+        (0.0, 0.0, 0.25),
+        0.5,
+        principled("chair", **{"Base Color": (0.7, 0.3, 0.1, 1), "Roughness": 0.5}),
+    )
+    knob = sphere(
+        "Knob",
+        (0.0, 0.0, 0.65),
+        0.15,
+        principled("knob", **{"Base Color": (0.8, 0.8, 0.8, 1), "Metallic": 1.0, "Roughness": 0.2}),
+    )
+    group = bpy.data.collections.new("Chairs")
+    for obj in (chair, knob):
+        bpy.context.scene.collection.objects.unlink(obj)
+        group.objects.link(obj)
+    for i in range(6):
+        empty = add(f"copy {i}", None, (-2.0 + 0.8 * i, -0.5 + 0.3 * (i % 2), 0.0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+        empty.rotation_euler, empty.scale = (0.0, 0.0, 0.4 * i), (1.0 if i % 2 else -0.7, 0.7, 0.7 + 0.1 * i)
+
+
+def modifiers(folder):
+    stage()
+    three([principled(f"grey {i}", **{"Base Color": (0.6, 0.5, 0.4, 1), "Roughness": 0.4}) for i in range(3)])
+    soft = bpy.data.objects["Middle"]
+    level = soft.modifiers.new("Subdivision", "SUBSURF")
+    level.levels, level.render_levels = 0, 3
+    row = bpy.data.objects["Left"].modifiers.new("Array", "ARRAY")
+    row.count, row.relative_offset_displace = 2, (0.0, 1.1, 0.0)
+    bevel = cube("Box", (0.0, -1.2, 0.25), 0.5, principled("box", Roughness=0.6)).modifiers.new(
+        "Bevel", "BEVEL"
+    )
+    bevel.width, bevel.segments = 0.1, 3
+    hidden = cube("Hidden", (0.0, -1.8, 0.8), 0.8, principled("hidden"))
+    hidden.hide_render = True
+    only_viewport = sphere("Viewport only", (0.8, -1.5, 0.5), 0.3, principled("viewport"))
+    only_viewport.hide_viewport = True  # is rendered
+
+
+def geometry_nodes(folder):
+    stage()
+    pebble = sphere(
+        "Pebble",
+        (0.0, 0.0, -5.0),
+        0.12,
+        principled("pebble", **{"Base Color": (0.6, 0.2, 0.5, 1), "Roughness": 0.4}),
+    )
+    pebble.hide_render = True
+    ground = plane("Ground", (0.0, 0.0, 0.05), 3.0, principled("ground", Roughness=0.9))
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
+    points.inputs["Density"].default_value = 8.0
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = pebble, True
+    copies, join = tree.nodes.new("GeometryNodeInstanceOnPoints"), tree.nodes.new("GeometryNodeJoinGeometry")
+    tree.links.new(start.outputs[0], points.inputs["Mesh"])
+    tree.links.new(points.outputs["Points"], copies.inputs["Points"])
+    tree.links.new(info.outputs["Geometry"], copies.inputs["Instance"])
+    tree.links.new(copies.outputs[0], join.inputs[0])
+    tree.links.new(start.outputs[0], join.inputs[0])
+    tree.links.new(join.outputs[0], end.inputs[0])
+    ground.modifiers.new("Scatter", "NODES").node_group = tree
+
+
+def markers(folder):
+    scene, _ = stage()
+    three(
+        [
+            principled(f"colour {i}", **{"Base Color": (*c, 1)})
+            for i, c in enumerate([(0.7, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.1, 0.7)])
+        ]
+    )
+    scene.frame_start, scene.frame_end = 5, 12
+    first = scene.camera
+    first.name = "Wide"
+    first.keyframe_insert("location", frame=5)
+    first.location.x += 0.4
+    first.keyframe_insert("location", frame=12)
+    second = camera((2.5, -3.0, 1.2), (0.0, 0.0, 0.5), lens=50.0)
+    second.name = "Close"
+    for frame, eye in ((5, first), (9, second)):
+        marker = scene.timeline_markers.new(eye.name, frame=frame)
+        marker.camera = eye
+
+
+def lens_shift(folder):
+    scene, _ = stage()
+    three(
+        [
+            principled(f"colour {i}", **{"Base Color": (*c, 1)})
+            for i, c in enumerate([(0.7, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.1, 0.7)])
+        ]
+    )
+    data = scene.camera.data
+    data.shift_x, data.shift_y, data.sensor_fit, data.sensor_height = 0.15, -0.1, "VERTICAL", 22.0
+
+
+def agx(folder):
+    scene, _ = stage()
+    three([principled(f"grey {i}", **{"Base Color": (0.5, 0.5, 0.5, 1)}) for i in range(3)])
+    scene.view_settings.view_transform, scene.view_settings.look = "AgX", "AgX - Punchy"
+    scene.view_settings.exposure = 0.7
+
+
+def names(folder):
+    stage()
+    three(
+        [
+            principled(name, **{"Base Color": image(f"bild {name}", tiles), "Roughness": 0.7})
+            for name in ("grün", "模型 1", 'a/b: <c> & "d".001')
+        ]
+    )
+    bpy.data.objects["Left"].name = "Stühle é.001"
+    bpy.data.objects["Middle"].name = "椅子 <1>"
+    bpy.data.objects["Right"].name = "a/b\\c"
+
+
+def missing_image(folder):
+    stage()
+    lost = bpy.data.images.load(str(_written(folder, "lost.png")))
+    three(
+        [
+            principled("lost", **{"Base Color": lost, "Roughness": 0.7}),
+            principled("kept"),
+            principled("lost too", **{"Base Color": lost}),
+        ]
+    )
+    return (Path(folder) / "lost.png").unlink
+
+
+def image_file(folder):
+    stage()
+    picture = bpy.data.images.load(str(_written(folder, "picture é.png")))
+    three([principled(f"picture {r}", **{"Base Color": picture, "Roughness": r}) for r in (0.3, 0.6, 0.9)])
+
+
+def library(folder):
+    new_file()
+    shelf = cube(
+        "Shelf",
+        (0.0, 0.0, 0.0),
+        0.9,
+        principled("shelf", **{"Base Color": (0.2, 0.5, 0.3, 1), "Roughness": 0.5}),
+    )
+    shelf.rotation_euler = (0.0, 0.0, 0.3)
+    file = save(folder, "shelf of a library")
+    stage()
+    with bpy.data.libraries.load(str(file), link=True, relative=False) as (_, wanted):
+        wanted.objects = ["Shelf"]
+    for x in (-1.2, 1.2):
+        empty = add(f"place {x}", None, (x, 0.0, 0.45))
+        empty.instance_type = "COLLECTION"
+        group = bpy.data.collections.new(f"linked {x}")
+        group.objects.link(wanted.objects[0])
+        empty.instance_collection = group
+
+
+def two_slots(folder):
+    stage()
+    three([principled("paint", **{"Base Color": (0.7, 0.2, 0.1, 1), "Roughness": 0.4}) for _ in range(3)])
+    for name in ("Left", "Middle", "Right"):
+        data = bpy.data.objects[name].data
+        data.materials.append(
+            principled(
+                f"second {name}", **{"Base Color": (0.9, 0.9, 0.9, 1), "Metallic": 1.0, "Roughness": 0.25}
+            )
+        )
+        for polygon in data.polygons:
+            polygon.material_index = int(polygon.center.z > 0.1)
+    aim(bpy.data.objects["Camera"], (0.0, 0.0, 0.6 * math.sqrt(1.0)))
+
+
+def _written(folder, name):
+    picture = image("written", tiles)
+    picture.filepath_raw, picture.file_format = str(Path(folder) / name), "PNG"
+    picture.save()
+    return Path(folder) / name
+
+
+CASES = (
+    instances,
+    modifiers,
+    geometry_nodes,
+    markers,
+    lens_shift,
+    agx,
+    names,
+    missing_image,
+    image_file,
+    library,
+    two_slots,
+)

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stage of the files: a floor with tiles, a wall, a camera, an area light and a world of one colour."""
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+SIZE = 128, 96
+
+
+def new_file():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.frame_start = scene.frame_end = 1
+    scene.view_settings.view_transform = "Standard"
+    camera((0.0, -5.2, 2.0), (0.0, 0.0, 0.7))
+    return scene
+
+
+def stage(*, lit=True):
+    scene = new_file()
+    floor = plane(
+        "Floor",
+        (0.0, 0.0, 0.0),
+        8.0,
+        principled(
+            "floor", **{"Base Color": (0.45, 0.42, 0.4, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
+        ),
+    )
+    wall = plane(
+        "Wall",
+        (0.0, 3.0, 2.0),
+        8.0,
+        principled(
+            "wall", **{"Base Color": (0.3, 0.45, 0.6, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
+        ),
+    )
+    wall.rotation_euler = (math.pi / 2, 0.0, 0.0)
+    if lit:
+        light("AREA", "Key", (-2.0, -3.0, 4.0), 150.0, target=(0, 0, 0.5), size=1.5)
+        world((0.3, 0.35, 0.4))
+    return scene, floor
+
+
+def camera(eye, target, lens=35.0):
+    data = bpy.data.cameras.new("Camera")
+    data.lens = lens
+    obj = add("Camera", data, eye)
+    aim(obj, target)
+    bpy.context.scene.camera = obj
+    return obj
+
+
+def aim(obj, target):
+    obj.rotation_euler = (Vector(target) - obj.location).to_track_quat("-Z", "Y").to_euler()
+
+
+def add(name, data, location=(0.0, 0.0, 0.0)):
+    obj = bpy.data.objects.new(name, data)
+    obj.location = location
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def light(kind, name, location, energy, target=(0.0, 0.0, 0.0), **settings):
+    data = bpy.data.lights.new(name, kind)
+    data.energy = energy
+    for key, value in settings.items():
+        setattr(data, key, value)
+    obj = add(name, data, location)
+    aim(obj, target)
+    return obj
+
+
+def world(colour, strength=1.0):
+    value = bpy.data.worlds.new("World")
+    value.use_nodes = True
+    background = value.node_tree.nodes["Background"]
+    background.inputs[0].default_value = (*colour, 1.0)
+    background.inputs[1].default_value = strength
+    bpy.context.scene.world = value
+    return value
+
+
+def plane(name, location, size, material):
+    bpy.ops.mesh.primitive_plane_add(size=size, location=location)
+    return finish(name, material)
+
+
+def cube(name, location, size, material):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=location)
+    return finish(name, material)
+
+
+def sphere(name, location, radius, material):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=64, ring_count=32)
+    obj = finish(name, material)
+    bpy.ops.object.shade_smooth()
+    return obj
+
+
+def finish(name, material):
+    obj = bpy.context.object
+    obj.name = name
+    obj.data.materials.append(material)
+    return obj
+
+
+def three(materials):
+    """Three objects in a row: a sphere, a cube, and a sphere."""
+    first, second, third = materials
+    sphere("Left", (-1.35, 0.0, 0.61), 0.6, first)
+    cube("Middle", (0.0, 0.2, 0.46), 0.9, second).rotation_euler = (0.0, 0.0, 0.5)
+    sphere("Right", (1.35, 0.0, 0.61), 0.6, third)
+
+
+def principled(name, **inputs):
+    """A Principled material; an image or an output of a node is linked."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    node = tree.nodes["Principled BSDF"]
+    for key, value in inputs.items():
+        if isinstance(value, bpy.types.Image):
+            texture = tree.nodes.new("ShaderNodeTexImage")
+            texture.image = value
+            tree.links.new(texture.outputs["Color"], node.inputs[key])
+        else:
+            node.inputs[key].default_value = value
+    return material
+
+
+def shader(name, kind, **inputs):
+    """A material of one shader node; its tree and that node."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.remove(tree.nodes["Principled BSDF"])
+    node = node_of(tree, kind, **inputs)
+    tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    return material, tree, node
+
+
+def node_of(tree, kind, **inputs):
+    node = tree.nodes.new(kind)
+    for key, value in inputs.items():
+        node.inputs[key].default_value = value
+    return node
+
+
+def image(name, function, size=256, *, space="sRGB", alpha=None):
+    """An image of ``function(x, y)`` -> (H, W, 3), x and y in 0..1 with y up, packed into the file."""
+    y, x = (np.mgrid[0:size, 0:size] + 0.5) / size
+    rgba = np.ones((size, size, 4), np.float32)
+    rgba[..., :3] = function(x, y)
+    if alpha is not None:
+        rgba[..., 3] = alpha(x, y)
+    value = bpy.data.images.new(name, size, size, alpha=alpha is not None)
+    value.colorspace_settings.name = space
+    value.pixels.foreach_set(rgba.ravel())
+    value.update()
+    value.pack()
+    return value
+
+
+def tiles(x, y, n=8, dark=(0.1, 0.1, 0.3), bright=(0.9, 0.8, 0.6)):
+    """Tiles; the lower left one is red, so that a turned image is seen."""
+    odd = ((np.floor(x * n) + np.floor(y * n)) % 2)[..., None]
+    colour = odd * np.array(bright) + (1.0 - odd) * np.array(dark)
+    corner = ((x < 2.0 / n) & (y < 1.0 / n))[..., None]
+    return np.where(corner, np.array((0.9, 0.1, 0.1)), colour)
+
+
+def save(folder, name):
+    file = Path(folder) / f"{name}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), compress=True, relative_remap=False)
+    return file

@@ -1,0 +1,175 @@
+"""The exporter inside Blender: what is written of small files, and what is refused."""
+
+import json
+import shutil
+from functools import cache
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from enfilade.camera.load import load_path
+from enfilade.scene.mitsuba.files import check_scene
+from enfilade.settings import LimitSettings
+from studies.blender.__main__ import read_exr, render
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+FILES = (
+    "modifiers",
+    "instances",
+    "markers",
+    "lens_shift",
+    "agx",
+    "names",
+    "missing_image",
+    "library",
+    "procedural",
+    "emission",
+)
+
+
+@pytest.fixture(scope="session")
+def files(blender):
+    return dict(zip(FILES, blender.make(*FILES), strict=True))
+
+
+@pytest.fixture(scope="session")
+def exported(blender, files):
+    """Folder and ``import.json`` of an exported file; each is exported once."""
+
+    @cache
+    def export(name):
+        code, out, result = blender.job(files[name], f"scene {name}")
+        assert code == 0, result
+        return out, result
+
+    return export
+
+
+def notes(result, kind):
+    return [(note["object"], note["what"]) for note in result["notes"] if note["kind"] == kind]
+
+
+def shapes(out):
+    return {shape.id(): shape for shape in mi.load_file(str(out / "scene.xml"), optimize=False).shapes()}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_scene_is_accepted_and_the_path_is_read(exported, name):
+    out, result = exported(name)
+    check_scene(out / "scene.xml", LimitSettings())
+    path = load_path(out / "camera_path.json")
+    assert len(path.cameras) == result["frames"][1] - result["frames"][0] + 1
+    assert shapes(out)
+    assert result["counts"]["triangles"] > 0
+
+
+def test_modifiers_and_visibility_are_those_of_renders(exported):
+    out, _ = exported("modifiers")
+    found = shapes(out)
+    assert "Hidden" not in found
+    assert "Viewport only" in found  # hidden in the viewport alone
+    assert found["Middle"].face_count() == 6 * 4**3 * 2
+    assert found["Left"].face_count() == 2 * (64 * 30 * 2 + 64 * 2)
+
+
+def test_instances_are_shapes_of_their_instancers(exported):
+    out, result = exported("instances")
+    found = shapes(out)
+    assert {f"copy {i}: Chair" for i in range(6)} <= set(found)
+    assert result["counts"]["instances"] > 12
+    # A copy of negative scale keeps its normals outside.
+    box = found["copy 0: Chair"]
+    parameters = mi.traverse(box)
+    points = np.array(parameters["vertex_positions"]).reshape(-1, 3)
+    normals = np.array(parameters["vertex_normals"]).reshape(-1, 3)
+    assert (np.einsum("ij,ij->i", points - points.mean(axis=0), normals) > 0.0).all()
+
+
+def test_a_marker_is_a_cut(exported):
+    out, result = exported("markers")
+    path = json.loads((out / "camera_path.json").read_text())
+    assert (path["cuts"], path["first_frame"], len(path["camera_path"])) == ([5], 5, 8)
+    assert path["camera_path"][3]["fov"] > path["camera_path"][4]["fov"]
+    assert result["camera"] in ("Wide", "Close")
+
+
+def test_the_lens_shift_is_the_principal_point(exported):
+    out, _ = exported("lens_shift")
+    frame = json.loads((out / "camera_path.json").read_text())["camera_path"][0]
+    # Vertical fit: the shift is in units of the sensor's height; x moves the picture left, y up.
+    assert frame["principal_point"] == pytest.approx([0.5 - 0.15 * 96 / 128, 0.5 - 0.1], abs=1e-6)
+
+
+def test_view_and_exposure_are_those_of_the_file(exported):
+    _, result = exported("agx")
+    assert result["view"] == {"display": "sRGB", "view_transform": "AgX", "look": "AgX - Punchy"}
+    assert result["exposure_ev"] == pytest.approx(0.7)
+
+
+def test_names_of_any_script_are_ids(exported):
+    out, _ = exported("names")
+    assert {"Stühle é_001", "椅子 <1>", "a_b\\c"} <= set(shapes(out))
+
+
+def test_a_missing_image_is_grey_and_noted(exported):
+    out, result = exported("missing_image")
+    assert any("lost.png" in what for _, what in notes(result, "approximated"))
+    assert "lost.png" not in (out / "scene.xml").read_text()
+
+
+def test_procedural_values_are_baked_and_noted(exported):
+    out, result = exported("procedural")
+    assert {name.split(",")[0] for name, _ in notes(result, "baked")} == {"noise", "voronoi", "checker"}
+    checker = next((out / "textures").glob("checker*.png"))
+    tones = np.array(mi.Bitmap(str(checker)))
+    assert {int(tone) for tone in np.percentile(tones, [30, 95])} == {124, 231}  # 0.2 and 0.8, linear
+
+
+def test_an_open_emitter_shines_on_both_sides(exported):
+    out, _ = exported("emission")
+    found = shapes(out)
+    assert found["Screen"].is_emitter()
+    assert found["Screen back"].is_emitter()
+    assert "Left back" not in found
+
+
+def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):
+    apart = tmp_path / "library.blend"
+    shutil.copyfile(files["library"], apart)
+    code, _, error = blender.job(apart, "apart")
+    assert (code, "outside the allowed folders" in error["what"]) == (3, True)
+    code, _, _ = blender.job(apart, "allowed", library_folders=[str(files["library"].parent)])
+    assert code == 0
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_a_cut_off_file_is_refused(blender, files, tmp_path, share):
+    whole = files["agx"].read_bytes()
+    cut = tmp_path / f"cut {share}.blend"
+    cut.write_bytes(whole[: int(share * len(whole))])
+    code, _, error = blender.job(cut, f"cut {share}")
+    assert code == 3
+    assert "cut" in error["where"]
+
+
+@pytest.mark.parametrize(
+    ("limit", "word"), [({"instances": 10}, "instances"), ({"triangles": 1000}, "triangles")]
+)
+def test_limits_hold(blender, files, limit, word):
+    code, _, error = blender.job(files["instances"], f"limit {word}", limits=limit)
+    assert (code, word in error["what"]) == (3, True)
+
+
+def test_a_wrong_name_lists_the_right_ones(blender, files):
+    code, _, error = blender.job(files["agx"], "wrong camera", camera="Kamera")
+    assert (code, "Camera" in error["do"]) == (3, True)
+
+
+def test_cycles_and_mitsuba_agree_on_the_light(blender, exported, files):
+    code, out, result = blender.job(files["agx"], "cycles", task="cycles", spp=64, unbiased=True)
+    assert (code, result["spp"]) == (0, 64)
+    theirs = read_exr(out / "cycles-0001.exr")
+    ours = render(exported("agx")[0], 64, 1)
+    # Light of an area lamp and a world on plastics. The noise of the mean is 0.2 %.
+    assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=0.02)

@@ -1,0 +1,73 @@
+"""Functions from Blender's parameters to Mitsuba's."""
+
+import math
+
+import numpy as np
+import pytest
+
+from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
+from enfilade_blender.materials import mapping
+
+
+def test_sockets_of_blender_3_have_the_names_of_blender_4():
+    names = mapping.principled_names(["Base Color", "Specular", "Clearcoat", "Emission", "Metallic"])
+    assert names["Specular IOR Level"] == "Specular"
+    assert names["Coat Weight"] == "Clearcoat"
+    assert names["Emission Color"] == "Emission"
+    assert "Sheen Weight" not in names
+
+
+@pytest.mark.parametrize(("level", "factor"), [(0.0, 0.0), (0.5, 1.0), (1.0, 2.0)])
+def test_the_level_scales_the_reflectance_along_the_normal(level, factor):
+    ior = mapping.interface_ior(1.5, level)
+    assert ((ior - 1.0) / (ior + 1.0)) ** 2 == pytest.approx(0.04 * factor)
+
+
+def test_a_metal_reflects_its_colour_along_the_normal_and_all_light_at_grazing_angles():
+    colour = np.array([0.9, 0.5, 0.1])
+    eta, k = mapping.conductor_ior(colour, np.ones(3))
+    assert mapping.conductor_reflectance(eta, k, np.ones(3)) == pytest.approx(colour, abs=1e-6)
+    assert mapping.conductor_reflectance(eta, k, np.full(3, 1e-6)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_metal_is_near_schlicks_reflectance():
+    cosine = np.linspace(0.1, 1.0, 20)
+    for colour in (0.3, 0.6, 0.95):
+        eta, k = mapping.conductor_ior(np.full(3, colour), np.ones(3))
+        schlick = colour + (1.0 - colour) * (1.0 - cosine) ** 5
+        # Schlick's curve has no exact index; a fit by its value along the normal alone is 0.15 away.
+        assert mapping.conductor_reflectance(eta[0], k[0], cosine) == pytest.approx(schlick, abs=0.045)
+
+
+def test_a_mapping_node_scales_then_turns_then_moves():
+    matrix = np.array(mapping.uv_matrix("POINT", (0.5, 0.0, 0.0), (0.0, 0.0, math.pi / 2), (2.0, 3.0, 1.0)))
+    assert matrix @ [1.0, 0.0, 1.0] == pytest.approx([0.5, 2.0, 1.0])
+    assert matrix @ [0.0, 1.0, 1.0] == pytest.approx([-2.5, 0.0, 1.0])
+
+
+def test_a_mapping_node_of_the_kind_texture_is_the_inverse_of_a_point():
+    settings = (0.3, -0.2, 0.0), (0.0, 0.0, 0.7), (2.0, 0.5, 1.0)
+    both = mapping.product(mapping.uv_matrix("TEXTURE", *settings), mapping.uv_matrix("POINT", *settings))
+    assert np.array(both) == pytest.approx(np.eye(3), abs=1e-12)
+
+
+@pytest.mark.parametrize("blend", [0.05, 0.5, 1.0])
+def test_the_ramp_of_a_spot_has_the_flux_of_blenders(blend):
+    half = 0.5
+    outer, inner = mapping.spot_ramp(half, blend)
+    angle = (np.arange(20000) + 0.5) / 20000 * 0.8
+    x = np.clip((np.cos(angle) - math.cos(half)) / ((1.0 - math.cos(half)) * blend), 0.0, 1.0)
+    theirs = x * x * (3.0 - 2.0 * x)
+    ours = np.clip((outer - angle) / (outer - inner), 0.0, 1.0)
+    flux = [np.sum(falloff * np.sin(angle)) for falloff in (theirs, ours)]
+    assert flux[1] == pytest.approx(flux[0], rel=0.05)  # a line in place of a smooth step
+
+
+def test_a_point_light_has_one_flux_with_and_without_radius():
+    power, radius = 100.0, 0.25
+    # Seen from afar, a sphere has the radiant intensity of its radiance times its cross section.
+    assert sphere_radiance(power, radius) * math.pi * radius**2 == pytest.approx(point_intensity(power))
+
+
+def test_an_area_light_emits_its_power():
+    assert area_radiance(60.0, 2.0) * math.pi * 2.0 == pytest.approx(60.0)

@@ -1,0 +1,178 @@
+"""``enfilade import`` writes a scene folder; `render` and `plan` import by themselves."""
+
+import json
+import os
+
+import pytest
+
+from enfilade.settings import VideoSettings, ViewingSettings
+from support.fake_blender import NOTE, RESULT
+
+QUICK = ("--method", "reference", "--spp", "2", "--device", "cpu", "--quiet")
+
+
+@pytest.fixture
+def shot(tmp_path, blender_path):
+    def write(**wish):
+        file = tmp_path / "my shot.blend"
+        file.write_text(json.dumps(wish))
+        return file
+
+    return write
+
+
+def imports(source):
+    return len(source.with_suffix(".calls").read_text().splitlines())
+
+
+def test_an_import_lists_what_it_means_in_the_picture(run, shot, tmp_path):
+    notes = [{"kind": kind, **NOTE, "object": kind} for kind in ("mapped", "baked", "not-carried")]
+    out = tmp_path / "scenes" / "my shot"
+    result = run("import", shot(notes=notes), "--out", out, "--quiet")
+    assert result.exit_code == 0, result.output
+    first, *_ = result.stdout.splitlines()
+    assert first == "not carried over:"
+    assert "  not-carried / Noise Texture: a procedural texture\n      the sofa is plain\n" in result.stdout
+    assert "my shot.blend by Blender 4.5.1: 3 objects, 4 instances" in result.stdout
+    assert "1 not carried over, 0 approximated, 1 baked, 1 mapped" in result.stdout
+    assert "  mapped / Noise" not in result.stdout
+    render = next(line for line in result.stdout.splitlines() if line.startswith("render"))
+    settings, path = f"'{out}/settings.toml'", f"'{out}/camera_path.json'"
+    assert f"enfilade render '{out}/scene.xml' --path {path} --settings {settings}" in render
+
+
+def test_the_printed_command_renders_with_the_settings_of_the_file(run, shot, tmp_path, jobs):
+    out = tmp_path / "scene"
+    run("import", shot(), "--out", out)
+    files = ("--path", out / "camera_path.json", "--settings", out / "settings.toml")
+    run("render", out / "scene.xml", *files, "--out", tmp_path / "run")
+    assert jobs[0].settings[ViewingSettings].exposure_ev == 0.5
+
+
+def test_as_json(run, shot, tmp_path):
+    result = run("import", shot(), "--out", tmp_path / "s", "--json", "--frames", "3-5", "--size", "32x24")
+    found = json.loads(result.stdout)
+    assert (found["frames"], found["size"], found["view"]) == ([3, 5], [32, 24], RESULT["view"])
+    assert found["wall_s"] > 0.0
+
+
+def test_strict_is_an_error_of_the_input(run, shot, tmp_path):
+    result = run("import", shot(notes=[{"kind": "not-carried", **NOTE}]), "--out", tmp_path / "s", "--strict")
+    assert result.exit_code == 2
+    assert "--strict refuses my shot.blend" in result.stderr
+    assert not (tmp_path / "s").exists()
+
+
+def test_folders_are_replaced_on_demand_only(run, shot, tmp_path):
+    out = tmp_path / "s"
+    assert run("import", shot(), "--out", out).exit_code == 0
+    again = run("import", shot(), "--out", out)
+    assert (again.exit_code, "--overwrite" in again.stderr) == (2, True)
+    assert run("import", shot(), "--out", out, "--overwrite").exit_code == 0
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").touch()
+    refused = run("import", shot(), "--out", tmp_path / "other", "--overwrite")
+    assert refused.exit_code == 2
+    assert "holds no imported scene" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--frames", "1,5"), "takes one range"),
+        (("--set", "decoupled.quality=5"), "has no effect on an import"),
+        (("--blender", "/nowhere"), "/nowhere can't import scenes"),
+        (("--set", "blender.bake_px=1"), "out of range"),
+    ],
+)
+def test_wrong_input(run, shot, tmp_path, flags, words):
+    result = run("import", shot(), "--out", tmp_path / "s", *flags)
+    assert result.exit_code == 2
+    assert words in result.stderr
+
+
+def test_without_blender(run, shot, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setattr("enfilade.scene.blender.find.environment_folder", lambda: tmp_path / "none")
+    result = run("render", shot(), "--out", tmp_path / "run")
+    assert result.exit_code == 2
+    assert "--install-blender" in result.stderr
+    assert not (tmp_path / "run" / "scene").exists()
+
+
+def test_a_run_from_a_blend_file_continues_without_another_import(run, shot, tmp_path):
+    source, out = shot(notes=[{"kind": "not-carried", **NOTE}]), tmp_path / "run"
+    line = ("render", source, "--out", out, *QUICK[:-1], "--size", "16x12")
+    first = run(*line, "--frames", "11-12")
+    assert first.exit_code == 0, first.output
+    assert "not carried over: Sofa / Noise Texture: a procedural texture; the sofa is plain" in first.stderr
+    assert sorted(file.name for file in (out / "frames").iterdir()) == ["0011.exr", "0012.exr"]
+    assert run(*line, "--frames", "11-12").exit_code == 0
+    assert run("work", out, "--quiet").exit_code == 0
+    assert run("farm", out).exit_code == 0
+    assert imports(source) == 1
+    job = json.loads((out / "job.json").read_text())
+    assert job["scene"]["file"] == str(out / "scene" / "scene.xml")
+    assert job["settings"]["viewing"]["exposure_ev"] == 0.5
+    another = run(*line, "--frames", "11-13")
+    assert "holds another run" in another.stderr
+
+
+def test_a_run_is_bound_to_its_source(run, shot, tmp_path):
+    source, out = shot(), tmp_path / "run"
+    line = ("render", source, "--out", out, *QUICK, "--prepare")
+    assert run(*line).exit_code == 0
+    os.utime(source, (1.0, 1.0))
+    assert run(*line).exit_code == 0
+    chosen = run(*line, "--set", "blender.camera=B")
+    assert chosen.exit_code == 2
+    assert "camera: '' there, 'B' now" in chosen.stderr
+    shot(fps=25.0)
+    changed = run(*line)
+    assert changed.exit_code == 2
+    assert "has changed since it was imported" in changed.stderr
+    source.unlink()
+    assert f"`enfilade work {out}` continues without it" in run(*line).stderr
+    assert run("work", out, "--quiet").exit_code == 0
+
+
+def test_flags_win_over_the_file(run, shot, tmp_path, jobs, camera_path):
+    flags = ("--exposure-ev", "-1", "--fps", "12", "--size", "32x24")
+    result = run("render", shot(), "--out", tmp_path / "run", *flags)
+    assert result.exit_code == 0, result.output
+    run("render", shot(), "--out", tmp_path / "run2", "--path", camera_path)
+    first, second = jobs
+    assert first.settings[ViewingSettings].exposure_ev == -1.0
+    assert (first.path.fps, first.path.width, first.path.numbers) == (12.0, 32, (11, 12, 13))
+    assert second.path.numbers == (1, 2, 3)
+    assert second.settings[VideoSettings] == VideoSettings()
+
+
+def test_a_file_without_a_camera_needs_a_path(run, shot, tmp_path, jobs, camera_path):
+    result = run("render", shot(camera=""), "--out", tmp_path / "run")
+    assert result.exit_code == 2
+    assert "my shot.blend has no camera that can be used" in result.stderr
+    run("render", shot(camera=""), "--out", tmp_path / "run", "--path", camera_path)
+    assert len(jobs) == 1
+
+
+def test_plan_leaves_nothing(run, shot, tmp_path, jobs):
+    source = shot()
+    run("plan", source)
+    assert len(jobs[0].path) == 3
+    assert not jobs[0].scene.file.exists()
+
+
+def test_a_folder_of_something_else_is_refused_before_the_import(run, shot, tmp_path):
+    source = shot()
+    result = run("render", source, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "is not empty and holds no run" in result.stderr
+    assert not source.with_suffix(".calls").exists()
+
+
+def test_settings_of_blender_have_no_effect_on_xml(run, scene, camera_path, tmp_path):
+    flags = ("--path", camera_path, "--out", tmp_path / "run", "--set", "blender.camera=B")
+    result = run("render", scene, *flags)
+    assert result.exit_code == 2
+    assert "which Blender does not import" in result.stderr
