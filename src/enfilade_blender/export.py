@@ -93,5 +93,5 @@ def _integrator(selection: Selection, has_glass: bool) -> Element:
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
     if has_glass:
-        bounces = min(cycles.max_bounces, bounces + 4)
+        bounces = min(cycles.max_bounces, bounces + 2)
     return plugin("integrator", "path", max_depth=bounces + 2)

@@ -76,6 +76,11 @@ PRINCIPLED = (
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
     ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
+    (
+        "Roughness of 0.8 and more without Metallic",
+        "mapped",
+        "`diffuse`, lighter by the mean of its reflections",
+    ),
     ("Roughness, textured", "mapped", "`blendbsdf` of two plastics; `alpha` on metals"),
     ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
     ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
