@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import bpy
@@ -75,7 +76,7 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
         "fps": scene.render.fps / scene.render.fps_base,
         "frames": list(selection.frames),
         "size": list(selection.size),
-        "exposure_ev": view.exposure,
+        "exposure_ev": view.exposure + math.log2(max(scene.cycles.film_exposure, 1e-6)),
         "view": {
             "display": scene.display_settings.display_device,
             "view_transform": view.view_transform,

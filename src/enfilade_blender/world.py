@@ -107,7 +107,7 @@ def _rendered(world: Any, width: int, folder: Path) -> F32:
     if any(node.type == "TEX_SKY" for node in world.node_tree.nodes):
         width = max(width, WIDTH_SUN)
     scene = bpy.data.scenes.new("enfilade world")
-    scene.world = world
+    scene.world = _for_light(world)
     camera = bpy.data.cameras.new("enfilade world")
     camera.type = "PANO"
     (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
@@ -129,9 +129,22 @@ def _rendered(world: Any, width: int, folder: Path) -> F32:
     image.colorspace_settings.name = "Non-Color"
     pixels = linear_pixels(image)[..., :3]
     bpy.data.images.remove(image)
+    bpy.data.worlds.remove(scene.world)
     bpy.data.scenes.remove(scene)
     (folder / "textures" / "rendered.exr").unlink()
     return np.roll(pixels, -(width // 2), axis=1)
+
+
+def _for_light(world: Any) -> Any:
+    """A copy of a world as diffuse light sees it: no ray is one of the camera."""
+    copy = world.copy()
+    links = copy.node_tree.links
+    for link in [link for link in links if link.from_node.type == "LIGHT_PATH"]:
+        socket = link.to_socket
+        links.remove(link)
+        if isinstance(socket.default_value, float):
+            socket.default_value = 0.0
+    return copy
 
 
 def _note_world(selection: Selection, notes: Notes) -> None:
