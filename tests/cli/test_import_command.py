@@ -115,7 +115,7 @@ def test_a_run_from_a_blend_file_continues_without_another_import(run, shot, tmp
     assert job["scene"]["file"] == str(out / "scene" / "scene.xml")
     assert job["settings"]["viewing"]["exposure_ev"] == 0.5
     another = run(*line, "--frames", "11-13")
-    assert "holds another run" in another.stderr
+    assert "frames: [11, 12] there, [11, 13] now" in another.stderr
 
 
 def test_a_run_is_bound_to_its_source(run, shot, tmp_path):
@@ -146,6 +146,11 @@ def test_flags_win_over_the_file(run, shot, tmp_path, jobs, camera_path):
     assert (first.path.fps, first.path.width, first.path.numbers) == (12.0, 32, (11, 12, 13))
     assert second.path.numbers == (1, 2, 3)
     assert second.settings[VideoSettings] == VideoSettings()
+
+
+def test_frames_beyond_the_range_of_the_file(run, shot, tmp_path, jobs):
+    run("render", shot(), "--out", tmp_path / "run", "--frames", "20,22,24")
+    assert jobs[0].path.numbers == (20, 22, 24)
 
 
 def test_a_file_without_a_camera_needs_a_path(run, shot, tmp_path, jobs, camera_path):
