@@ -3,8 +3,10 @@
 import json
 import os
 
+import numpy as np
 import pytest
 
+from enfilade.images import write_exr
 from enfilade.settings import VideoSettings, ViewingSettings
 from support.fake_blender import NOTE, RESULT
 
@@ -54,6 +56,24 @@ def test_as_json(run, shot, tmp_path):
     found = json.loads(result.stdout)
     assert (found["frames"], found["size"], found["view"]) == ([3, 5], [32, 24], RESULT["view"])
     assert found["wall_s"] > 0.0
+
+
+def test_a_check_names_the_objects_that_differ(run, shot, tmp_path):
+    for seed in (0, 1):
+        image = {"RGB": np.full((12, 16, 3), 0.25, np.float32)}
+        write_exr(tmp_path / "cycles" / str(seed) / "12.exr", image)
+    source, out = shot(size=[16, 12], cycles=str(tmp_path / "cycles")), tmp_path / "s"
+    check = ("--check", "--check-frames", "12", "--check-spp", "2", "--quiet")
+    result = run("import", source, "--out", out, *check)
+    assert result.exit_code == 0, result.output
+    assert "check   everything" in result.stdout
+    assert result.stdout.endswith(f"page    {out}/check.html\n")
+    assert "frame 12" in (out / "check.html").read_text()
+    found = json.loads(run("import", source, "--out", out, "--overwrite", *check, "--json").stdout)
+    everything = found["check"]["differences"][0]
+    assert everything["brightness_percent"] > 50.0  # the sky is white, and the images were grey
+    alone = run("import", source, "--out", tmp_path / "t", "--check-frames", "12")
+    assert "--check-frames needs --check" in alone.stderr
 
 
 def test_strict_is_an_error_of_the_input(run, shot, tmp_path):

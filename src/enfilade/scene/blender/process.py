@@ -100,9 +100,9 @@ def _follow(
     deadline, has_result = time.monotonic() + seconds, False
     while time.monotonic() < deadline:
         try:
-            line = lines.get(timeout=LOOK_S)
+            line: str | None = lines.get(timeout=LOOK_S)
         except queue.Empty:
-            line = ""
+            line = "" if process.poll() is None else None  # a process that it left may hold the pipe
         if not has_result and any(file.exists() for file in answers):
             has_result, deadline = True, time.monotonic() + ENDING_S
         if line is None:
