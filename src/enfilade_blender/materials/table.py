@@ -134,7 +134,11 @@ LIGHTS = (
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
-    ("Spread, light linking, nodes of lights but a plain emission", "not carried", "light is distributed as without them"),
+    (
+        "Spread, light linking, nodes of lights but a plain emission",
+        "not carried",
+        "light is distributed as without them",
+    ),
 )
 OBJECTS = (
     ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
