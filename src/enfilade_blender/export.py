@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import bpy
@@ -75,7 +76,7 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
         "fps": scene.render.fps / scene.render.fps_base,
         "frames": list(selection.frames),
         "size": list(selection.size),
-        "exposure_ev": view.exposure,
+        "exposure_ev": view.exposure + math.log2(max(scene.cycles.film_exposure, 1e-6)),
         "view": {
             "display": scene.display_settings.display_device,
             "view_transform": view.view_transform,
@@ -93,5 +94,5 @@ def _integrator(selection: Selection, has_glass: bool) -> Element:
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
     if has_glass:
-        bounces = min(cycles.max_bounces, bounces + 4)
+        bounces = min(cycles.max_bounces, bounces + 2)
     return plugin("integrator", "path", max_depth=bounces + 2)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.mapping import spot_ramp
+from enfilade_blender.materials.values import Constant, Emission
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Element, Identifiers, plugin
@@ -58,12 +59,29 @@ def area_radiance(power: float, area: float) -> float:
     return power / (math.pi * area)
 
 
-def lamp_colour(data: Any) -> Colour:
-    """Colour times power (or strength), with temperature and exposure, of a light's settings."""
+def lamp_colour(lamp: Lamp, notes: Notes) -> Colour:
+    """Colour times power (or strength), with temperature, exposure and an emission node of constants."""
+    data = lamp.data
     scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     tint = data.temperature_color if getattr(data, "use_temperature", False) else (1.0, 1.0, 1.0)
-    r, g, b = (float(c) * float(t) * scale for c, t in zip(data.color, tint, strict=True))
+    nodes = _node_colour(lamp, notes)
+    r, g, b = (float(c) * float(t) * n * scale for c, t, n in zip(data.color, tint, nodes, strict=True))
     return r, g, b
+
+
+def _node_colour(lamp: Lamp, notes: Notes) -> Colour:
+    """Factor of a light's nodes; 1 where they are more than an emission of constants, which is noted."""
+    data = lamp.data
+    if not data.use_nodes or data.node_tree is None:
+        return 1.0, 1.0, 1.0
+    outputs = [node for node in data.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
+    shader = Graph(lamp.name, notes).shader(outputs[0].inputs["Surface"], ()) if outputs else None
+    if isinstance(shader, Emission):
+        colour, strength = shader.colour, shader.strength
+        if isinstance(colour, Constant) and isinstance(strength, Constant):
+            return _scaled(colour.colour, strength.number)
+    notes.add("not-carried", lamp.name, "Nodes", "its nodes are left out", "light has no pattern")
+    return 1.0, 1.0, 1.0
 
 
 def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]:
@@ -71,17 +89,17 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     soft = [
         lamp
         for lamp in lamps
-        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp.data)) > 0
+        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp, notes)) > 0
     ]
     if not soft:
         return lamps, None
-    brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp.data)))
+    brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp, notes)))
     for lamp in soft:
         if lamp is not brightest:
             what, effect = "a sun beside a brighter one has no disc", "its shadows have sharp edges"
             notes.add("approximated", lamp.name, "Angle", what, effect)
     direction = _axis(brightest.matrix)
-    sun = Sun(brightest.name, direction, lamp_colour(brightest.data), float(brightest.data.angle))
+    sun = Sun(brightest.name, direction, lamp_colour(brightest, notes), float(brightest.data.angle))
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
@@ -108,7 +126,7 @@ def _is_in(view: View, place: np.ndarray, size: tuple[int, int]) -> bool:
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
     """Elements of one lamp; none for a dark one."""
     data, name = lamp.data, lamp.name
-    colour = lamp_colour(data)
+    colour = lamp_colour(lamp, notes)
     if max(colour) <= 0.0:
         return []
     _note_unusual(lamp, notes)
@@ -169,8 +187,6 @@ def _spot(lamp: Lamp, colour: Colour, notes: Notes) -> Element:
 
 def _note_unusual(lamp: Lamp, notes: Notes) -> None:
     data = lamp.data
-    if data.use_nodes and data.node_tree is not None and len(data.node_tree.nodes) > 2:
-        notes.add("not-carried", lamp.name, "Nodes", "its nodes are left out", "light has no pattern")
     if data.type == "AREA" and getattr(data, "spread", math.pi) < math.pi - 1e-3:
         what, effect = "its spread is left out", "light reaches all directions"
         notes.add("not-carried", lamp.name, "Spread", what, effect)

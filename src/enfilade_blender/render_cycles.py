@@ -29,6 +29,7 @@ def render_frames(job: Job) -> dict[str, Any]:
     render.use_compositing = render.use_sequencer = render.use_motion_blur = False
     settings = render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
+    cycles.film_exposure = 1.0  # as the exported scene; import.json has it in its exposure
     cycles.samples, cycles.seed = job.spp, job.seed
     cycles.use_adaptive_sampling, cycles.use_denoising = False, job.denoise
     if job.denoise:

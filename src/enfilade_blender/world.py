@@ -20,7 +20,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.scene_xml import Element, plugin
 
 WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096
-SAMPLES = 16
+SAMPLES, SAMPLES_SKY = 4, 16  # a pixel; the sun of a sky is smaller than one
 LOCAL_FROM_WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
 FILE = "textures/environment.exr"
 
@@ -104,10 +104,10 @@ def _rendered(world: Any, width: int, folder: Path) -> F32:
     """Radiance of a world, from north at the left edge over east, zenith on top."""
     images = [node.image for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT" and node.image]
     width = min(max([width, *(image.size[0] for image in images)]), WIDTH_MAX)
-    if any(node.type == "TEX_SKY" for node in world.node_tree.nodes):
-        width = max(width, WIDTH_SUN)
+    has_sky = any(node.type == "TEX_SKY" for node in world.node_tree.nodes)
+    width = max(width, WIDTH_SUN) if has_sky else width
     scene = bpy.data.scenes.new("enfilade world")
-    scene.world = world
+    scene.world = _for_light(world)
     camera = bpy.data.cameras.new("enfilade world")
     camera.type = "PANO"
     (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
@@ -122,16 +122,30 @@ def _rendered(world: Any, width: int, folder: Path) -> F32:
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
     render.filepath = str(folder / "textures" / "rendered.exr")
     cycles = scene.cycles
-    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = SAMPLES, False, False
+    cycles.samples = SAMPLES_SKY if has_sky else SAMPLES
+    cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.pixel_filter_type, cycles.sample_clamp_direct = "BOX", 0.0
     bpy.ops.render.render(write_still=True, scene=scene.name)
     image = bpy.data.images.load(render.filepath)
     image.colorspace_settings.name = "Non-Color"
     pixels = linear_pixels(image)[..., :3]
     bpy.data.images.remove(image)
+    bpy.data.worlds.remove(scene.world)
     bpy.data.scenes.remove(scene)
     (folder / "textures" / "rendered.exr").unlink()
     return np.roll(pixels, -(width // 2), axis=1)
+
+
+def _for_light(world: Any) -> Any:
+    """A copy of a world as diffuse light sees it: no ray is one of the camera."""
+    copy = world.copy()
+    links = copy.node_tree.links
+    for link in [link for link in links if link.from_node.type == "LIGHT_PATH"]:
+        socket = link.to_socket
+        links.remove(link)
+        if isinstance(socket.default_value, float):
+            socket.default_value = 0.0
+    return copy
 
 
 def _note_world(selection: Selection, notes: Notes) -> None:

@@ -84,8 +84,8 @@ def render(scene: Path, spp: int, seed: int) -> F32:
             "fov_axis": "y",
             "near_clip": 0.001,
             "far_clip": 1e5,
-            "principal_point_offset_x": shift[0] - 0.5,
-            "principal_point_offset_y": shift[1] - 0.5,
+            "principal_point_offset_x": 0.5 - shift[0],
+            "principal_point_offset_y": 0.5 - shift[1],
             "to_world": mi.ScalarTransform4f(
                 np.array(frame["camera_to_world"]) @ np.diag([-1.0, 1.0, -1.0, 1.0])
             ),

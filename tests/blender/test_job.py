@@ -6,7 +6,6 @@ import pytest
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import read_job
-from enfilade_blender.materials.table import markdown
 from enfilade_blender.notes import Notes
 
 JOB = {"task": "export", "source": "/a.blend", "out": "/b"}
@@ -41,8 +40,3 @@ def test_a_note_is_made_once():
     assert notes.to_list() == [
         {"kind": "baked", "object": "wall", "node": "Noise", "what": "baked", "effect": "less detail"}
     ]
-
-
-def test_the_tables_are_markdown_of_three_columns():
-    rows = [line for line in markdown().splitlines() if line]
-    assert all(line.count("|") == 4 for line in rows)

@@ -3,8 +3,10 @@
 import json
 import os
 
+import numpy as np
 import pytest
 
+from enfilade.images import write_exr
 from enfilade.settings import VideoSettings, ViewingSettings
 from support.fake_blender import NOTE, RESULT
 
@@ -54,6 +56,24 @@ def test_as_json(run, shot, tmp_path):
     found = json.loads(result.stdout)
     assert (found["frames"], found["size"], found["view"]) == ([3, 5], [32, 24], RESULT["view"])
     assert found["wall_s"] > 0.0
+
+
+def test_a_check_names_the_objects_that_differ(run, shot, tmp_path):
+    for seed in (0, 1):
+        image = {"RGB": np.full((12, 16, 3), 0.25, np.float32)}
+        write_exr(tmp_path / "cycles" / str(seed) / "12.exr", image)
+    source, out = shot(size=[16, 12], cycles=str(tmp_path / "cycles")), tmp_path / "s"
+    check = ("--check", "--check-frames", "12", "--check-spp", "2", "--quiet")
+    result = run("import", source, "--out", out, *check)
+    assert result.exit_code == 0, result.output
+    assert "check   everything" in result.stdout
+    assert result.stdout.endswith(f"page    {out}/check.html\n")
+    assert "frame 12" in (out / "check.html").read_text()
+    found = json.loads(run("import", source, "--out", out, "--overwrite", *check, "--json").stdout)
+    everything = found["check"]["differences"][0]
+    assert everything["brightness_percent"] > 50.0  # the sky is white, and the images were grey
+    alone = run("import", source, "--out", tmp_path / "t", "--check-frames", "12")
+    assert "--check-frames needs --check" in alone.stderr
 
 
 def test_strict_is_an_error_of_the_input(run, shot, tmp_path):
@@ -115,7 +135,7 @@ def test_a_run_from_a_blend_file_continues_without_another_import(run, shot, tmp
     assert job["scene"]["file"] == str(out / "scene" / "scene.xml")
     assert job["settings"]["viewing"]["exposure_ev"] == 0.5
     another = run(*line, "--frames", "11-13")
-    assert "holds another run" in another.stderr
+    assert "frames: [11, 12] there, [11, 13] now" in another.stderr
 
 
 def test_a_run_is_bound_to_its_source(run, shot, tmp_path):
@@ -146,6 +166,11 @@ def test_flags_win_over_the_file(run, shot, tmp_path, jobs, camera_path):
     assert (first.path.fps, first.path.width, first.path.numbers) == (12.0, 32, (11, 12, 13))
     assert second.path.numbers == (1, 2, 3)
     assert second.settings[VideoSettings] == VideoSettings()
+
+
+def test_frames_beyond_the_range_of_the_file(run, shot, tmp_path, jobs):
+    run("render", shot(), "--out", tmp_path / "run", "--frames", "20,22,24")
+    assert jobs[0].path.numbers == (20, 22, 24)
 
 
 def test_a_file_without_a_camera_needs_a_path(run, shot, tmp_path, jobs, camera_path):

@@ -87,6 +87,8 @@ def command(
     for flag, table in assigned(ctx).items():
         if table not in (BlenderSettings.table, LimitSettings.table):
             raise SettingsError(f"{flag} has no effect on an import, which does not read [{table}]")
+    if checking["check_frames"] is not None and not checking["is_checked"]:
+        raise SettingsError("--check-frames needs --check")
     _check_place(folder, is_replaced=is_replaced)
     blender = settings[BlenderSettings]
     from enfilade.cli.progress import watch
@@ -123,8 +125,6 @@ def _checked(
 ) -> dict[str, Any]:
     """Render and compare frames, and write the page; returns its place and the differences, or nothing."""
     if not is_checked:
-        if check_frames is not None:
-            raise SettingsError("--check-frames needs --check")
         return {}
     from enfilade.camera import parse_frames
     from enfilade.device import activate

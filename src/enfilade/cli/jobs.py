@@ -64,7 +64,8 @@ def job_of(
     selected = None if frames is None else parse_frames(frames)
     path = None if path_file is None else load_path(path_file, size=size, frames=selected, fps=fps)
     if run is not None and is_imported:
-        imported = _imported(run, scene, settings, size, quiet=quiet)
+        span = (selected[0], selected[-1]) if selected and path is None else None
+        imported = _imported(run, scene, settings, size, span, quiet=quiet)
         scene, settings = imported.scene_file, Settings.from_tables(imported.tables_under(tables), kinds)
         path = path or load_path(imported.checked_path(), size=size, frames=selected, fps=fps)
     if path is None:
@@ -73,14 +74,21 @@ def job_of(
 
 
 def _imported(
-    run: Path, source: Path, settings: Settings, size: tuple[int, int] | None, *, quiet: bool
+    run: Path,
+    source: Path,
+    settings: Settings,
+    size: tuple[int, int] | None,
+    frames: tuple[int, int] | None,
+    *,
+    quiet: bool,
 ) -> ImportedScene:
+    """Import a file into the run folder, unless it is there."""
     from enfilade.cli.progress import watch
     from enfilade.runs.source import imported_into
 
     with watch(quiet=quiet) as monitor:
         blender, limits = settings[BlenderSettings], settings[LimitSettings]
-        return imported_into(run, source, blender, limits, monitor, size=size)
+        return imported_into(run, source, blender, limits, monitor, size=size, frames=frames)
 
 
 def _check_effect(ctx: click.Context, method: Method, scene: Path, *, is_imported: bool) -> None:

@@ -43,6 +43,7 @@ def imported_into(
     monitor: Monitor,
     *,
     size: tuple[int, int] | None = None,
+    frames: tuple[int, int] | None = None,
 ) -> ImportedScene:
     """The scene of a file in a run folder; imported when the run begins, and kept.
 
@@ -53,8 +54,8 @@ def imported_into(
     source
     settings, limits
     monitor
-    size
-        Width and height of the images, pixels; None: the file's own.
+    size, frames
+        Width and height of the images in pixels, first and last frame; None: the file's own.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def imported_into(
         The file or the choices are not those of the run; or the folder holds something else, or can't be
         written.
     """
-    folder, choices = run / SCENE_FOLDER, choices_of(settings, size)
+    folder, choices = run / SCENE_FOLDER, choices_of(settings, size, frames)
     if (folder / SOURCE_FILE).is_file() and _is_kept(run, source, choices):
         imported = ImportedScene.read(folder)
         if settings.strict:

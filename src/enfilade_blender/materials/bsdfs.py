@@ -26,7 +26,8 @@ from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
 SMOOTH = 1e-3  # alpha below which a surface is a mirror
 ALPHA_MIN = 0.01
-ROUGHEST_PLASTIC = 0.65  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
+ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
+MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
 WHITE = (1.0, 1.0, 1.0)
 NO_INTERFACE = 1.0001  # Mitsuba refuses an index of 1
 TRANSMITTING = {
@@ -82,6 +83,9 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
 
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
+    if roughness >= MATT:
+        reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
+        return plugin("bsdf", "diffuse", reflectance=context.textures.lightened(base, reflected))
     if alpha < SMOOTH:
         reflectance = context.textures.colour(base)
         return plugin("bsdf", "plastic", int_ior=ior, ext_ior=1.0, diffuse_reflectance=reflectance)

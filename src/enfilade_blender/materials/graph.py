@@ -62,6 +62,9 @@ class Graph:
         ):
             if output.inputs[name].is_linked:
                 self._notes.add("not-carried", self._owner, name, f"{name.lower()} is not exported", effect)
+        if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
+            white, nothing = Constant((1.0, 1.0, 1.0)), Constant((0.0,))
+            return Lobe("transparent", white, nothing, nothing, None, output.name)
         return self.shader(output.inputs["Surface"], ())
 
     def shader(self, socket: Any, groups: tuple[Any, ...]) -> Shader:

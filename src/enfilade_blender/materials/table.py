@@ -76,6 +76,11 @@ PRINCIPLED = (
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
     ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
+    (
+        "Roughness of 0.8 and more without Metallic",
+        "mapped",
+        "`diffuse`, lighter by the mean of its reflections",
+    ),
     ("Roughness, textured", "mapped", "`blendbsdf` of two plastics; `alpha` on metals"),
     ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
     ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
@@ -129,7 +134,11 @@ LIGHTS = (
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
-    ("Spread, light nodes, light linking", "not carried", "light is distributed as without them"),
+    (
+        "Spread, light linking, nodes of lights but a plain emission",
+        "not carried",
+        "light is distributed as without them",
+    ),
 )
 OBJECTS = (
     ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),

@@ -62,6 +62,17 @@ class Textures:
             return self._texture(value)
         return self.rewritten(value, self.pixels(value) * scale, f"times {scale:.3g}", raw=False)
 
+    def lightened(self, value: Value, white: float) -> tuple[float, float, float] | Element:
+        """A colour below a share of white."""
+        if isinstance(value, Constant):
+            return colour([white + (1.0 - white) * c for c in value.colour])
+        if not isinstance(value, ImageValue | Texture) or (
+            isinstance(value, ImageValue) and self.is_missing(value)
+        ):
+            return self._texture(value)
+        image = white + (1.0 - white) * self.pixels(value)
+        return self.rewritten(value, image, f"below {white:.3g}", raw=False)
+
     def number(self, value: Value) -> float | Element:
         """A number or a texture of numbers."""
         if isinstance(value, Constant):

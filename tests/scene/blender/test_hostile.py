@@ -54,7 +54,7 @@ def test_a_library_outside_of_the_folder(folder, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("instances", "instances"), ("subdivided", "triangles")],
+    [("instances", "instances"), ("scattered", "instances"), ("subdivided", "triangles")],
 )
 def test_scenes_that_are_too_large(folder, tmp_path, name, words):
     with pytest.raises(SceneError, match=rf"{name}\.blend by Blender .*{words}"):

@@ -100,9 +100,9 @@ def _follow(
     deadline, has_result = time.monotonic() + seconds, False
     while time.monotonic() < deadline:
         try:
-            line = lines.get(timeout=LOOK_S)
+            line: str | None = lines.get(timeout=LOOK_S)
         except queue.Empty:
-            line = ""
+            line = "" if process.poll() is None else None  # a process that it left may hold the pipe
         if not has_result and any(file.exists() for file in answers):
             has_result, deadline = True, time.monotonic() + ENDING_S
         if line is None:
@@ -148,6 +148,7 @@ def _crash(about: str, code: int, megabytes: int, last: list[str]) -> str:
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
     said = "".join(f"\n  {line}" for line in last)
     return (
-        f"{about}: it ended without a result ({how}). The file is damaged, or needs more than {megabytes} MB "
-        f"of memory (--set limits.import_mb){'. The last lines:' if said else ''}{said}"
+        f"{about}: it ended without a result ({how}). The file is damaged, needs more than {megabytes} MB of "
+        f"memory (--set limits.import_mb), or has something that the importer does not know"
+        f"{'. The last lines:' if said else ''}{said}"
     )

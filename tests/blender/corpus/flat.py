@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A furnished flat: 500 objects, a million triangles after modifiers, 40 materials, a third of them baked."""
+
+import math
+import random
+
+import bpy
+import numpy as np
+
+from corpus.stage import aim, camera, image, light, new_file, node_of, principled, world
+
+ROOMS, ROOM_M, HEIGHT_M = 3, 5.0, 2.7
+
+
+def flat(folder):
+    scene = new_file()
+    scene.render.resolution_x, scene.render.resolution_y = 320, 180
+    chance = random.Random(1)  # noqa: S311  (of shapes and colours)
+    paints = _materials(chance)
+    for room in range(ROOMS):
+        _room(room * ROOM_M, paints, chance)
+    _daylight()
+    eye = camera((1.0, -1.2, 1.6), (2.5, 2.5, 1.0), lens=22.0)
+    scene.frame_start, scene.frame_end = 1, 48
+    for frame, x in ((1, 1.0), (48, ROOMS * ROOM_M - 2.0)):
+        eye.location.x = x
+        aim(eye, (x + 1.5, 2.5, 1.0))
+        eye.keyframe_insert("location", frame=frame)
+        eye.keyframe_insert("rotation_euler", frame=frame)
+
+
+def _materials(chance):
+    """40 materials: plastics, metals, images and, a third of them, procedural ones."""
+    paints = []
+    for i in range(40):
+        colour = (*(chance.uniform(0.1, 0.8) for _ in range(3)), 1.0)
+        material = principled(f"paint {i}", **{"Base Color": colour, "Roughness": chance.uniform(0.15, 0.9)})
+        node, tree = material.node_tree.nodes["Principled BSDF"], material.node_tree
+        if i % 3 == 0:
+            noise = node_of(tree, "ShaderNodeTexNoise", Scale=chance.uniform(2.0, 9.0))
+            ramp = tree.nodes.new("ShaderNodeValToRGB")
+            ramp.color_ramp.elements[1].color = colour
+            tree.links.new(noise.outputs[0], ramp.inputs[0])
+            tree.links.new(ramp.outputs[0], node.inputs["Base Color"])
+        elif i % 3 == 1:
+            texture = tree.nodes.new("ShaderNodeTexImage")
+            texture.image = image(f"print {i}", lambda x, y, k=i: _print(x, y, k), 128)
+            tree.links.new(texture.outputs[0], node.inputs["Base Color"])
+        elif i % 2:
+            node.inputs["Metallic"].default_value = 1.0
+        paints.append(material)
+    return paints
+
+
+def _print(x, y, number):
+    wave = 0.5 + 0.4 * np.sin(2.0 * np.pi * (number % 7 + 1) * x) * np.sin(2.0 * np.pi * (number % 5 + 1) * y)
+    return np.stack([wave, 0.8 * wave, 0.5 + 0.0 * x], -1)
+
+
+def _room(x, paints, chance):
+    """Floor, ceiling and walls, shelves of books, chairs, and bowls on a table."""
+    _box("floor", (x + 2.5, 1.0, -0.05), (ROOM_M, 6.0, 0.1), paints[1])
+    _box("ceiling", (x + 2.5, 1.0, HEIGHT_M), (ROOM_M, 6.0, 0.1), paints[2])
+    _box("wall", (x + 2.5, 4.0, HEIGHT_M / 2), (ROOM_M, 0.1, HEIGHT_M), paints[5])
+    for shelf in range(5):
+        _box("shelf", (x + 2.5, 3.8, 0.4 + 0.4 * shelf), (3.0, 0.3, 0.03), paints[0])
+        for book in range(26):
+            size = (chance.uniform(0.03, 0.08), 0.2, chance.uniform(0.2, 0.32))
+            place = (x + 1.1 + 0.11 * book, 3.78, 0.42 + 0.4 * shelf + size[2] / 2)
+            bevel = _box("book", place, size, chance.choice(paints)).modifiers.new("Bevel", "BEVEL")
+            bevel.width, bevel.segments = 0.004, 2
+    for seat in range(6):
+        place = (x + 1.0 + 0.7 * (seat % 3), 0.6 + 1.2 * (seat // 3), 0.3)
+        soft = _box("chair", place, (0.5, 0.5, 0.6), chance.choice(paints)).modifiers.new("Soft", "SUBSURF")
+        soft.levels, soft.render_levels = 1, 6
+    for bowl in range(12):
+        bpy.ops.mesh.primitive_uv_sphere_add(
+            radius=0.09, segments=128, ring_count=64, location=(x + 1.0 + 0.15 * bowl, 1.2, 0.9)
+        )
+        bpy.ops.object.shade_smooth()
+        bpy.context.object.name = "bowl"
+        bpy.context.object.data.materials.append(chance.choice(paints))
+    light("POINT", "Bulb", (x + 2.5, 1.0, 2.2), 60.0, shadow_soft_size=0.08)
+
+
+def _box(name, place, size, material):
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
+    obj = bpy.context.object
+    obj.name, obj.scale = name, size
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    obj.data.materials.append(material)
+    return obj
+
+
+def _daylight():
+    tree = world((1.0, 1.0, 1.0), 1.0).node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image("sky", lambda _x, y: np.stack([0.4 + 0.3 * y, 0.5 + 0.3 * y, 0.7 + 0.3 * y], -1))
+    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs[0])
+    sun = light("SUN", "Sun", (0.0, -5.0, 6.0), 2.0, angle=math.radians(0.5))
+    aim(sun, (3.0, 2.0, 0.0))
+
+
+LARGE = (flat,)

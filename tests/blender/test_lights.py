@@ -1,0 +1,84 @@
+"""Lights of Blender, as emitters: records in, elements out."""
+
+import math
+from types import SimpleNamespace
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from enfilade_blender.lights import emitters, note_seen, split_suns
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp, View
+from enfilade_blender.scene_xml import Identifiers, write_scene
+
+SAMPLES = 20_000
+ABOVE = np.eye(4)
+ABOVE[2, 3] = 2.0  # shines down
+
+
+def lamp(kind, name="Lamp", matrix=ABOVE, **settings):
+    defaults = {
+        "type": kind, "energy": 100.0, "color": (1.0, 1.0, 1.0), "use_nodes": False, "use_shadow": True,
+        "shadow_soft_size": 0.0, "shape": "SQUARE", "size": 1.0, "size_y": 1.0, "angle": 0.0,
+        "spot_size": 1.0, "spot_blend": 0.2,
+    }  # fmt: skip
+    return Lamp(name, SimpleNamespace(**(defaults | settings)), matrix)
+
+
+def irradiance(tmp_path, light):
+    """Irradiance at the origin, on a plane that faces up."""
+    elements = emitters(light, Identifiers(), Notes())
+    write_scene(tmp_path / "scene.xml", elements)
+    scene = mi.load_file(str(tmp_path / "scene.xml"))
+    si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
+    si.n = mi.Normal3f(0.0, 0.0, 1.0)
+    rng = np.random.default_rng(1)
+    sample = mi.Point2f(*rng.random((2, SAMPLES), np.float32))
+    direction, weight = scene.sample_emitter_direction(si, sample, test_visibility=False)
+    return float(np.mean(np.array(weight.x) * np.array(direction.d.z)))
+
+
+@pytest.mark.parametrize(
+    ("light", "expected"),
+    [
+        (lamp("POINT"), 100.0 / (4.0 * math.pi) / 4.0),  # intensity over the squared distance
+        (lamp("POINT", shadow_soft_size=0.1), 100.0 / (4.0 * math.pi) / 4.0),
+        (lamp("SPOT"), 100.0 / (4.0 * math.pi) / 4.0),
+        (lamp("SUN", energy=3.0), 3.0),
+        (lamp("AREA", size=0.01), 100.0 / math.pi / 4.0),  # far away, on its axis
+        (lamp("AREA", size=0.01, shape="DISK"), 100.0 / math.pi / 4.0),
+        (lamp("AREA", size=0.01, size_y=0.02, shape="ELLIPSE"), 100.0 / math.pi / 4.0),
+    ],
+)
+def test_irradiance_below_a_light(tmp_path, light, expected):
+    assert irradiance(tmp_path, light) == pytest.approx(expected, rel=0.01)
+
+
+def test_power_does_not_change_with_the_scale_of_the_object(tmp_path):
+    large = lamp("AREA", matrix=ABOVE @ np.diag([3.0, 3.0, 3.0, 1.0]), size=0.01)
+    assert irradiance(tmp_path, large) == pytest.approx(100.0 / math.pi / 4.0, rel=0.01)
+
+
+def test_a_dark_lamp_is_left_out():
+    assert emitters(lamp("POINT", energy=0.0), Identifiers(), Notes()) == []
+
+
+def test_the_brightest_sun_with_a_disc_is_in_the_environment():
+    notes = Notes()
+    weak, bright = lamp("SUN", "weak", angle=0.1, energy=1.0), lamp("SUN", "bright", angle=0.1, energy=3.0)
+    rest, sun = split_suns([weak, bright, lamp("SUN", "sharp")], notes)
+    assert (sun.name, [light.name for light in rest]) == ("bright", ["weak", "sharp"])
+    assert [note["object"] for note in notes.to_list()] == ["weak"]
+
+
+def test_lamps_in_the_field_of_view_are_noted():
+    projection = np.diag([1.0, 1.0, 1.0, 1.0])
+    down, up = np.eye(4), np.diag([1.0, -1.0, -1.0, 1.0])
+    down[2, 3] = 5.0
+    for pose, expected in ((down, []), (up, ["Panel"])):  # from above its back is seen, which is dark
+        notes = Notes()
+        view = View("Camera", pose, projection, {})
+        note_seen([lamp("AREA", "Panel"), lamp("POINT", "Point")], None, [view], (64, 48), notes)
+        assert [note["object"] for note in notes.to_list()] == expected
