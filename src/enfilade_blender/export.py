@@ -52,6 +52,7 @@ def export(job: Job) -> dict[str, Any]:
     for lamp in lamps:
         elements += emitters(lamp, identifiers, notes)
     elements += environment(selection, sun, job.out, notes)
+    shapes.textures.remove_unused(elements)
     write_scene(job.out / "scene.xml", [_integrator(selection, shapes.has_glass), *elements])
     counts = {
         "objects": len(evaluated.placed),
