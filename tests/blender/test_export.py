@@ -27,6 +27,7 @@ FILES = (
     "library",
     "procedural",
     "emission",
+    "lamps_in_view",
 )
 
 
@@ -136,6 +137,13 @@ def test_an_open_emitter_shines_on_both_sides(exported):
     assert found["Screen"].is_emitter()
     assert found["Screen back"].is_emitter()
     assert "Left back" not in found
+
+
+def test_a_point_light_in_sight_has_no_radius(exported):
+    out, result = exported("lamps_in_view")
+    assert [name for name, what in notes(result, "approximated") if "radius" in what] == ["Seen"]
+    assert {"Inside the left sphere", "Behind the camera"} <= set(shapes(out))
+    assert "Seen" not in shapes(out)
 
 
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):
