@@ -13,7 +13,7 @@ from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
 from enfilade_blender.image_files import srgb_from_linear
 from enfilade_blender.materials.ggx import mean_reflectance
-from studies.blender.__main__ import read_exr, render
+from studies.blender.command import read_exr, render
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 FILES = (
