@@ -7,6 +7,7 @@ from enfilade.cli.group import EnfiladeGroup, debug_option
 MODULES = {
     "scene": "studies.scenes.command",
     "bench": "studies.bench.command",
+    "blender": "studies.blender.command",
     "calibrate": "studies.cases.calibrate",
     "validate": "studies.observers.command",
 }

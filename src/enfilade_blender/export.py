@@ -20,6 +20,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import Element, plugin, write_scene
 from enfilade_blender.shapes import Shapes
+from enfilade_blender.visibility import seen_lamps
 from enfilade_blender.world import environment
 
 
@@ -47,11 +48,13 @@ def export(job: Job) -> dict[str, Any]:
     elements = shapes.write(evaluated.placed)
     report_progress(0.9, "lights")
     lamps, sun = split_suns(evaluated.lamps, notes)
-    note_seen(lamps, sun, views, selection.size, notes)
+    seen = seen_lamps(lamps, sun, views, selection)
+    note_seen(lamps, sun, seen, notes)
     identifiers = shapes.identifiers
     for lamp in lamps:
-        elements += emitters(lamp, identifiers, notes)
+        elements += emitters(lamp, identifiers, notes, is_seen=lamp.name in seen)
     elements += environment(selection, sun, job.out, notes)
+    shapes.textures.remove_unused(elements)
     write_scene(job.out / "scene.xml", [_integrator(selection, shapes.has_glass), *elements])
     counts = {
         "objects": len(evaluated.placed),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, plugin
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
+CORNERS = ((-0.45, -0.45), (-0.45, 0.45), (0.45, -0.45), (0.45, 0.45))  # nearly, of an area light
 
 
 @dataclass(frozen=True)
@@ -103,28 +105,42 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
-def note_seen(
-    lamps: list[Lamp], sun: Sun | None, views: list[View], size: tuple[int, int], notes: Notes
-) -> None:
-    """Note lamps and a sun in the field of view of a frame: Cycles does not show them to the camera."""
-    what = "the lamp is seen where nothing hides it"
+def points_of(lamp: Lamp) -> np.ndarray:
+    """Points of a lamp's shape, (N, 3): its middle, and an area's corners; none where it has no shape."""
+    data, middle = lamp.data, lamp.matrix[:3, 3]
+    if data.type == "POINT" and data.shadow_soft_size > TINY:
+        return middle[None]
+    if data.type != "AREA":
+        return np.zeros((0, 3))
+    width, height = _area_size(data)
+    corners = [
+        middle + sx * width * lamp.matrix[:3, 0] + sy * height * lamp.matrix[:3, 1] for sx, sy in CORNERS
+    ]
+    return np.stack([middle, *corners])
+
+
+def faces_camera(lamp: Lamp, view: View) -> bool:
+    """Whether the bright side of a lamp is towards a camera."""
+    return (
+        lamp.data.type != "AREA" or float((lamp.matrix[:3, 3] - view.pose[:3, 3]) @ _axis(lamp.matrix)) > 0.0
+    )
+
+
+def note_seen(lamps: list[Lamp], sun: Sun | None, seen: set[str], notes: Notes) -> None:
+    """Note what becomes of the lamps that the camera would see."""
+    bright = "a bright shape where Cycles shows none"
     for lamp in lamps:
-        data, place = lamp.data, lamp.matrix[:3, 3]
-        has_shape = data.type == "AREA" or (data.type == "POINT" and data.shadow_soft_size > TINY)
-        lit = [v for v in views if data.type != "AREA" or (place - v.pose[:3, 3]) @ _axis(lamp.matrix) > 0.0]
-        if has_shape and any(_is_in(view, place, size) for view in lit):
-            notes.add("approximated", lamp.name, "Light", what, "a bright shape where Cycles shows none")
-    if sun is not None and any(_is_in(view, view.pose[:3, 3] + sun.direction, size) for view in views):
-        notes.add("approximated", sun.name, "Sun", what, "a bright disc in the sky where Cycles shows none")
+        if lamp.name in seen and lamp.data.type == "POINT":
+            what = "its radius is left out, since the camera would see the lamp"
+            notes.add("approximated", lamp.name, "Radius", what, "its shadows have sharp edges")
+        elif lamp.name in seen:
+            notes.add("approximated", lamp.name, "Light", "the camera sees the lamp", bright)
+    if sun is not None and sun.name in seen:
+        notes.add("approximated", sun.name, "Sun", "the camera sees the sun", bright)
 
 
-def _is_in(view: View, place: np.ndarray, size: tuple[int, int]) -> bool:
-    x, y, depth = view.pixels(place[None], size)[0]
-    return bool(depth > 0.0 and 0.0 <= x <= size[0] and 0.0 <= y <= size[1])
-
-
-def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
-    """Elements of one lamp; none for a dark one."""
+def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes, *, is_seen: bool = False) -> list[Element]:
+    """Elements of one lamp; none for a dark one. A point light that the camera would see has no radius."""
     data, name = lamp.data, lamp.name
     colour = lamp_colour(lamp, notes)
     if max(colour) <= 0.0:
@@ -140,7 +156,7 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
         return [_spot(lamp, colour, notes)]
     radius = float(data.shadow_soft_size)
     place = lamp.matrix[:3, 3]
-    if radius <= TINY:
+    if radius <= TINY or is_seen:
         emitter = plugin("emitter", "point", intensity=_scaled(colour, point_intensity(1.0)))
         emitter.append(_vector("position", place, tag="point"))
         return [emitter]
@@ -154,8 +170,7 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
 def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     data = lamp.data
     is_round = data.shape in ("DISK", "ELLIPSE")
-    width = float(data.size)
-    height = width if data.shape in ("SQUARE", "DISK") else float(data.size_y)
+    width, height = _area_size(data)
     axes = lamp.matrix @ np.diag([0.5 * width, 0.5 * height, 1.0, 1.0])
     area = float(np.linalg.norm(np.cross(axes[:3, 0], axes[:3, 1]))) * (math.pi if is_round else 4.0)
     radiance = _scaled(colour, area_radiance(1.0, max(area, 1e-12)))
@@ -169,6 +184,11 @@ def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     )
     shape.set("id", identifiers.unique(lamp.name))
     return shape
+
+
+def _area_size(data: Any) -> tuple[float, float]:
+    width = float(data.size)
+    return width, width if data.shape in ("SQUARE", "DISK") else float(data.size_y)
 
 
 def _spot(lamp: Lamp, colour: Colour, notes: Notes) -> Element:

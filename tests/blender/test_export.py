@@ -11,7 +11,9 @@ import pytest
 from enfilade.camera.load import load_path
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
-from studies.blender.__main__ import read_exr, render
+from enfilade_blender.image_files import srgb_from_linear
+from enfilade_blender.materials.ggx import mean_reflectance
+from studies.blender.command import read_exr, render
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 FILES = (
@@ -25,6 +27,7 @@ FILES = (
     "library",
     "procedural",
     "emission",
+    "lamps_in_view",
 )
 
 
@@ -122,8 +125,10 @@ def test_procedural_values_are_baked_and_noted(exported):
     out, result = exported("procedural")
     assert {name.split(",")[0] for name, _ in notes(result, "baked")} == {"noise", "voronoi", "checker"}
     checker = next((out / "textures").glob("checker*.png"))
-    tones = np.array(mi.Bitmap(str(checker)))
-    assert {int(tone) for tone in np.percentile(tones, [30, 95])} == {124, 231}  # 0.2 and 0.8, linear
+    tones = np.percentile(np.array(mi.Bitmap(str(checker))), [30, 95]) / 255.0
+    white = mean_reflectance(0.64, 1.5)  # of its roughness of 0.8: the surface is matt
+    wanted = srgb_from_linear(white + (1.0 - white) * np.array([0.2, 0.8]))
+    assert tones == pytest.approx(wanted, abs=1.5 / 255.0)
 
 
 def test_an_open_emitter_shines_on_both_sides(exported):
@@ -132,6 +137,13 @@ def test_an_open_emitter_shines_on_both_sides(exported):
     assert found["Screen"].is_emitter()
     assert found["Screen back"].is_emitter()
     assert "Left back" not in found
+
+
+def test_a_point_light_in_sight_has_no_radius(exported):
+    out, result = exported("lamps_in_view")
+    assert [name for name, what in notes(result, "approximated") if "radius" in what] == ["Seen"]
+    assert {"Inside the left sphere", "Behind the camera"} <= set(shapes(out))
+    assert "Seen" not in shapes(out)
 
 
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade_blender.lights import emitters, note_seen, split_suns
+from enfilade_blender.lights import emitters, faces_camera, note_seen, points_of, split_suns
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Identifiers, write_scene
@@ -73,12 +73,25 @@ def test_the_brightest_sun_with_a_disc_is_in_the_environment():
     assert [note["object"] for note in notes.to_list()] == ["weak"]
 
 
-def test_lamps_in_the_field_of_view_are_noted():
-    projection = np.diag([1.0, 1.0, 1.0, 1.0])
-    down, up = np.eye(4), np.diag([1.0, -1.0, -1.0, 1.0])
-    down[2, 3] = 5.0
-    for pose, expected in ((down, []), (up, ["Panel"])):  # from above its back is seen, which is dark
-        notes = Notes()
-        view = View("Camera", pose, projection, {})
-        note_seen([lamp("AREA", "Panel"), lamp("POINT", "Point")], None, [view], (64, 48), notes)
-        assert [note["object"] for note in notes.to_list()] == expected
+def test_the_back_of_an_area_light_is_dark():
+    above, below = np.eye(4), np.eye(4)
+    above[2, 3] = 5.0
+    views = [View("Camera", pose, np.eye(4), {}) for pose in (above, below)]
+    assert [faces_camera(lamp("AREA"), view) for view in views] == [False, True]
+    assert [faces_camera(lamp("POINT"), view) for view in views] == [True, True]
+
+
+def test_a_point_light_that_the_camera_would_see_has_no_radius():
+    notes, bulb = Notes(), lamp("POINT", "Bulb", shadow_soft_size=0.1)
+    note_seen([bulb, lamp("AREA", "Panel")], None, {"Bulb", "Panel"}, notes)
+    assert [note["node"] for note in notes.to_list()] == ["Radius", "Light"]
+    kinds = [
+        emitters(bulb, Identifiers(), notes, is_seen=is_seen)[0].get("type") for is_seen in (False, True)
+    ]
+    assert kinds == ["sphere", "point"]
+
+
+def test_points_of_shapes():
+    assert len(points_of(lamp("AREA"))) == 5
+    assert len(points_of(lamp("POINT", shadow_soft_size=0.1))) == 1
+    assert len(points_of(lamp("POINT"))) == len(points_of(lamp("SPOT"))) == 0

@@ -123,7 +123,12 @@ INPUTS = (
     ("Missing image", "approximated", "a mid grey"),
 )
 LIGHTS = (
-    ("Point", "mapped", "`sphere` of its radius, which the camera sees; `point` for radius 0"),
+    ("Point", "mapped", "`sphere` of its radius; `point` for radius 0"),
+    (
+        "Point that the camera would see",
+        "approximated",
+        "`point`: sharp shadows, no bright ball",
+    ),
     (
         "Spot",
         "approximated",

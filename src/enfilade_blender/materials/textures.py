@@ -151,6 +151,13 @@ class Textures:
         matrix = FLIP @ np.array(value.matrix)
         return bitmap(self._files[key], raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix)
 
+    def remove_unused(self, elements: list[Element]) -> None:
+        """Delete files that no element names: baked textures of which only others were made."""
+        named = {string.get("value") for element in elements for string in element.iter("string")}
+        for file in (self._folder / "textures").iterdir():
+            if f"textures/{file.name}" not in named:
+                file.unlink()
+
     def _texture(self, value: Value) -> Element | Any:
         if isinstance(value, Texture):
             return bitmap(value.file, raw=value.raw, wrap="repeat", matrix=FLIP)

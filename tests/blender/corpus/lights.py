@@ -111,4 +111,11 @@ def hdri(folder):
     tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs[0])
 
 
-CASES = (point, spot, area, sun, sun_sharp, sky, hdri)
+def lamps_in_view(folder):
+    _objects()
+    light("POINT", "Seen", (0.5, 0.0, 1.5), 30.0, shadow_soft_size=0.1)
+    light("POINT", "Inside the left sphere", (-1.35, 0.0, 0.61), 30.0, shadow_soft_size=0.1)
+    light("POINT", "Behind the camera", (0.0, -6.0, 3.0), 30.0, shadow_soft_size=0.1)
+
+
+CASES = (point, spot, area, sun, sun_sharp, sky, hdri, lamps_in_view)

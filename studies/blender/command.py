@@ -1,4 +1,4 @@
-"""Fidelity of the corpus: ``python -m studies.blender --blender PYTHON [--only NAME] --out FOLDER``."""
+"""Fidelity of the corpus of files from Blender: ``python -m studies blender``."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ EXPORTER, CORPUS = ROOT / "src" / "enfilade_blender", ROOT / "tests" / "blender"
 SEEDS = 1, 2
 
 
-@click.command()
+@click.command("blender", short_help="Scenes from Blender, against Cycles.")
 @click.option("--blender", default=str(ROOT / ".venv-blender" / "bin" / "python"), help="A Python with bpy.")
 @click.option("--only", multiple=True, help="Name of a file; all by default.")
 @click.option("--spp", default=128, help="Samples a pixel of each half.")
 @click.option("--source", type=click.Path(path_type=Path, exists=True), help="A .blend file of your own.")
 @click.option("--keep", is_flag=True, help="Take Cycles' images of an earlier run.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("runs/blender"))
-def main(
+def command(
     blender: str, only: tuple[str, ...], spp: int, source: Path | None, out: Path, *, keep: bool
 ) -> None:
     """Render each file by Cycles and, exported, by Mitsuba; print differences, and write both pictures."""
@@ -119,7 +119,7 @@ def _job(blender: str, job: dict[str, object], folder: Path) -> None:
 
 def _run(blender: str, arguments: list[str], folder: Path) -> str:
     folder.mkdir(parents=True, exist_ok=True)
-    done = subprocess.run([blender, *arguments], capture_output=True, text=True, check=False)
+    done = subprocess.run([blender, *arguments], capture_output=True, text=True, check=False)  # noqa: S603
     if done.returncode:
         error = next(iter(folder.rglob("error.json")), None)
         sys.exit(f"{' '.join(arguments)}: {error.read_text() if error else done.stderr[-2000:]}")
@@ -134,7 +134,3 @@ def _write_pictures(file: Path, cycles: F32, ours: F32) -> None:
     row = np.concatenate([a, b, np.clip(0.5 + 4.0 * (b - a), 0.0, 1.0)], axis=1)
     picture = Image.fromarray(np.rint(row * 255.0).astype(np.uint8))
     picture.resize((row.shape[1] * 3, row.shape[0] * 3), Image.Resampling.NEAREST).save(file)
-
-
-if __name__ == "__main__":
-    main()
