@@ -78,14 +78,15 @@ def _refinement(results: Values, extent: Extent, _folder: Path, _figures: Path) 
     for scene, result in results.items():
         for light, of in result.items():
             told = of["predictions"]
-            same, count = refinement.agreement(of["segments"], result["no noise"]["segments"])
+            most = str(max(refinement.SPPS))
+            same, count = refinement.agreement(of["segments"], result[most]["segments"])
             name = light if light == "no noise" else f"{light} paths"
             percents = (told[key] for key in ("before", "after", "split_before", "split_after"))
             counts = (told[key] for key in ("split", "remaining"))
             rows.append((scene, name, *map(_or_dash, percents), *counts, f"{same} of {count}"))
     heads = (
         "scene", "light", "before, %", "after, %", "split segments: before, %", "after, %", "splits",
-        "remaining segments", "initial segments decided as without noise",
+        "remaining segments", "initial segments decided as with the most paths",
     )  # fmt: skip
     return _block([_size(extent), _table(heads, rows)], [])
 

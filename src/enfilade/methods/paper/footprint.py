@@ -18,7 +18,7 @@ from enfilade.records import F32, Geometry, Halves, Mask, Warped
 
 # Variance along an axis, square pixels: with that of the filter of §5 at rest (1/4), a Gaussian of one pixel.
 # It passes 0.29 at half the Nyquist frequency. Finer structure is aliased and resampled in any keyframe, and
-# differs at any distance of two of them. Chosen in ROOM and ATRIUM without noise, of 0.25, 0.5 and 1.
+# differs at any distance of two of them. Chosen in ROOM and ATRIUM without noise, of 0.25 to 1.
 FINEST = 0.75
 
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
