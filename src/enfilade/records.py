@@ -218,6 +218,8 @@ class Warped:
         0 where the keyframe shows the sky.
     magnification : (H, W) float32
         Area of the keyframe's pixel in pixels of the new image.
+    footprint : (H, W) float32
+        Extent of the surface that the pixel averages: variance along an axis, square pixels of the new image.
     is_disoccluded : (H, W) bool
         Pixels without a splat; the paper calls them holes.
     """
@@ -226,6 +228,7 @@ class Warped:
     depth: F32
     shape_index: U32
     magnification: F32
+    footprint: F32
     is_disoccluded: Mask
 
     def __post_init__(self) -> None:
@@ -234,6 +237,7 @@ class Warped:
         _check(self.depth, size, np.float32, "depth")
         _check(self.shape_index, size, np.uint32, "shape_index")
         _check(self.magnification, size, np.float32, "magnification")
+        _check(self.footprint, size, np.float32, "footprint")
 
     @property
     def color(self) -> F32:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from studies.cases import charts, pictures, placement, separation, statistics, times
+from studies.cases import charts, pictures, placement, refinement, separation, statistics, times
 from studies.cases.charts import velocity_class
 from studies.cases.extent import Extent
 
@@ -71,6 +71,24 @@ def _statistics(results: Values, extent: Extent, _folder: Path, figures: Path) -
         for scene, result in results.items()
     ]
     return _block([_size(extent), _table(heads, rows)], drawn)
+
+
+def _refinement(results: Values, extent: Extent, _folder: Path, _figures: Path) -> Block:
+    rows = []
+    for scene, result in results.items():
+        for light, of in result.items():
+            told = of["predictions"]
+            most = str(max(refinement.SPPS))
+            same, count = refinement.agreement(of["segments"], result[most]["segments"])
+            name = light if light == "no noise" else f"{light} paths"
+            percents = (told[key] for key in ("before", "after", "split_before", "split_after"))
+            counts = (told[key] for key in ("split", "remaining"))
+            rows.append((scene, name, *map(_or_dash, percents), *counts, f"{same} of {count}"))
+    heads = (
+        "scene", "light", "before, %", "after, %", "split segments: before, %", "after, %", "splits",
+        "remaining segments", "initial segments decided as with the most paths",
+    )  # fmt: skip
+    return _block([_size(extent), _table(heads, rows)], [])
 
 
 def _shares(results: Values, extent: Extent, _folder: Path, _figures: Path) -> Block:
@@ -257,6 +275,7 @@ def _reflections(results: Values, extent: Extent, _folder: Path, _figures: Path)
 BLOCKS: dict[str, Callable[[Values, Extent, Path, Path], Block]] = {
     "placement": _placement,
     "statistics": _statistics,
+    "refinement": _refinement,
     "shares": _shares,
     "times": _times,
     "threshold": _threshold,

@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.monitor import Monitor
-from studies.cases import SCENES, placement, reflections, separation, statistics, supports, threshold, times
+from studies.cases import (
+    SCENES,
+    placement,
+    refinement,
+    reflections,
+    separation,
+    statistics,
+    supports,
+    threshold,
+    times,
+)
 from studies.cases.case import Case, Result, open_folder, read_result
 from studies.cases.extent import Extent
 
@@ -17,6 +27,7 @@ Results = Mapping[str, Mapping[str, Result]]  # by item and scene
 ITEMS: dict[str, Callable[[Case], Any]] = {  # in the order of the paper's figures and tables
     "placement": placement.measure,
     "statistics": statistics.measure,
+    "refinement": refinement.measure,
     "shares": statistics.shares,
     "times": times.measure,
     "threshold": threshold.measure,

@@ -6,7 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.cache import LruCache
+from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.refine import Refinement
+from enfilade.methods.walkthrough import Walkthrough
+from enfilade.records import Keyframe
 from enfilade.settings import MaskSettings
 from studies.cases.case import Case
 from studies.progress import counted
@@ -15,6 +19,9 @@ PAPER_SHARES = {  # Table 1, percent
     "atrium": {"slow": 2.4, "specular": 40.8, "occlusion": 0.3, "keyframes": 6.0, "total": 49.5},
     "room": {"slow": 28.1, "specular": 0.0, "occlusion": 1.9, "keyframes": 5.1, "total": 35.1},
 }
+
+
+CACHED_KEYFRAMES = 8  # 150 MiB at 640x480
 
 
 def measure(case: Case) -> dict[str, Any]:
@@ -27,7 +34,7 @@ def measure(case: Case) -> dict[str, Any]:
         ``predictions``, ``plain``: see :func:`predictions`; ``split_percent``: the limit above which segments
         are split.
     """
-    summary, plain = case.rendered("paper"), without_noise(case)
+    summary, plain = case.rendered("paper"), refined(case, case.noise_free_windows.walk, "no noise")
     limit = case.whole.settings[MaskSettings].split_percent
     return {
         "per_frame": summary["per_frame"],
@@ -78,7 +85,7 @@ def predictions(segments: list[dict[str, Any]], limit: float) -> dict[str, Any]:
         without splits; ``before_still``, ``after_still``: for all, without pursuit.
         ``split_only_by_pursuit``: split segments below the limit without pursuit;
         ``unsplit_above_limit_still``: remaining segments above the limit without pursuit.
-        ``remaining_above_limit``: remaining segments above the limit, where splitting does not help.
+        ``remaining_above_limit``: remaining segments above the limit; 0, since splitting goes on.
     """
     compared = [s for s in segments if s["middle"] is not None]
     initial = [s for s in compared if s["depth"] == 0]
@@ -108,12 +115,17 @@ def _mean(segments: list[dict[str, Any]], key: str) -> float | None:
     return float(np.average([s[key] for s in segments], weights=weights))
 
 
-def without_noise(case: Case) -> list[dict[str, Any]]:
-    """Segments as in a summary, compared and split without noise (`NoiseFreeRenderer`)."""
-    windows = case.noise_free_windows
-    refinement, numbers = Refinement(windows.walk), windows.walk.path.numbers
+def refined(case: Case, walk: Walkthrough, light: str) -> list[dict[str, Any]]:
+    """Segments as in a summary: all of a walk, compared and split by a light."""
+    kept: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
+
+    def keyframe(frame: int) -> Keyframe:
+        return kept.get(
+            frame, lambda: Keyframe(frame, walk.view(frame).geometry, trace_keyframe(walk, frame))
+        )
+
+    refinement, rows = Refinement(walk), []
     initial = [s for shot in case.analysis.segments() for s in shot]
-    rows = []
-    for segment in counted(initial, "segments without noise", case.monitor):
-        rows += [result.to_table(numbers) for result in refinement.refine(segment, windows.keyframe)]
+    for segment in counted(initial, f"segments, {light}", case.monitor):
+        rows += [result.to_table(walk.path.numbers) for result in refinement.refine(segment, keyframe)]
     return rows

@@ -16,20 +16,19 @@ from enfilade.gbuffer import View, image_flow
 from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis
 from enfilade.methods.paper.composite import composite
-from enfilade.methods.paper.keyframe import trace_keyframe
 from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.support import spatial_support_px, temporal_limits
 from enfilade.methods.paper.temporal_filter import Slice, filter_along_flow
 from enfilade.methods.paper.warp import warped_pair
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
-from enfilade.records import F32, Geometry, Keyframe, Shading
+from enfilade.records import F32, Geometry, Halves, Keyframe, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import AntialiasSettings, SamplingSettings, TraceSettings, WarpSettings
 from studies.cases.virtual_images import reflected_geometry
 from studies.cases.visibility import Viewer
 
-CACHED_IMAGES, CACHED_VIEWS, CACHED_KEYFRAMES = 64, 24, 8  # about 700 MiB at 640x480
+CACHED_IMAGES, CACHED_VIEWS = 64, 24  # about 600 MiB at 640x480
 END_FRAMES = 10  # at the ends of a path, where the support of the temporal filter is truncated
 
 
@@ -67,7 +66,6 @@ class Windows:
         self._folder = folder
         self._images: LruCache[tuple[str, int], Shading] = LruCache(CACHED_IMAGES)
         self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
-        self._keyframes: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
 
     def around(self, frame: int, settings: AntialiasSettings) -> range:
         """Frames of the same shot that the filter may use."""
@@ -104,20 +102,14 @@ class Windows:
     def reused(self, frame: int) -> Shading:
         """A frame composited from its keyframes, with traced disocclusions (I_ibr of Fig. 9).
 
-        The keyframes are the initial ones, without splits. The variance is that of traced pixels, and 0
-        elsewhere: keyframes are denoised.
+        The keyframes are the initial ones, without splits, and not denoised. The variance is the warped
+        density of the noise (:mod:`enfilade.metric.noise`).
         """
         segments = (s for shot in self.analysis.segments() for s in shot)
         segment = next((s for s in segments if frame in s.inbetweens), None)
         if segment is None:
             return self.traced(frame)
         return self._cached("reused", frame, lambda: self._composited(segment, frame))
-
-    def keyframe(self, frame: int) -> Keyframe:
-        """A keyframe of the method."""
-        return self._keyframes.get(
-            frame, lambda: Keyframe(frame, self.geometry(frame), trace_keyframe(self.walk, frame))
-        )
 
     def antialiased(
         self,
@@ -158,13 +150,26 @@ class Windows:
         )
 
     def _composited(self, segment: Segment, frame: int) -> Shading:
-        geometry, progress = self.geometry(frame), self.walk.path.progress(segment, frame)
-        settings = self.walk.settings[WarpSettings]
-        warped = warped_pair(self.walk, self.keyframe(segment.first), self.keyframe(segment.last), frame)
-        color, is_disoccluded = composite(*warped, geometry, progress=progress, settings=settings)
-        traced = self.traced(frame)
+        color, is_disoccluded = self._warped(segment, frame, lambda of: of.color)
+        density, _ = self._warped(segment, frame, lambda of: np.repeat(of.variance[..., None], 3, axis=2))
+        variance, traced = np.ascontiguousarray(density[..., 0]), self.traced(frame)
         color[is_disoccluded] = traced.color[is_disoccluded]
-        return Shading(color, np.where(is_disoccluded, traced.variance, np.float32(0.0)))
+        variance[is_disoccluded] = traced.variance[is_disoccluded]
+        return Shading(color, variance)
+
+    def _warped(self, segment: Segment, frame: int, values: Callable[[Shading], F32]) -> tuple[F32, Mask]:
+        """Values of both keyframes, composited at a frame, and disoccluded pixels."""
+        images = [values(self.traced(at)) for at in (segment.first, segment.last)]
+        first, last = (
+            Keyframe(at, self.geometry(at), Halves(image, image))
+            for at, image in zip((segment.first, segment.last), images, strict=True)
+        )
+        return composite(
+            *warped_pair(self.walk, first, last, frame),
+            self.geometry(frame),
+            progress=self.walk.path.progress(segment, frame),
+            settings=self.walk.settings[WarpSettings],
+        )
 
     def _cached(self, kind: str, frame: int, make: Callable[[], Shading]) -> Shading:
         if self._folder is None:

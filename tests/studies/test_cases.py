@@ -14,7 +14,16 @@ from enfilade.errors import InputError, RunFolderError
 from enfilade.monitor import Silence
 from enfilade.records import SurfaceClass
 from enfilade.settings import KeyframeSettings, Placement
-from studies.cases import placement, reflections, separation, statistics, supports, threshold, times
+from studies.cases import (
+    placement,
+    refinement,
+    reflections,
+    separation,
+    statistics,
+    supports,
+    threshold,
+    times,
+)
 from studies.cases.blocks import BLOCKS
 from studies.cases.case import Case, Result, open_folder
 from studies.cases.document import check_blocks, replaced, write_document
@@ -63,7 +72,7 @@ def test_predictions_by_hand():
     segments = [
         segment(0, 10, 0, 20.0, 8.0, is_split=True),
         segment(0, 4, 1, 4.0, 2.0, is_split=False),
-        segment(4, 10, 1, 12.0, 11.0, is_split=False),  # splitting did not help
+        segment(4, 10, 1, 12.0, 11.0, is_split=False),
         segment(10, 14, 0, 2.0, 1.0, is_split=False),
         segment(14, 15, 0, 0.0, 0.0, is_split=False, middle=None),  # nothing between its keyframes
     ]
@@ -78,6 +87,13 @@ def test_predictions_by_hand():
         found[key] for key in ("split_only_by_pursuit", "unsplit_above_limit_still", "remaining_above_limit")
     ] == [1, 1, 1]
     assert statistics.predictions(segments[3:], 10.0)["split_before"] is None
+
+
+def test_lights_agree_where_they_split_the_same_initial_segments():
+    one = [segment(0, 10, 0, 20.0, 8.0, is_split=True), segment(10, 14, 0, 2.0, 1.0, is_split=False)]
+    other = [one[0], segment(0, 5, 1, 30.0, 8.0, is_split=True), segment(10, 14, 0, 12.0, 1.0, is_split=True)]
+    assert refinement.agreement(one, other) == (1, 2)
+    assert refinement.agreement(one, one) == (2, 2)
 
 
 def test_art_is_the_least_spp_at_which_nothing_is_visible():
@@ -210,7 +226,9 @@ def test_all_items_agree_with_each_other(results):
     run, plain_segments = found["statistics"]["segments"], found["statistics"]["plain_segments"]
     initial = [[(s["first"], s["last"]) for s in of if s["depth"] == 0] for of in (run, plain_segments)]
     assert initial[0] == initial[1] == [(1, 7), (7, 13), (13, 14)]
-    assert found["statistics"]["plain"]["before"] > found["statistics"]["predictions"]["before"]
+    by_light = found["refinement"]
+    assert list(by_light) == ["no noise", "8", "32", "128"]
+    assert by_light["no noise"]["segments"] == plain_segments
     assert found["shares"]["frames"] == len(found["statistics"]["per_frame"]) == 14
     assert 0.0 < found["shares"]["specular_percent"] < 50.0
     methods = found["times"]["methods"]

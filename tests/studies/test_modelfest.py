@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from enfilade.metric import HalvesAqm, LuminanceHalves
+from enfilade.monitor import Silence
 from studies.observers import modelfest
 from studies.observers.mode import PAPER
 from studies.observers.modelfest import PIXELS_PER_DEGREE, SIZE_PX, Thresholds, target
@@ -118,3 +120,21 @@ class LinearMetric:
 
 def test_a_threshold_beyond_the_range_of_the_display_is_above_1():
     assert threshold_contrast(LinearMetric(), -target(29), 30.0) == pytest.approx(2.0, rel=1e-3)
+
+
+class WithoutNoise:
+    """The metric of halves for images without noise."""
+
+    def __init__(self, viewing):
+        self.viewing = viewing
+        self._aqm = HalvesAqm(viewing)
+
+    def compare(self, test, reference):
+        return self._aqm.compare(LuminanceHalves(test, test), LuminanceHalves(reference, reference))
+
+
+@pytest.mark.slow
+def test_the_gain_of_the_metric_of_halves_is_that_of_modelfest():
+    found = modelfest.measure(SimpleNamespace(name="halves", aqm=WithoutNoise), Silence())
+    assert found.gain_db == pytest.approx(0.0, abs=0.02)  # GAIN_DB is applied already
+    assert found.rms_db == pytest.approx(3.9, abs=0.1)

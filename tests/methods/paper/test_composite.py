@@ -38,6 +38,7 @@ def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded
         np.full(size, depth, np.float32),
         np.full(size, shape_index, np.uint32),
         np.full(size, magnification, np.float32),
+        np.full(size, 0.25 * magnification, np.float32),
         np.full(size, is_disoccluded),
     )
 

@@ -71,10 +71,10 @@ def test_stretched_pixels_are_filtered_less(pair):
     peaks = []
     for magnification in (1.0, 2.0, 9.0):
         one = dataclasses.replace(
-            colored(pair[0], impulse), magnification=np.full((48, 64), magnification, np.float32)
+            colored(pair[0], impulse), footprint=np.full((48, 64), 0.25 * magnification, np.float32)
         )
         peaks.append(shown_alike(one, one, np.ones((48, 64), bool), support)[0].color[24, 32, 0])
-    # Variance 1 + 1/6 in place of 1, less 1/4 (magnification - 1).
-    assert peaks[0] == pytest.approx(1 / (2 * np.pi * (7 / 6)), rel=0.02)
-    assert peaks[1] == pytest.approx(1 / (2 * np.pi * (11 / 12)), rel=0.02)
+    # Variance 1 of the filter and 3/4 of the finest structure, less the footprint.
+    assert peaks[0] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 4)), rel=0.02)
+    assert peaks[1] == pytest.approx(1 / (2 * np.pi * (7 / 4 - 1 / 2)), rel=0.02)
     assert peaks[2] == 1.0

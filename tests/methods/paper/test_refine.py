@@ -74,7 +74,7 @@ def test_a_change_is_found_and_split_with_8_paths(change):
 
 
 def test_noise_of_4_paths_is_no_difference():
-    # `studies/cases/README.md` has 1000 trials.
+    # `studies/cases/README.md` has more trials.
     for seed in range(3):
         (result,) = refined("none", spp=4, seed=seed)
         assert result.percent_visible < 5.0

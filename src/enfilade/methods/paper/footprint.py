@@ -1,9 +1,10 @@
 """What is compared: two warped keyframes as the filter of §5 will show them (§4.3, step 3).
 
-A pixel of a keyframe is the mean over its square. Where the warp stretches it, the surface appears blurred.
-The filter of §5 blurs, too. Both images are filtered to the footprint that this filter gives to pixels that
-no warp has stretched; a stretched pixel is filtered less, or not at all. A difference remains where the
-stretched pixel is wider than the footprint: it is the blur that the delivered frame would have.
+A pixel of a keyframe is a mean over its square. Where the warp stretches it, the surface appears blurred, and
+bilinear interpolation adds to it, by the position between the samples. Both images are filtered to one
+footprint: that of the filter of §5 at the pixel's velocity, and of the finest structure that keyframes
+reproduce. A stretched pixel is filtered less, or not at all. A difference remains where it is wider than the
+footprint: it is the blur that the delivered frame would have.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from enfilade.methods.paper.spatial_filter import reconstruct
 from enfilade.methods.paper.warp import disparity_gradient
 from enfilade.records import F32, Geometry, Halves, Mask, Warped
 
-# Variances along an axis, square pixels.
-PIXEL = 1.0 / 12.0  # of the square over which the paths are distributed
-BILINEAR = 1.0 / 6.0  # of bilinear interpolation, the mean over all positions between four samples
+# Variance along an axis, square pixels: with that of the filter of §5 at rest (1/4), a Gaussian of one pixel.
+# It passes 0.29 at half the Nyquist frequency. Finer structure is aliased and resampled in any keyframe, and
+# differs at any distance of two of them. Chosen in ROOM and ATRIUM without noise, of 0.25 to 1.
+FINEST = 0.75
 
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
 
@@ -71,7 +73,7 @@ def shown_alike(before: Warped, after: Warped, is_compared: Mask, support_px: F3
 
 
 def _shown(warped: Warped, is_compared: Mask, filler: F32, support_px: F32) -> Halves:
-    support = _remaining_support(warped.magnification, support_px)
+    support = _remaining_support(warped.footprint, support_px)
     first, second = (
         reconstruct(np.where(is_compared[..., None], half, filler), support)
         for half in (warped.shading.first, warped.shading.second)
@@ -79,13 +81,9 @@ def _shown(warped: Warped, is_compared: Mask, filler: F32, support_px: F32) -> H
     return Halves(first, second)
 
 
-def _remaining_support(magnification: F32, support_px: F32) -> F32:
-    """Full width of the filter that brings stretched pixels to the common footprint; at least one pixel.
-
-    The temporal filter interpolates the frame once more.
-    """
-    wanted = np.square(support_px / np.float32(SIGMAS)) + np.float32(BILINEAR)
-    stretched = np.float32(PIXEL + BILINEAR) * (magnification - np.float32(1.0))
-    sigma = np.sqrt(np.maximum(wanted - stretched, np.float32(0.0)))
+def _remaining_support(footprint: F32, support_px: F32) -> F32:
+    """Full width of the filter that brings pixels to the common footprint; at least one pixel."""
+    shown = np.square(support_px / np.float32(SIGMAS)) + np.float32(FINEST)
+    sigma = np.sqrt(np.maximum(shown - footprint, np.float32(0.0)))
     support: F32 = np.maximum(np.float32(SIGMAS) * sigma, np.float32(1.0))
     return support

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from enfilade.methods.denoise import denoise
 from enfilade.methods.paper.composite import composite
+from enfilade.methods.paper.keyframe import find_guides
 from enfilade.methods.paper.masks import provenance_of, slow_pixels, specular_pixels
 from enfilade.methods.paper.refine import SegmentResult
 from enfilade.methods.paper.warp import warped_pair
@@ -49,7 +51,10 @@ def derive(
 
 
 def _trace_into(walk: Walkthrough, frame: int, color: F32, where: Mask) -> int:
-    """Trace some pixels of an image, with paths distributed over the pixel; returns the samples left out."""
+    """Trace some pixels of an image, with paths distributed over the pixel; returns the samples left out.
+
+    The denoiser sees the whole image, and changes the traced pixels alone.
+    """
     if not where.any():
         return 0
     filled = walk.trace(
@@ -60,4 +65,5 @@ def _trace_into(walk: Walkthrough, frame: int, color: F32, where: Mask) -> int:
         pixel_filter=PixelFilter.BOX,
     )
     color[where] = filled.color
+    color[where] = denoise(color, *find_guides(walk, frame))[where]
     return filled.dropped

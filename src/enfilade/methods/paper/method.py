@@ -74,7 +74,7 @@ class Paper(Method):
                 "the metric tells differences from noise"
             )
         if why := why_no_denoiser():
-            raise SettingsError(f"--method paper denoises its keyframes. {why}")
+            raise SettingsError(f"--method paper denoises its pixels. {why}")
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Initial keyframes (§4.2)."""

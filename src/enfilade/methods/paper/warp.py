@@ -19,6 +19,7 @@ from enfilade.records import F32, U32, Geometry, Halves, Keyframe, Warped
 from enfilade.settings import WarpSettings
 
 CONTINUOUS = 0.1  # largest relative change of disparity between neighbours on one surface
+PIXEL_VARIANCE = 1.0 / 12.0  # of positions over a pixel along an axis, square pixels
 EVEN = 0.1  # largest relative difference of two such changes in a row on one slope
 
 
@@ -143,6 +144,11 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     centre = Array2f(winner - winner_row * source.width, winner_row) + 0.5
     at = centre + offset
 
+    # Estimate the area that the pixel averages: that of the keyframe's pixels, and of the interpolation.
+    beyond = at - 0.5 - dr.floor(at - 0.5)
+    interpolated = beyond * (1.0 - beyond)
+    footprint = det * (PIXEL_VARIANCE + 0.5 * (interpolated.x + interpolated.y))
+
     # Interpolate among the neighbours on the winner's surface.
     shape_indices = lanes(keyframe.geometry.shape_index)
     halves = lanes(keyframe.shading.first), lanes(keyframe.shading.second)
@@ -162,15 +168,16 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     # Normalize, and clear disoccluded pixels.
     is_disoccluded = is_empty | (total <= 0.0)
     inverse = dr.select(is_disoccluded, 0.0, 1.0 / total)
-    magnification = dr.select(is_disoccluded, 0.0, det)
+    magnification, footprint = (dr.select(is_disoccluded, 0.0, value) for value in (det, footprint))
     first, second = (color * inverse for color in colors)
     depth = dr.select(is_disoccluded | (depth >= INFINITE), 0.0, depth)
     shape_index = dr.select(is_disoccluded, 0, shape_index)
-    dr.eval(first, second, depth, shape_index, magnification, is_disoccluded)
+    dr.eval(first, second, depth, shape_index, magnification, footprint, is_disoccluded)
     return Warped(
         shading=Halves(image(first, height, width), image(second, height, width)),
         depth=image(depth, height, width),
         shape_index=image(shape_index, height, width),
         magnification=image(magnification, height, width),
+        footprint=image(footprint, height, width),
         is_disoccluded=image(is_disoccluded, height, width),
     )
