@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -111,6 +112,10 @@ def main():
         case "hang after":
             export(job, wish)
             time.sleep(600)
+        case "leave a process":
+            export(job, wish)
+            left = subprocess.Popen(["/bin/sleep", "60"], start_new_session=True)
+            (Path(job["out"]) / "left.pid").write_text(str(left.pid))
         case "hang":
             say("Fra:1 still at it")
             time.sleep(600)

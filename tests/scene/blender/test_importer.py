@@ -147,6 +147,11 @@ def test_a_process_that_hangs_at_its_end_is_ended(load, shot, monkeypatch):
     assert load(shot(do="hang after")).camera == "Cam"
 
 
+def test_a_process_that_is_left_behind_is_not_waited_for(load, shot):
+    made = load(shot(do="leave a process"))
+    os.kill(int((made.folder / "left.pid").read_text()), signal.SIGKILL)  # it still runs, and has the pipe
+
+
 def test_strict_refuses_what_is_not_carried_over(load, shot, tmp_path):
     notes = [{"kind": "not-carried", **NOTE}, {"kind": "not-carried", **NOTE, "object": "Chair"}]
     source = shot(notes=[*notes, {"kind": "mapped", **NOTE}])

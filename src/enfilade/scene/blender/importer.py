@@ -164,10 +164,13 @@ def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, 
 
 
 def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Tables of numbers and strings; JSON's strings are TOML's."""
+    """Tables of numbers and strings; JSON's strings are TOML's, but for escapes of surrogates."""
     lines = ["# Settings of the imported file, for --settings."]
     for name, table in tables.items():
-        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items())]
+        lines += [
+            f"[{name}]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
+        ]
     return "\n".join(lines) + "\n"
 
 
