@@ -27,6 +27,7 @@ def render_frames(job: Job) -> dict[str, Any]:
     render.resolution_x, render.resolution_y = selection.size
     render.resolution_percentage = 100
     render.use_compositing = render.use_sequencer = render.use_motion_blur = False
+    render.use_border = render.use_multiview = render.use_stamp = False
     settings = render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
     cycles.film_exposure = 1.0  # as the exported scene; import.json has it in its exposure
