@@ -107,10 +107,11 @@ Value = Constant | ImageValue | AttributeValue | Procedural | Texture
 
 @dataclass(frozen=True)
 class NormalMap:
-    """Tangent-space normals of an image."""
+    """Tangent-space normals of an image: `output` of a node Normal Map."""
 
     image: Value
     strength: float
+    output: Output
 
 
 @dataclass(frozen=True)
