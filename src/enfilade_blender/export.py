@@ -34,7 +34,7 @@ def export(job: Job) -> dict[str, Any]:
     """
     notes = Notes()
     report_progress(0.0, "open")
-    selection = open_source(job)
+    selection = open_source(job, notes)
     check_size(selection, job.limits)
     report_progress(0.05, "cameras")
     note_motion(selection, notes)

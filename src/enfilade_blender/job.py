@@ -49,7 +49,7 @@ class Job:
         Pixels; None takes the scene's resolution.
     limits
     library_folders : tuple of Path
-        Folders besides the source's own that linked libraries may lie in.
+        Folders besides the source's own that linked libraries and images may lie in.
     bake_px : int
         Largest width of a baked texture.
     bake_samples : int

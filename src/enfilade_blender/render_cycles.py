@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from enfilade_blender.job import Job
-from enfilade_blender.notes import report_progress
+from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.open_file import open_source
 
 
@@ -19,7 +19,7 @@ def render_frames(job: Job) -> dict[str, Any]:
     Data stays in memory from frame to frame. With ``job.unbiased`` the file's clamping, filtered glossy and
     light threshold are off, and pixels are boxes. Limits of bounces stay the file's.
     """
-    selection = open_source(job)
+    selection = open_source(job, Notes())
     scene = selection.scene
     render, cycles = scene.render, scene.cycles
     render.engine, cycles.device = "CYCLES", "CPU"

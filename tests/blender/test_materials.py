@@ -1,5 +1,6 @@
 """Materials that are easily lost, as they are exported."""
 
+import shutil
 from xml.etree import ElementTree as ET
 
 import mitsuba as mi
@@ -61,6 +62,20 @@ def test_plastic_by_fresnel_keeps_its_normals(made):
     plastic = elements["material bumpy plastic"].find(".//bsdf[@type='bumpmap']/bsdf")
     assert plastic.get("type") == "roughplastic"
     assert "the tint of reflections is left out" in notes["bumpy plastic"]
+
+
+def test_a_picture_of_another_folder_is_missing(blender, made, tmp_path):
+    _, _, notes = made
+    assert "picture.png" not in notes
+    apart = tmp_path / "apart.blend"
+    shutil.copyfile(blender.folder / "files" / f"{NAME}.blend", apart)
+    code, out, result = blender.job(apart, "apart")
+    (note,) = [
+        note for note in result["notes"] if note["kind"] == "not-carried" and "folders" in note["what"]
+    ]
+    assert (code, note["object"]) == (0, "picture.png")
+    assert note["effect"] == f"the image is missing; allow {blender.folder / 'files'}"
+    assert not list((out / "textures").glob("picture*"))
 
 
 def test_opacity_dims_what_is_emitted(made):

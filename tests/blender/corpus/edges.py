@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials that are easily lost: one plane of each."""
 
+import bpy
 import numpy as np
 
 from corpus.stage import image, new_file, node_of, plane, principled, shader
 
 
-def uncommon_materials(_folder):
+def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     makers = (_cut_out, _see_through, _sheer_gloss, _bumpy_plastic)
@@ -14,6 +15,10 @@ def uncommon_materials(_folder):
     materials.append(principled("premultiplied", **{"Base Color": half, "Metallic": 1.0}))
     inputs = {"Emission Color": (1, 1, 1, 1), "Emission Strength": 4.0, "Alpha": 0.25}
     materials.append(principled("faint glow", **inputs))
+    (folder / "picture.png").write_bytes(half.packed_file.data)
+    materials.append(
+        principled("picture", **{"Base Color": bpy.data.images.load(str(folder / "picture.png"))})
+    )
     for number, material in enumerate(materials):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
