@@ -114,7 +114,8 @@ def main():
             time.sleep(600)
         case "leave a process":
             export(job, wish)
-            left = subprocess.Popen(["/bin/sleep", "60"], start_new_session=True)
+            line = ["/bin/sh", "-c", 'sleep 60; : > "$0"', str(Path(job["source"]).with_suffix(".ended"))]
+            left = subprocess.Popen(line, start_new_session=True)
             (Path(job["out"]) / "left.pid").write_text(str(left.pid))
         case "hang":
             say("Fra:1 still at it")

@@ -148,8 +148,9 @@ def test_a_process_that_hangs_at_its_end_is_ended(load, shot, monkeypatch):
 
 
 def test_a_process_that_is_left_behind_is_not_waited_for(load, shot):
-    made = load(shot(do="leave a process"))
-    os.kill(int((made.folder / "left.pid").read_text()), signal.SIGKILL)  # it still runs, and has the pipe
+    made = load(shot(do="leave a process"))  # which has the pipe for a minute
+    os.killpg(int((made.folder / "left.pid").read_text()), signal.SIGKILL)
+    assert not (made.folder.parent / "shot.ended").exists()
 
 
 def test_strict_refuses_what_is_not_carried_over(load, shot, tmp_path):
