@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds objects that move or deform, and lamps that change: the exported scene is static."""
+"""Finds what moves, deforms or changes: the exported scene is static."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import bpy
 import numpy as np
 
 from enfilade_blender.notes import Notes
@@ -17,7 +18,7 @@ DEFORMING = ("ARMATURE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BOD
 
 
 def note_motion(selection: Selection, notes: Notes) -> None:
-    """Note every object but cameras whose pose, shape or light changes over the frames."""
+    """Note every object but cameras whose pose, shape or light changes, and animated materials and worlds."""
     first, last = selection.frames
     if first == last:
         return
@@ -32,6 +33,11 @@ def note_motion(selection: Selection, notes: Notes) -> None:
         notes.add("not-carried", name, "Animation", "its deformation is left out", effect)
     for name in _changing(lights):
         notes.add("not-carried", name, "Animation", "the change of its light is left out", effect)
+    world = selection.scene.world
+    used = [material for material in bpy.data.materials if material.users] + ([world] if world else [])
+    for data in used:
+        if any(_is_animated(part) for part in (data, data.node_tree)):
+            notes.add("not-carried", data.name, "Animation", "its animation is left out", effect)
     rest = max(len(moving) - LISTED, 0) + max(len(deforming) - LISTED, 0)
     if rest:
         notes.add("not-carried", f"{rest} further objects", "Animation", "their motion is left out", effect)
@@ -50,6 +56,11 @@ def _state(selection: Selection, frame: int) -> tuple[dict[str, np.ndarray], dic
 def _changing(states: tuple[dict[str, np.ndarray], ...]) -> list[str]:
     first, *rest = states
     return [name for name, value in first.items() if any(_differs(value, later.get(name)) for later in rest)]
+
+
+def _is_animated(data: Any) -> bool:
+    animation = getattr(data, "animation_data", None)
+    return animation is not None and animation.action is not None
 
 
 def _differs(pose: np.ndarray, other: Any) -> bool:

@@ -72,6 +72,12 @@ def test_the_colour_of_an_object_is_baked(exported):
     assert median == pytest.approx([203, 89, 124], abs=1)  # sRGB of 0.6, 0.1, 0.2
 
 
+def test_generated_coordinates_are_baked_over_the_mesh_at_the_first_frame(exported):
+    file = next((exported[0] / "textures").glob("rising_ Rising*"))
+    values = np.array(mi.Bitmap(str(file)))[..., 0]
+    assert np.percentile(values[values > 0], 95) == pytest.approx(255, abs=5)  # half of it at frame 1
+
+
 def test_what_is_lost_is_noted(exported):
     _, result = exported
     noted = {(note["object"], note["node"]) for note in result["notes"]}
@@ -80,6 +86,8 @@ def test_what_is_lost_is_noted(exported):
         ("Key", "Light linking"),
         ("Scene", "Color Management: Gamma"),
         ("Scene", "Frame Step"),
+        ("World", "Animation"),
+        ("rising", "Animation"),
         ("World", "Ray visibility"),
         ("coloured", "Object Info"),
     }
@@ -87,7 +95,7 @@ def test_what_is_lost_is_noted(exported):
 
 def test_cycles_renders_beyond_the_files_border(blender, source):
     _, out, _ = blender.job(source, "border", task="cycles", spp=1)
-    image = read_exr(out / "cycles-0001.exr")
+    image = read_exr(out / "cycles-0011.exr")
     assert image.shape == (24, 32, 3)
     assert image[0, 0].max() > 0.0
     assert image[-1, -1].max() > 0.0

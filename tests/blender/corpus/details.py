@@ -14,9 +14,7 @@ def details(folder):
     light("AREA", "Portal", (0.0, -2.0, 3.0), 50.0, size=1.0).data.cycles.is_portal = True
     key = light("POINT", "Key", (-2.0, -3.0, 4.0), 100.0, shadow_soft_size=0.0)
     key.light_linking.receiver_collection = bpy.data.collections.new("only these")
-    for frame, power in ((1, 100.0), (5, 50.0)):
-        key.data.energy = power
-        key.data.keyframe_insert("energy", frame=frame)
+    _keyed(key.data, "energy", 100.0, 50.0)
     sphere("Dome", (0.0, 0.0, 0.0), 20.0, shader("dome", "ShaderNodeEmission", Strength=0.3)[0])
     sphere("Bulb", (1.5, -1.0, 1.5), 0.1, shader("bulb", "ShaderNodeEmission", Strength=9.0)[0])
     cube("material floor", (2.5, 0.0, 0.25), 0.5, principled("plain"))
@@ -25,10 +23,18 @@ def details(folder):
     _corrected_images()
     _tilted_normals()
     _object_colour()
+    _animated_gradient()
+
+
+def _keyed(data, name, at_first, at_last):
+    """Keys of a value at the first and last frame; at frame 1 it is another one, by half."""
+    for frame, value in ((1, 0.5 * at_first), (11, at_first), (15, at_last)):
+        setattr(data, name, value)
+        data.keyframe_insert(name, frame=frame)
 
 
 def _settings(scene):
-    scene.frame_start, scene.frame_end, scene.frame_step = 1, 5, 2
+    scene.frame_start, scene.frame_end, scene.frame_step = 11, 15, 2
     scene.view_settings.gamma = 1.2
     render = scene.render
     render.resolution_percentage, render.use_border = 25, True
@@ -36,9 +42,10 @@ def _settings(scene):
 
 
 def _hidden_world():
-    """A world of 0.2 that the camera sees as green, in a group; it is hidden from the camera, too."""
+    """A world of 0.2 at the first frame, which the camera would see as green, and from which it is hidden."""
     value = world((0.0, 1.0, 0.0))
     value.cycles_visibility.camera = False
+    _keyed(value.node_tree.nodes["Background"].inputs[1], "default_value", 1.0, 2.0)
     group = bpy.data.node_groups.new("by ray", "ShaderNodeTree")
     group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
     ray, end = group.nodes.new("ShaderNodeLightPath"), group.nodes.new("NodeGroupOutput")
@@ -102,6 +109,19 @@ def _object_colour():
     tree.links.new(info.outputs["Color"], node.inputs["Color"])
     tree.links.new(info.outputs["Random"], node.inputs["Roughness"])
     cube("Coloured", (2.0, -1.5, 0.2), 0.3, coloured).color = (0.6, 0.1, 0.2, 1.0)
+
+
+def _animated_gradient():
+    """Generated coordinates, scaled by an animated number: no function of the UV map."""
+    rising, tree, node = shader("rising", "ShaderNodeBsdfDiffuse")
+    coordinates, split = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
+    scaled = tree.nodes.new("ShaderNodeMath")
+    scaled.operation = "MULTIPLY"
+    _keyed(scaled.inputs[1], "default_value", 1.0, 0.0)
+    tree.links.new(coordinates.outputs["Generated"], split.inputs[0])
+    tree.links.new(split.outputs["Z"], scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], node.inputs["Color"])
+    cube("Rising", (-2.0, -1.5, 0.2), 0.3, rising)
 
 
 CASES = (details,)
