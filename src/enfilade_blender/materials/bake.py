@@ -46,6 +46,7 @@ SMALLEST = 64  # pixels
 PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
 UNIFORM = 2e-3  # standard deviation below which a texture is a constant
 CONSTANT_PX = 8
+FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
 UV_MAPS = 8  # that a mesh of Blender can have
 
 
@@ -110,9 +111,10 @@ class Bakery:
         is_normal = isinstance(value, ProceduralNormal)
         pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
         if is_normal:
-            file = self._textures.write(f"{placed.name} normal", np.clip(pixels, 0.0, 1.0), raw=True)
+            pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
+            file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
             self._note(value.output, material.name, placed.name, size)
-            return NormalMap(Texture(file, BAKED_UV, (0.5, 0.5, 1.0), raw=True), 1.0, value.output)
+            return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
         return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV, placed.name)
 
     def _with_baked_normals(self, shader: Shader) -> Shader:
@@ -140,7 +142,7 @@ class Bakery:
     def _stored(
         self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str, where: str
     ) -> Value:
-        """A baked value: a constant where it is uniform, else a file."""
+        """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
         output = value.output
         if isinstance(value, Procedural) and value.is_of_view:
             effect = "as seen along the normal from all directions"
@@ -150,6 +152,8 @@ class Bakery:
         colour = (float(mean[0]), float(mean[1]), float(mean[2]))
         if inside.std(axis=0).max() <= UNIFORM * max(1.0, float(mean.max())):
             return Constant(colour)
+        if covered is not None:
+            pixels = np.where(covered[..., None], pixels, mean)
         is_data = output.socket.type != "RGBA" or pixels.max() > 1.0
         file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
         self._note(output, name, where, len(pixels))

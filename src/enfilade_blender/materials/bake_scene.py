@@ -115,12 +115,12 @@ class Canvas:
         """Values of an output (size, size, 3), the first row on top, and the texels that the mesh covers."""
         image = bpy.data.images.new(TARGET, size, size, alpha=True, float_buffer=True)
         image.colorspace_settings.name = "Non-Color"
-        image.generated_color = (0.0, 0.0, 0.0, 0.0)
+        image.pixels.foreach_set(np.zeros(size * size * 4, np.float32))  # Blender clears to an alpha of 1
         copy = material.copy()
         _wire(copy.node_tree, output, image, is_normal=is_normal)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
-        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=True)
+        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=False)
         rgba = linear_pixels(image)
         groups = [n.node_tree for n in copy.node_tree.nodes if n.type == "GROUP" and n.node_tree is not None]
         bpy.data.materials.remove(copy)
