@@ -170,7 +170,6 @@ def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
         _name(instance),
         mesh,
         slots,
-        is_instance=instance.is_instance,
         colour=tuple(obj.color),
         index=obj.pass_index,
     )

@@ -21,13 +21,10 @@ class Limits:
         Objects of the evaluated scene, instances included.
     triangles : int
         Triangles that are written.
-    seconds : float
-        Wall time of the whole job; the caller ends it.
     """
 
     instances: int = 1_000_000
     triangles: int = 50_000_000
-    seconds: float = 1800.0
 
 
 @dataclass(frozen=True)

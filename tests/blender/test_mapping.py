@@ -10,14 +10,6 @@ from enfilade_blender.materials import mapping
 from enfilade_blender.materials.textures import file_stem
 
 
-def test_sockets_of_blender_3_have_the_names_of_blender_4():
-    names = mapping.principled_names(["Base Color", "Specular", "Clearcoat", "Emission", "Metallic"])
-    assert names["Specular IOR Level"] == "Specular"
-    assert names["Coat Weight"] == "Clearcoat"
-    assert names["Emission Color"] == "Emission"
-    assert "Sheen Weight" not in names
-
-
 @pytest.mark.parametrize(("level", "factor"), [(0.0, 0.0), (0.5, 1.0), (1.0, 2.0)])
 def test_the_level_scales_the_reflectance_along_the_normal(level, factor):
     ior = mapping.interface_ior(1.5, level)

@@ -115,7 +115,7 @@ def main():
         case "leave a process":
             export(job, wish)
             line = ["/bin/sh", "-c", 'sleep 60; : > "$0"', str(Path(job["source"]).with_suffix(".ended"))]
-            left = subprocess.Popen(line, start_new_session=True)
+            left = subprocess.Popen(line, start_new_session=True)  # noqa: S603
             (Path(job["out"]) / "left.pid").write_text(str(left.pid))
         case "hang":
             say("Fra:1 still at it")

@@ -74,8 +74,8 @@ class Graph:
             return Nothing()
         node, inner = found.node, found.groups
         if node.type == "BSDF_PRINCIPLED":
-            names = mapping.principled_names([s.name for s in node.inputs])
-            inputs = {new: self.value(node.inputs[old], inner) for new, old in names.items()}
+            names = (name for name in mapping.PRINCIPLED if name in node.inputs)
+            inputs = {name: self.value(node.inputs[name], inner) for name in names}
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
             first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))

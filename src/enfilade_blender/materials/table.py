@@ -29,7 +29,6 @@ class LobeKind:
 LOBES = {
     "BSDF_DIFFUSE": LobeKind("diffuse", "`diffuse`"),
     "BSDF_GLOSSY": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
-    "BSDF_ANISOTROPIC": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
     "BSDF_METALLIC": LobeKind(
         "glossy",
         "`conductor` or `roughconductor`",
@@ -168,7 +167,7 @@ OBJECTS = (
         "mapped",
         "merged, or `instance` where they are many",
     ),
-    ("Linked libraries", "mapped", "within the source's folder and the allowed ones"),
+    ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
     ("Animated objects, lamps, materials and worlds", "not carried", "as in the first frame"),
     ("Gamma, curves and white balance of the view; frame step", "not carried", "left out"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),

@@ -134,7 +134,7 @@ Normal = NormalMap | Bump | ProceduralNormal | None
 
 @dataclass(frozen=True)
 class Principled:
-    """Blender's Principled BSDF; `inputs` by names of Blender 4."""
+    """Blender's Principled BSDF; `inputs` by their names."""
 
     inputs: dict[str, Value]
     normal: Normal

@@ -85,11 +85,7 @@ def job_table(task: str, source: Path, out: Path, choices: Choices, limits: Limi
     """A job of the importer; the part that its tasks have in common."""
     folders = [folder for folder in limits.allow.split(os.pathsep) if folder]
     named = {name: value or None for name, value in asdict(choices).items()}
-    bounds = {
-        "instances": limits.import_instances,
-        "triangles": limits.import_triangles,
-        "seconds": limits.import_s,
-    }
+    bounds = {"instances": limits.import_instances, "triangles": limits.import_triangles}
     files = {"source": str(source.resolve()), "out": str(out.resolve())}
     return {"task": task, **files, **named, "limits": bounds, "library_folders": folders}
 
