@@ -86,7 +86,7 @@ class EnfiladeRender(bpy.types.Operator):
         except OSError as error:
             self.report({"ERROR"}, f"{order.command}: {error.strerror}; give the program in the preferences")
             return {"CANCELLED"}
-        bpy.app.timers.register(watch, first_interval=LOOK_S)
+        bpy.app.timers.register(watch, first_interval=LOOK_S, persistent=True)  # opening a file keeps it
         return {"FINISHED"}
 
 

@@ -42,10 +42,13 @@ class Order:
     blender: str = ""
 
     def line(self) -> list[str]:
-        """The command line; names are quoted as TOML."""
+        """The command line; names are quoted as TOML, which has no escapes of surrogates."""
         chosen = {"blender.scene": self.scene, "blender.program": self.blender}
         settings = [
-            part for key, value in chosen.items() if value for part in ("--set", f"{key}={json.dumps(value)}")
+            part
+            for key, value in chosen.items()
+            if value
+            for part in ("--set", f"{key}={json.dumps(value, ensure_ascii=False)}")
         ]
         files = [str(self.source), "--out", str(self.run)]
         return [self.command, "render", *files, "--quality", f"{self.quality:g}", *settings]

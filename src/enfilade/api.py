@@ -146,7 +146,7 @@ def import_scene(
     Returns
     -------
     ImportedScene
-        Its folder, and what was mapped, baked, approximated and not carried over.
+        Its folder, and what was baked, approximated and not carried over.
 
     Raises
     ------

@@ -28,6 +28,16 @@ NOT_CARRIED = {
     "GREASEPENCIL": "grease pencil",
     "GPENCIL": "grease pencil",
 }
+SETTINGS = {  # of a render of nothing
+    "engine": ENGINE,
+    "resolution_x": 8,
+    "resolution_y": 8,
+    "resolution_percentage": 100,
+    "use_border": False,
+    "use_multiview": False,
+    "use_compositing": False,
+    "use_sequencer": False,
+}
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 
 
@@ -76,26 +86,19 @@ def evaluate(selection: Selection, limits: Limits, notes: Notes) -> Evaluated:
 def _render(selection: Selection) -> None:
     """Render nothing, in 8x8 pixels, by a camera of our own where there is none."""
     scene, render = selection.scene, selection.scene.render
-    before = (
-        render.engine,
-        render.resolution_x,
-        render.resolution_y,
-        render.use_compositing,
-        render.use_sequencer,
-    )
+    before = {name: getattr(render, name) for name in SETTINGS}
     camera, own = scene.camera, None
     if camera is None:
         own = bpy.data.objects.new("enfilade camera", bpy.data.cameras.new("enfilade camera"))
         scene.collection.objects.link(own)
         scene.camera = own
-    render.engine, render.resolution_x, render.resolution_y = ENGINE, 8, 8
-    render.use_compositing = render.use_sequencer = False
+    for name, value in SETTINGS.items():
+        setattr(render, name, value)
     for layer in scene.view_layers:
         layer.use = layer == selection.view_layer
     bpy.ops.render.render(scene=scene.name)
-    render.engine, render.resolution_x, render.resolution_y, render.use_compositing, render.use_sequencer = (
-        before
-    )
+    for name, value in before.items():
+        setattr(render, name, value)
     scene.camera = camera
     if own is not None:
         bpy.data.objects.remove(own)
@@ -113,6 +116,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
             continue
         matrix = np.array(instance.matrix_world, np.float64)
         if obj.type == "LIGHT":
+            _note_linking(obj, notes)
             result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))
         elif obj.type in NOT_CARRIED:
             what = f"{NOT_CARRIED[obj.type]} can't be exported"
@@ -162,7 +166,13 @@ def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
     if mesh is None or len(mesh) == 0:
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)
-    return Placed(_name(instance), mesh, slots, is_instance=instance.is_instance)
+    return Placed(
+        _name(instance),
+        mesh,
+        slots,
+        colour=tuple(obj.color),
+        index=obj.pass_index,
+    )
 
 
 def _name(instance: Any) -> str:
@@ -172,7 +182,19 @@ def _name(instance: Any) -> str:
     )
 
 
+def _note_linking(obj: Any, notes: Notes) -> None:
+    """Note light linking and shadow linking, of lamps and of emitters."""
+    linking = obj.light_linking
+    if linking.receiver_collection is not None:
+        what, effect = "light linking is left out", "it lights all objects"
+        notes.add("not-carried", obj.name, "Light linking", what, effect)
+    if linking.blocker_collection is not None:
+        what, effect = "shadow linking is left out", "all objects cast shadows in its light"
+        notes.add("not-carried", obj.name, "Shadow linking", what, effect)
+
+
 def _note_object(obj: Any, notes: Notes) -> None:
+    _note_linking(obj, notes)
     hidden = [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]
     if hidden:
         what = f"hidden from {', '.join(hidden)} rays in Blender"

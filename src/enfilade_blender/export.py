@@ -11,7 +11,7 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
-from enfilade_blender.lights import emitters, note_seen, split_suns
+from enfilade_blender.lights import emitters, is_portal, note_seen, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
@@ -34,10 +34,11 @@ def export(job: Job) -> dict[str, Any]:
     """
     notes = Notes()
     report_progress(0.0, "open")
-    selection = open_source(job)
+    selection = open_source(job, notes)
     check_size(selection, job.limits)
     report_progress(0.05, "cameras")
     note_motion(selection, notes)
+    _note_settings(selection.scene, notes)
     views = read_views(selection, notes)
     if views:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
@@ -47,7 +48,7 @@ def export(job: Job) -> dict[str, Any]:
     shapes = Shapes(job, selection, views, notes)
     elements = shapes.write(evaluated.placed)
     report_progress(0.9, "lights")
-    lamps, sun = split_suns(evaluated.lamps, notes)
+    lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
     seen = seen_lamps(lamps, sun, views, selection)
     note_seen(lamps, sun, seen, notes)
     identifiers = shapes.identifiers
@@ -86,6 +87,22 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
             "look": view.look,
         },
     }
+
+
+def _note_settings(scene: Any, notes: Notes) -> None:
+    """Note settings of the scene's view and frames that nothing carries."""
+    view = scene.view_settings
+    settings = {
+        "Gamma": abs(view.gamma - 1.0) > 1e-4,
+        "Curves": view.use_curve_mapping,
+        "White balance": getattr(view, "use_white_balance", False),  # from Blender 4.3 on
+    }
+    for name in (name for name, is_used in settings.items() if is_used):
+        what, effect = f"{name.lower()} of the view is left out", "the tones of the picture differ"
+        notes.add("not-carried", scene.name, f"Color Management: {name}", what, effect)
+    if scene.frame_step != 1:
+        what, effect = f"its step of {scene.frame_step} is left out", "every frame is rendered"
+        notes.add("not-carried", scene.name, "Frame Step", what, effect)
 
 
 def _integrator(selection: Selection, has_glass: bool) -> Element:

@@ -21,13 +21,10 @@ class Limits:
         Objects of the evaluated scene, instances included.
     triangles : int
         Triangles that are written.
-    seconds : float
-        Wall time of the whole job; the caller ends it.
     """
 
     instances: int = 1_000_000
     triangles: int = 50_000_000
-    seconds: float = 1800.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Job:
         Pixels; None takes the scene's resolution.
     limits
     library_folders : tuple of Path
-        Folders besides the source's own that linked libraries may lie in.
+        Folders besides the source's own that linked libraries and images may lie in.
     bake_px : int
         Largest width of a baked texture.
     bake_samples : int

@@ -64,11 +64,21 @@ def area_radiance(power: float, area: float) -> float:
 def lamp_colour(lamp: Lamp, notes: Notes) -> Colour:
     """Colour times power (or strength), with temperature, exposure and an emission node of constants."""
     data = lamp.data
-    scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0) * _unnormalized(data)
     tint = data.temperature_color if getattr(data, "use_temperature", False) else (1.0, 1.0, 1.0)
     nodes = _node_colour(lamp, notes)
     r, g, b = (float(c) * float(t) * n * scale for c, t, n in zip(data.color, tint, nodes, strict=True))
     return r, g, b
+
+
+def _unnormalized(data: Any) -> float:
+    """What Cycles multiplies the power of a lamp by that is not normalized; an area's has its own factor."""
+    if getattr(data, "normalize", True) or data.type == "AREA":
+        return 1.0
+    if data.type == "SUN":
+        return math.pi * math.sin(0.5 * data.angle) ** 2 if data.angle > 0.0 else 1.0
+    radius = float(data.shadow_soft_size)
+    return 4.0 * math.pi * radius**2 if radius > 0.0 else 4.0
 
 
 def _node_colour(lamp: Lamp, notes: Notes) -> Colour:
@@ -84,6 +94,11 @@ def _node_colour(lamp: Lamp, notes: Notes) -> Colour:
             return _scaled(colour.colour, strength.number)
     notes.add("not-carried", lamp.name, "Nodes", "its nodes are left out", "light has no pattern")
     return 1.0, 1.0, 1.0
+
+
+def is_portal(lamp: Lamp) -> bool:
+    """Whether a lamp emits nothing: it tells Cycles where the world's light comes in."""
+    return lamp.data.type == "AREA" and bool(lamp.data.cycles.is_portal)
 
 
 def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]:

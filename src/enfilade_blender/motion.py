@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds objects that move or deform: the exported scene is static."""
+"""Finds what moves, deforms or changes: the exported scene is static."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import bpy
 import numpy as np
 
 from enfilade_blender.notes import Notes
@@ -17,30 +18,49 @@ DEFORMING = ("ARMATURE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BOD
 
 
 def note_motion(selection: Selection, notes: Notes) -> None:
-    """Note every object but cameras whose pose or shape changes over the frames."""
+    """Note every object but cameras whose pose, shape or light changes, and animated materials and worlds."""
     first, last = selection.frames
     if first == last:
         return
     frames = sorted({int(frame) for frame in np.linspace(first, last, SAMPLES)})
-    poses = [_poses(selection, frame) for frame in frames]
-    moving = [
-        name for name, pose in poses[0].items() if any(_differs(pose, later.get(name)) for later in poses[1:])
-    ]
+    poses, lights = zip(*[_state(selection, frame) for frame in frames], strict=True)
+    moving = _changing(poses)
     deforming = [obj.name for obj in selection.scene.objects if obj.name not in moving and _deforms(obj)]
     effect = f"it stays as in frame {first}"
     for name in moving[:LISTED]:
         notes.add("not-carried", name, "Animation", "its motion is left out", effect)
     for name in deforming[:LISTED]:
         notes.add("not-carried", name, "Animation", "its deformation is left out", effect)
+    for name in _changing(lights):
+        notes.add("not-carried", name, "Animation", "the change of its light is left out", effect)
+    world = selection.scene.world
+    used = [material for material in bpy.data.materials if material.users] + ([world] if world else [])
+    for data in used:
+        if any(_is_animated(part) for part in (data, data.node_tree)):
+            notes.add("not-carried", data.name, "Animation", "its animation is left out", effect)
     rest = max(len(moving) - LISTED, 0) + max(len(deforming) - LISTED, 0)
     if rest:
         notes.add("not-carried", f"{rest} further objects", "Animation", "their motion is left out", effect)
     selection.scene.frame_set(first)
 
 
-def _poses(selection: Selection, frame: int) -> dict[str, np.ndarray]:
+def _state(selection: Selection, frame: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Poses of objects, and power and colour of lamps, by name."""
     selection.scene.frame_set(frame)
-    return {obj.name: np.array(obj.matrix_world) for obj in selection.scene.objects if obj.type != "CAMERA"}
+    objects = [obj for obj in selection.scene.objects if obj.type != "CAMERA"]
+    lamps = [obj for obj in objects if obj.type == "LIGHT"]
+    lights = {obj.name: np.array([obj.data.energy, *obj.data.color]) for obj in lamps}
+    return {obj.name: np.array(obj.matrix_world) for obj in objects}, lights
+
+
+def _changing(states: tuple[dict[str, np.ndarray], ...]) -> list[str]:
+    first, *rest = states
+    return [name for name, value in first.items() if any(_differs(value, later.get(name)) for later in rest)]
+
+
+def _is_animated(data: Any) -> bool:
+    animation = getattr(data, "animation_data", None)
+    return animation is not None and animation.action is not None
 
 
 def _differs(pose: np.ndarray, other: Any) -> bool:

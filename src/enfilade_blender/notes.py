@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Notes on what was mapped, baked, approximated and not carried over, by object and node."""
+"""Notes on what was baked, approximated and not carried over, by object and node."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
-Kind = Literal["mapped", "baked", "approximated", "not-carried"]
+Kind = Literal["baked", "approximated", "not-carried"]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import bpy
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
+from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 
 IMPORTERS: dict[str, Callable[..., Any]] = {
@@ -23,22 +24,11 @@ IMPORTERS: dict[str, Callable[..., Any]] = {
     ".usdc": lambda file: bpy.ops.wm.usd_import(filepath=file),
     ".usdz": lambda file: bpy.ops.wm.usd_import(filepath=file),
 }
-DATA = (
-    "meshes",
-    "curves",
-    "materials",
-    "images",
-    "lights",
-    "cameras",
-    "worlds",
-    "objects",
-    "collections",
-    "scenes",
-)
+IMAGE_FILES = ("FILE", "SEQUENCE", "MOVIE", "TILED")  # sources of images that are read from the disk
 
 
-def open_source(job: Job) -> Selection:
-    """Open the source of a job.
+def open_source(job: Job, notes: Notes) -> Selection:
+    """Open the source of a job. Images of other folders are detached, with a note.
 
     Raises
     ------
@@ -48,15 +38,14 @@ def open_source(job: Job) -> Selection:
     if not job.source.is_file():
         raise ExportError("there is no such file", str(job.source), "check the path")
     suffix = job.source.suffix.lower()
-    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
     try:
         if suffix == ".blend":
             _check_is_blend(job.source)
             bpy.ops.wm.open_mainfile(filepath=str(job.source), load_ui=False, use_scripts=False)
             _check_libraries(job)
         elif suffix in IMPORTERS:
-            _clear()
             IMPORTERS[suffix](str(job.source))
         else:
             raise ExportError("unknown kind of file", str(job.source), f"give .blend, {', '.join(IMPORTERS)}")
@@ -65,6 +54,7 @@ def open_source(job: Job) -> Selection:
         raise ExportError(
             f"Blender can't open it: {reason}", str(job.source), "open it in Blender, and save it again"
         ) from error
+    _detach_images(job, notes)
     return _select(job)
 
 
@@ -79,16 +69,31 @@ def _check_is_blend(file: Path) -> None:
         )
 
 
-def _clear() -> None:
-    """Remove everything, so that an importer's objects are alone."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+def _is_allowed(file: Path, job: Job) -> bool:
+    """Whether a file lies in the source's folder or in an allowed one."""
+    folders = [job.source.resolve().parent, *(folder.resolve() for folder in job.library_folders)]
+    return any(file.is_relative_to(folder) for folder in folders)
+
+
+def _detach_images(job: Job, notes: Notes) -> None:
+    """Images of files in other folders become missing ones: what is read may be written into the scene."""
+    for image in bpy.data.images:
+        if image.source not in IMAGE_FILES or image.packed_files or not image.filepath:
+            continue
+        file = Path(bpy.path.abspath(image.filepath, library=image.library)).resolve()
+        is_missing = image.source == "FILE" and not file.is_file()  # which is noted where it is used
+        if is_missing or _is_allowed(file, job):
+            continue
+        what = f"its file {file} lies outside the allowed folders"
+        notes.add("not-carried", image.name, "", what, f"the image is missing; allow {file.parent}")
+        image.filepath = ""
+        image.buffers_free()
 
 
 def _check_libraries(job: Job) -> None:
-    folders = [job.source.resolve().parent, *(folder.resolve() for folder in job.library_folders)]
     for library in bpy.data.libraries:
         file = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
-        if not any(file.is_relative_to(folder) for folder in folders):
+        if not _is_allowed(file, job):
             raise ExportError(
                 f"it links the library {file}, outside the allowed folders",
                 str(job.source),

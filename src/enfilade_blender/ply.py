@@ -91,6 +91,11 @@ class Mesh:
         _, counts = np.unique(edges[:, 0] * (len(self.positions) + 1) + edges[:, 1], return_counts=True)
         return bool((counts == 2).all())
 
+    def volume(self) -> float:
+        """Volume inside a closed mesh; negative where its triangles face inward."""
+        a, b, c = (self.positions[self.triangles[:, corner]].astype(np.float64) for corner in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
 
 def joined(meshes: list[Mesh]) -> Mesh:
     """One mesh of copies with the same maps."""

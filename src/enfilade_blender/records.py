@@ -78,14 +78,18 @@ class Placed:
     slots : tuple
         Materials (bpy) or None.
     matrices : list of (4, 4) float64
-    is_instance : bool
+    colour : tuple of float
+        RGBA of the object's viewport display, which materials may read.
+    index : int
+        Pass index of the object.
     """
 
     name: str
     mesh: Mesh
     slots: tuple[Any, ...]
     matrices: list[np.ndarray] = field(default_factory=list)
-    is_instance: bool = False
+    colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+    index: int = 0
 
 
 @dataclass(eq=False)

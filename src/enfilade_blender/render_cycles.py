@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from enfilade_blender.job import Job
-from enfilade_blender.notes import report_progress
+from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.open_file import open_source
 
 
@@ -19,7 +19,7 @@ def render_frames(job: Job) -> dict[str, Any]:
     Data stays in memory from frame to frame. With ``job.unbiased`` the file's clamping, filtered glossy and
     light threshold are off, and pixels are boxes. Limits of bounces stay the file's.
     """
-    selection = open_source(job)
+    selection = open_source(job, Notes())
     scene = selection.scene
     render, cycles = scene.render, scene.cycles
     render.engine, cycles.device = "CYCLES", "CPU"
@@ -27,6 +27,7 @@ def render_frames(job: Job) -> dict[str, Any]:
     render.resolution_x, render.resolution_y = selection.size
     render.resolution_percentage = 100
     render.use_compositing = render.use_sequencer = render.use_motion_blur = False
+    render.use_border = render.use_multiview = render.use_stamp = False
     settings = render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
     cycles.film_exposure = 1.0  # as the exported scene; import.json has it in its exposure

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 Element = ET.Element
+RESERVED = str.maketrans("./$", "___")  # of ids: separators of paths, and the mark of a parameter
 Property = float | int | bool | str | tuple[float, float, float] | np.ndarray | Element
 
 
@@ -61,7 +62,7 @@ class Identifiers:
 
     def unique(self, name: str) -> str:
         """An id after a name."""
-        plain = name.replace(".", "_").replace("/", "_").strip() or "unnamed"
+        plain = name.translate(RESERVED).strip() or "unnamed"
         candidate, number = plain, 1
         while candidate in self._used:
             number += 1

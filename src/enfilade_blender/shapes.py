@@ -58,17 +58,19 @@ class Shapes:
     ----------
     textures : Textures
     identifiers : Identifiers
-        Of shapes.
+        Of BSDFs, shapes and emitters.
     has_glass : bool
     """
 
     def __init__(self, job: Job, selection: Selection, views: list[View], notes: Notes) -> None:
         self._out, self._notes = job.out, notes
         self.textures = Textures(job.out, notes)
-        self.identifiers, self._bsdf_ids, self._files = Identifiers(), Identifiers(), Identifiers()
+        self.identifiers, self._files = Identifiers(), Identifiers()
+        self._eyes = np.array([view.pose[:3, 3] for view in views]).reshape(-1, 3)
+        self._middles, self._owners = np.zeros((0, 3)), np.zeros(0, np.int64)
         self._bakery = Bakery(job, selection, views, self.textures, notes)
         self._shaders: dict[Any, Shader] = {}
-        self._shared: dict[Any, tuple[str, Any]] = {}
+        self._shared: dict[str, tuple[str, Surface]] = {}  # by names of materials
         self._bsdfs: list[Element] = []
         self.has_glass = False
         (job.out / "meshes").mkdir(exist_ok=True)
@@ -81,6 +83,8 @@ class Shapes:
     def write(self, placed: list[Placed]) -> list[Element]:
         """Write all meshes; elements of BSDFs and shapes."""
         shapes: list[Element] = []
+        self._middles = np.concatenate([np.zeros((0, 3)), *map(_middles, placed)])
+        self._owners = np.repeat([id(item) for item in placed], [len(item.matrices) for item in placed])
         total = sum(len(p.mesh) * len(p.matrices) for p in placed)
         for number, item in enumerate(placed):
             if number % 50 == 0:
@@ -114,9 +118,20 @@ class Shapes:
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             elements.append(self._shape(name, mesh, bsdf, radiance, uv, attribute))
-            if radiance is not None and not mesh.is_closed():
+            if radiance is not None and not self._hides_its_back(part.mesh, placed):
                 elements.append(self._shape(f"{name} back", _back(mesh), bsdf, radiance, uv, attribute))
         return elements + (self._instances(placed, instanced) if instanced else [])
+
+    def _hides_its_back(self, mesh: Mesh, placed: Placed) -> bool:
+        """Whether an emitter is closed, faces outward, and has neither a camera nor an object inside."""
+        if not mesh.is_closed() or mesh.volume() <= 0.0:
+            return False
+        points = np.concatenate([self._eyes, self._middles[self._owners != id(placed)]])
+        for matrix in placed.matrices:
+            copy = mesh.transformed(matrix).positions
+            if ((points > copy.min(axis=0)) & (points < copy.max(axis=0))).all(axis=1).any():
+                return False
+        return True
 
     def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
         group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))
@@ -153,18 +168,20 @@ class Shapes:
         """Id of a BSDF, its surface, and the UV map and attribute of the mesh that it reads."""
         uv, attribute = _maps(shader, mesh)
         material = part.material
-        key = (material.name_full if material else "", part.name if is_own else "")
-        if key not in self._shared:
-            surface = build(shader, self._context(material))
-            element = surface.element(self._context(material))
-            name = material.name if material else "no material"
-            identifier = self._bsdf_ids.unique(
-                f"material {name}: {part.name}" if is_own else f"material {name}"
-            )
-            self._bsdfs.append(named(element, identifier))
-            self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
+        key = material.name_full if material else ""
+        if not is_own and key in self._shared:
+            return (*self._shared[key], uv, attribute)
+        surface = build(shader, self._context(material))
+        element = surface.element(self._context(material))
+        name = material.name if material else "no material"
+        identifier = self.identifiers.unique(
+            f"material {name}: {part.name}" if is_own else f"material {name}"
+        )
+        self._bsdfs.append(named(element, identifier))
+        self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
+        if not is_own:
             self._shared[key] = identifier, surface
-        return (*self._shared[key], uv, attribute)
+        return identifier, surface, uv, attribute
 
     def _context(self, material: Any) -> Context:
         return Context(material.name if material else "no material", self.textures, self._notes)
@@ -177,6 +194,13 @@ def _parts(placed: Placed) -> Any:
     for slot in np.unique(slots):
         mesh = placed.mesh if (slots == slot).all() else placed.mesh.select(slots == slot)
         yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed)
+
+
+def _middles(placed: Placed) -> np.ndarray:
+    """Middles of the boxes of an object's copies, (N, 3)."""
+    positions = placed.mesh.positions
+    middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
+    return np.array([matrix[:3, :3] @ middle + matrix[:3, 3] for matrix in placed.matrices]).reshape(-1, 3)
 
 
 def _maps(shader: Shader, mesh: Mesh) -> tuple[str | None, str | None]:
@@ -201,7 +225,7 @@ def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:
 
 
 def _back(mesh: Mesh) -> Mesh:
-    """The other side of an open emitter, a little behind it."""
+    """The other side of an emitter, a little behind it."""
     size = float(np.ptp(mesh.positions, axis=0).max(initial=0.0))
     back = mesh.reversed()
     corners = back.positions[back.triangles]

@@ -22,6 +22,7 @@ from enfilade_blender.scene_xml import Element, plugin
 WIDTH, WIDTH_SUN, WIDTH_MAX = 1024, 2048, 4096
 SAMPLES, SAMPLES_SKY = 4, 16  # a pixel; the sun of a sky is smaller than one
 LOCAL_FROM_WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)
+RAYS = ("camera", "diffuse", "glossy", "transmission")
 FILE = "textures/environment.exr"
 
 
@@ -35,7 +36,7 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
     if plain is not None:
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
-        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder)
+        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder, selection.frames[0])
         what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
         notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
     if sun is not None:
@@ -100,14 +101,15 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
     return r, g, b
 
 
-def _rendered(world: Any, width: int, folder: Path) -> F32:
-    """Radiance of a world, from north at the left edge over east, zenith on top."""
+def _rendered(world: Any, width: int, folder: Path, frame: int) -> F32:
+    """Radiance of a world at a frame, from north at the left edge over east, zenith on top."""
     images = [node.image for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT" and node.image]
     width = min(max([width, *(image.size[0] for image in images)]), WIDTH_MAX)
     has_sky = any(node.type == "TEX_SKY" for node in world.node_tree.nodes)
     width = max(width, WIDTH_SUN) if has_sky else width
     scene = bpy.data.scenes.new("enfilade world")
     scene.world = _for_light(world)
+    scene.frame_set(frame)
     camera = bpy.data.cameras.new("enfilade world")
     camera.type = "PANO"
     (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
@@ -137,15 +139,24 @@ def _rendered(world: Any, width: int, folder: Path) -> F32:
 
 
 def _for_light(world: Any) -> Any:
-    """A copy of a world as diffuse light sees it: no ray is one of the camera."""
+    """A copy of a world as diffuse light sees it: no ray is one of the camera, which may see it."""
     copy = world.copy()
-    links = copy.node_tree.links
-    for link in [link for link in links if link.from_node.type == "LIGHT_PATH"]:
-        socket = link.to_socket
-        links.remove(link)
-        if isinstance(socket.default_value, float):
-            socket.default_value = 0.0
+    copy.cycles_visibility.camera = True
+    _cut_light_path(copy.node_tree)
     return copy
+
+
+def _cut_light_path(tree: Any) -> None:
+    """Replace the outputs of Light Path by 0, in copies of groups, too."""
+    for node in list(tree.nodes):
+        if node.type == "GROUP" and node.node_tree is not None:
+            node.node_tree = node.node_tree.copy()
+            _cut_light_path(node.node_tree)
+        elif node.type == "LIGHT_PATH":
+            zero = tree.nodes.new("ShaderNodeValue")
+            zero.outputs[0].default_value = 0.0
+            for socket in [link.to_socket for link in tree.links if link.from_node == node]:
+                tree.links.new(zero.outputs[0], socket)
 
 
 def _note_world(selection: Selection, notes: Notes) -> None:
@@ -153,7 +164,13 @@ def _note_world(selection: Selection, notes: Notes) -> None:
     if scene.render.film_transparent:
         effect = "the world is seen where the film would be transparent"
         notes.add("not-carried", scene.name, "Film: Transparent", "the background is opaque", effect)
-    if world is None or not world.use_nodes or world.node_tree is None:
+    if world is None:
+        return
+    hidden = [ray for ray in RAYS if not getattr(world.cycles_visibility, ray)]
+    if hidden:
+        what = f"hidden from {', '.join(hidden)} rays in Blender"
+        notes.add("not-carried", world.name, "Ray visibility", what, "the world is seen by all rays")
+    if not world.use_nodes or world.node_tree is None:
         return
     if any(node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in world.node_tree.nodes):
         notes.add("not-carried", world.name, "Volume", "the world's volume is left out", "there is no fog")

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade_blender.lights import emitters, faces_camera, note_seen, points_of, split_suns
+from enfilade_blender.lights import emitters, faces_camera, is_portal, note_seen, points_of, split_suns
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Identifiers, write_scene
@@ -47,6 +47,10 @@ def irradiance(tmp_path, light):
         (lamp("POINT", shadow_soft_size=0.1), 100.0 / (4.0 * math.pi) / 4.0),
         (lamp("SPOT"), 100.0 / (4.0 * math.pi) / 4.0),
         (lamp("SUN", energy=3.0), 3.0),
+        # Measured in Cycles, with lights that are not normalized.
+        (lamp("POINT", shadow_soft_size=0.5, normalize=False), 100.0 / 4.0 * 0.25),
+        (lamp("POINT", normalize=False), 100.0 / math.pi / 4.0),
+        (lamp("SUN", energy=3.0, angle=1.0, normalize=False), 3.0 * math.pi * math.sin(0.5) ** 2),
         (lamp("AREA", size=0.01), 100.0 / math.pi / 4.0),  # far away, on its axis
         (lamp("AREA", size=0.01, shape="DISK"), 100.0 / math.pi / 4.0),
         (lamp("AREA", size=0.01, size_y=0.02, shape="ELLIPSE"), 100.0 / math.pi / 4.0),
@@ -63,6 +67,12 @@ def test_power_does_not_change_with_the_scale_of_the_object(tmp_path):
 
 def test_a_dark_lamp_is_left_out():
     assert emitters(lamp("POINT", energy=0.0), Identifiers(), Notes()) == []
+
+
+def test_a_portal_is_an_area_light_that_is_marked():
+    marks = [SimpleNamespace(is_portal=is_marked) for is_marked in (True, False)]
+    assert [is_portal(lamp("AREA", cycles=mark)) for mark in marks] == [True, False]
+    assert not is_portal(lamp("POINT"))
 
 
 def test_the_brightest_sun_with_a_disc_is_in_the_environment():

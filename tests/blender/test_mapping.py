@@ -7,14 +7,7 @@ import pytest
 
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
-
-
-def test_sockets_of_blender_3_have_the_names_of_blender_4():
-    names = mapping.principled_names(["Base Color", "Specular", "Clearcoat", "Emission", "Metallic"])
-    assert names["Specular IOR Level"] == "Specular"
-    assert names["Coat Weight"] == "Clearcoat"
-    assert names["Emission Color"] == "Emission"
-    assert "Sheen Weight" not in names
+from enfilade_blender.materials.textures import file_stem
 
 
 @pytest.mark.parametrize(("level", "factor"), [(0.0, 0.0), (0.5, 1.0), (1.0, 2.0)])
@@ -71,3 +64,14 @@ def test_a_point_light_has_one_flux_with_and_without_radius():
 
 def test_an_area_light_emits_its_power():
     assert area_radiance(60.0, 2.0) * math.pi * 2.0 == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize("letter", ["a", "\N{CJK UNIFIED IDEOGRAPH-6905}"])
+def test_file_names_are_short_enough_for_any_disk(letter):
+    stem = file_stem(200 * letter + "$")
+    assert 100 < len(stem.encode()) <= 120
+    assert set(stem) == {letter}
+
+
+def test_file_names_lack_the_characters_that_mitsuba_reads():
+    assert file_stem("cost $5: a/b.c") == "cost _5_ a_b_c"

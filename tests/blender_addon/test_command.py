@@ -53,13 +53,15 @@ def ended(process, seconds=60.0):
 
 
 def test_an_order_is_an_enfilade_command(command):
-    order = command.Order("enfilade", Path("/a b.blend"), Path("/run"), 12.5, 'My "scene"', "/opt/blender")
+    order = command.Order("enfilade", Path("/a b.blend"), Path("/run"), 12.5, 'My "scene" 🎬', "/opt/blender")
     line = order.line()
     assert line[:6] == ["enfilade", "render", "/a b.blend", "--out", "/run", "--quality"]
     assert "--quality" in ALL_FLAGS
     names = [part.partition("=") for part in line[7:] if part != "--set"]
     tables = {name.removeprefix("blender."): tomllib.loads(f"v = {value}")["v"] for name, _, value in names}
-    assert BlenderSettings.from_table(tables) == BlenderSettings(scene='My "scene"', program="/opt/blender")
+    assert BlenderSettings.from_table(tables) == BlenderSettings(
+        scene='My "scene" 🎬', program="/opt/blender"
+    )
 
 
 def test_progress_is_followed_to_the_end(command, program):
@@ -123,6 +125,8 @@ said.append(call())
 bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "shot.blend"))
 said.append(call())
 said.append(bpy.ops.enfilade.render.poll())
+bpy.ops.wm.read_homefile()
+said.append(bpy.app.timers.is_registered(blender_addon.watch))
 while blender_addon.watch() is not None:
     time.sleep(0.05)
 said += [blender_addon.EnfiladePanel.message, bpy.ops.enfilade.render.poll()]
@@ -146,6 +150,6 @@ def test_the_panel_runs_the_command_in_blender(program, tmp_path):
     )
     said = json.loads(next(row for row in done.stdout.splitlines() if row.startswith("said"))[5:])
     assert "Save the file first" in said[0]
-    assert said[1:] == [["FINISHED"], False, "no camera", True, False], done.stderr
+    assert said[1:] == [["FINISHED"], False, True, "no camera", True, False], done.stderr
     arguments = (tmp_path / "arguments").read_text().splitlines()
     assert arguments[:6] == ["render", f"{tmp_path}/shot.blend", "--out", f"{tmp_path}/run", "--quality", "5"]

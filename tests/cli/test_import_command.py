@@ -28,7 +28,7 @@ def imports(source):
 
 
 def test_an_import_lists_what_it_means_in_the_picture(run, shot, tmp_path):
-    notes = [{"kind": kind, **NOTE, "object": kind} for kind in ("mapped", "baked", "not-carried")]
+    notes = [{"kind": kind, **NOTE, "object": kind} for kind in ("baked", "not-carried")]
     out = tmp_path / "scenes" / "my shot"
     result = run("import", shot(notes=notes), "--out", out, "--quiet")
     assert result.exit_code == 0, result.output
@@ -36,8 +36,7 @@ def test_an_import_lists_what_it_means_in_the_picture(run, shot, tmp_path):
     assert first == "not carried over:"
     assert "  not-carried / Noise Texture: a procedural texture\n      the sofa is plain\n" in result.stdout
     assert "my shot.blend by Blender 4.5.1: 3 objects, 4 instances" in result.stdout
-    assert "1 not carried over, 0 approximated, 1 baked, 1 mapped" in result.stdout
-    assert "  mapped / Noise" not in result.stdout
+    assert "1 not carried over, 0 approximated, 1 baked" in result.stdout
     render = next(line for line in result.stdout.splitlines() if line.startswith("render"))
     settings, path = f"'{out}/settings.toml'", f"'{out}/camera_path.json'"
     assert f"enfilade render '{out}/scene.xml' --path {path} --settings {settings}" in render

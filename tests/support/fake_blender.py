@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -111,6 +112,11 @@ def main():
         case "hang after":
             export(job, wish)
             time.sleep(600)
+        case "leave a process":
+            export(job, wish)
+            line = ["/bin/sh", "-c", 'sleep 60; : > "$0"', str(Path(job["source"]).with_suffix(".ended"))]
+            left = subprocess.Popen(line, start_new_session=True)  # noqa: S603
+            (Path(job["out"]) / "left.pid").write_text(str(left.pid))
         case "hang":
             say("Fra:1 still at it")
             time.sleep(600)

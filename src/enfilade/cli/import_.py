@@ -183,17 +183,16 @@ def _table(imported: ImportedScene, spent: Source) -> dict[str, object]:
 
 
 def _notes(notes: Iterable[Note]) -> Iterator[str]:
-    """Notes by kind; a part that is mapped as it is needs no line."""
+    """Notes by kind."""
     from itertools import groupby
 
-    from enfilade.scene.blender.notes import TITLES, NoteKind, grouped
+    from enfilade.scene.blender.notes import TITLES, grouped
 
     for kind, groups in groupby(grouped(notes), key=lambda group: group.kind):
-        if kind is not NoteKind.MAPPED:
-            yield f"{TITLES[kind]}:"
-            for group in groups:
-                yield f"  {group.listed}: {group.what}"
-                yield f"      {group.effect}"
+        yield f"{TITLES[kind]}:"
+        for group in groups:
+            yield f"  {group.listed}: {group.what}"
+            yield f"      {group.effect}"
 
 
 def _ending(imported: ImportedScene, spent: Source) -> Iterator[str]:

@@ -15,7 +15,7 @@ from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import TRACED_COLUMNS, percent, psnr_text, seconds, spoken
 from enfilade.scene.blender.imported import ImportedScene
-from enfilade.scene.blender.notes import TITLES, NoteGroup, NoteKind, grouped
+from enfilade.scene.blender.notes import TITLES, NoteGroup, grouped
 from enfilade.settings import SECTIONS, Section
 
 __all__ = ["contents"]
@@ -167,11 +167,7 @@ def _difference(
 def _import_notes(imported: ImportedScene) -> list[tuple[str, list[NoteGroup]]]:
     """Parts of the imported file that are not as they were, under the titles of their kinds."""
     groups = grouped(imported.notes)
-    titled = [
-        (title, [group for group in groups if group.kind is kind])
-        for kind, title in TITLES.items()
-        if kind is not NoteKind.MAPPED
-    ]
+    titled = [(title, [group for group in groups if group.kind is kind]) for kind, title in TITLES.items()]
     return [(title, found) for title, found in titled if found]
 
 

@@ -18,7 +18,7 @@ from enfilade.reports.page import write_page
 from enfilade.reports.tables import seconds
 from enfilade.runs.fidelity import CheckedFrame, ImportCheck
 from enfilade.scene.blender.imported import ImportedScene
-from enfilade.scene.blender.notes import TITLES, NoteKind, grouped
+from enfilade.scene.blender.notes import TITLES, grouped
 from enfilade.settings import Settings, VideoSettings, ViewingSettings
 
 __all__ = ["CHECK_PAGE", "differences_of", "write_check"]
@@ -62,7 +62,7 @@ def write_check(imported: ImportedScene, check: ImportCheck, differences: Sequen
     frames = [_frame(of, view) for of in check.frames]
     boxes = [[_box(of.shape_index, object_.shape_index) for of in check.frames] for object_ in listed]
     height, width = check.frames[0].shape_index.shape
-    notes = [group for group in grouped(imported.notes) if group.kind is not NoteKind.MAPPED]
+    notes = grouped(imported.notes)
     variables = {
         "imported": imported,
         "view_name": settings[VideoSettings].view or "sRGB",

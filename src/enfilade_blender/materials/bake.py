@@ -17,13 +17,18 @@ from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
 from enfilade_blender.materials.graph import upstream
+from enfilade_blender.materials.table import OBJECT_DATA
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
+    Add,
     AttributeValue,
     Constant,
     ImageValue,
+    Lobe,
+    Mix,
     NormalMap,
     Output,
+    Principled,
     Procedural,
     ProceduralNormal,
     Shader,
@@ -41,6 +46,8 @@ SMALLEST = 64  # pixels
 PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
 UNIFORM = 2e-3  # standard deviation below which a texture is a constant
 CONSTANT_PX = 8
+FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
+UV_MAPS = 8  # that a mesh of Blender can have
 
 
 class Bakery:
@@ -61,14 +68,17 @@ class Bakery:
 
     def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
         """A shader without procedural values, its mesh, and whether it is this object's own."""
+        shader = replaced(shader, lambda value: _of_mesh(value, mesh))
+        self._note_lost(shader, material, mesh, placed)
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
         uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
         if not wanted and len(uv_maps) <= 1:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
-            uv_map = next(iter(uv_maps), "")
-            return replaced(shader, lambda value: self._over_uv(value, material, uv_map)), mesh, False
+            return replaced(shader, lambda value: self._over_uv(value, material)), mesh, False
         size = self._resolution(placed, mesh)
+        shader = self._with_baked_normals(shader)
+        mesh = _with_room(mesh, shader)
         with self._stage().mesh(mesh, placed) as canvas:
             mesh = replace(mesh, uvs={**mesh.uvs, BAKED_UV: canvas.unwrap()}, active_uv=BAKED_UV)
             own = replaced(shader, lambda value: self._over_mesh(value, material, canvas, placed, size))
@@ -76,20 +86,20 @@ class Bakery:
 
     def _stage(self) -> BakeScene:
         if self._scene is None:
-            self._scene = BakeScene(self._job.bake_samples)
+            self._scene = BakeScene(self._job.bake_samples, self._selection.frames[0])
         return self._scene
 
-    def _over_uv(self, value: Any, material: Any, uv_map: str) -> Any:
-        if not isinstance(value, Procedural):
+    def _over_uv(self, value: Any, material: Any) -> Any:
+        if not isinstance(value, Procedural) or value.uv_map is None:
             return value
         key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
-            with self._stage().square(uv_map) as canvas:
+            with self._stage().square(value.uv_map) as canvas:
                 pixels, _ = canvas.bake(value.output, material, size)
             self._of_uv[key] = self._stored(
-                pixels, None, value, material.name, uv_map, "the unit square of UV"
+                pixels, None, value, material.name, value.uv_map, "the unit square of UV"
             )
         return self._of_uv[key]
 
@@ -101,27 +111,52 @@ class Bakery:
         is_normal = isinstance(value, ProceduralNormal)
         pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
         if is_normal:
-            file = self._textures.write(f"{placed.name} normal", np.clip(pixels, 0.0, 1.0), raw=True)
+            pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
+            file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
             self._note(value.output, material.name, placed.name, size)
-            return NormalMap(Texture(file, BAKED_UV, (0.5, 0.5, 1.0), raw=True), 1.0)
+            return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
         return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV, placed.name)
+
+    def _with_baked_normals(self, shader: Shader) -> Shader:
+        """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map."""
+        if isinstance(shader, Mix | Add):
+            first, second = (self._with_baked_normals(part) for part in (shader.first, shader.second))
+            return replace(shader, first=first, second=second)
+        if isinstance(shader, Principled | Lobe) and isinstance(shader.normal, NormalMap):
+            image = shader.normal.image
+            if not (isinstance(image, ImageValue) and self._textures.is_missing(image)):
+                return replace(shader, normal=ProceduralNormal(shader.normal.output))
+        return shader
+
+    def _note_lost(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> None:
+        """Note what a bake on a copy of the object, or the object's file, lacks."""
+        for value in values_of(shader):
+            if not isinstance(value, Procedural | ProceduralNormal | AttributeValue):
+                continue
+            for found in upstream(value.output):
+                what = _lost(found, mesh, len(placed.matrices))
+                if what:
+                    effect = "the surface differs where it depends on that"
+                    self._notes.add("approximated", material.name, found.node.name, what, effect)
 
     def _stored(
         self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str, where: str
     ) -> Value:
-        """A baked value: a constant where it is uniform, else a file."""
+        """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
+        output = value.output
+        if isinstance(value, Procedural) and value.is_of_view:
+            effect = "as seen along the normal from all directions"
+            self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
         inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
         mean = inside.mean(axis=0)
         colour = (float(mean[0]), float(mean[1]), float(mean[2]))
         if inside.std(axis=0).max() <= UNIFORM * max(1.0, float(mean.max())):
             return Constant(colour)
-        output = value.output
+        if covered is not None:
+            pixels = np.where(covered[..., None], pixels, mean)
         is_data = output.socket.type != "RGBA" or pixels.max() > 1.0
         file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
         self._note(output, name, where, len(pixels))
-        if isinstance(value, Procedural) and value.is_of_view:
-            effect = "as seen along the normal from all directions"
-            self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
 
     def _note(self, output: Output, name: str, where: str, size: int) -> None:
@@ -148,6 +183,39 @@ class Bakery:
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
         power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
         return int(min(power, self._job.bake_px))
+
+
+def _of_mesh(value: Any, mesh: Mesh) -> Any:
+    """A value of a mesh: an attribute that is a UV map rather than a colour is baked."""
+    is_uv = isinstance(value, AttributeValue) and value.name in mesh.uvs and value.name not in mesh.colours
+    return Procedural(value.output) if is_uv else value
+
+
+def _lost(found: Output, mesh: Mesh, copies: int) -> str:
+    """What is approximated of an output that depends on the object; empty for others."""
+    node, name = found.node, found.socket.name
+    if node.type == "OBJECT_INFO" and name == "Random":
+        return "its Random is another number than in Cycles, the same for all copies"
+    if node.type == "OBJECT_INFO" and name == "Location" and copies > 1:
+        return "its Location is that of the first copy"
+    if node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY":
+        return f"the property {node.attribute_name} is taken as 0"
+    attribute = {"ATTRIBUTE": "attribute_name", "VERTEX_COLOR": "layer_name"}.get(node.type)
+    layer = getattr(node, attribute) if attribute else ""
+    if layer and layer not in mesh.uvs and layer not in mesh.colours:
+        return f"the attribute {layer} is neither a UV map nor a colour of the mesh, and is taken as 0"
+    return OBJECT_DATA.get(node.type, "")
+
+
+def _with_room(mesh: Mesh, shader: Shader) -> Mesh:
+    """The mesh with one of Blender's UV maps free; the active one and those that are read are kept."""
+    if len(mesh.uvs) < UV_MAPS:
+        return mesh
+    outputs = [value.output for value in values_of(shader) if not isinstance(value, Constant | Texture)]
+    nodes = [found.node for output in outputs for found in upstream(output)]
+    read = {getattr(node, name, "") for node in nodes for name in ("uv_map", "attribute_name")}
+    first = sorted(mesh.uvs, key=lambda name: (name != mesh.active_uv, name not in read))
+    return replace(mesh, uvs={name: mesh.uvs[name] for name in first[: UV_MAPS - 1]})
 
 
 def _images(output: Output) -> list[Any]:

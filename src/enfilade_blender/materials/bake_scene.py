@@ -19,6 +19,7 @@ from enfilade_blender.records import Placed
 MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
 SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
+WHITE = (1.0, 1.0, 1.0, 1.0)
 TARGET = "enfilade target"
 
 
@@ -29,10 +30,13 @@ class BakeScene:
     ----------
     samples : int
         Of Cycles, for a texel.
+    frame : int
+        At which animated materials are baked.
     """
 
-    def __init__(self, samples: int) -> None:
+    def __init__(self, samples: int, frame: int) -> None:
         scene = bpy.data.scenes.new("enfilade bake")
+        scene.frame_set(frame)
         scene.render.engine = "CYCLES"
         scene.cycles.samples, scene.cycles.use_denoising = samples, False
         scene.cycles.use_adaptive_sampling = False
@@ -49,7 +53,7 @@ class BakeScene:
         data.use_auto_texspace = False
         data.texspace_location = 0.5 * (low + high)
         data.texspace_size = np.maximum(0.5 * (high - low), 1e-6)
-        with self._canvas(data, placed.matrices[0]) as canvas:
+        with self._canvas(data, placed.matrices[0], placed.colour, placed.index) as canvas:
             yield canvas
 
     @contextmanager
@@ -66,9 +70,12 @@ class BakeScene:
             yield canvas
 
     @contextmanager
-    def _canvas(self, data: Any, matrix: np.ndarray) -> Iterator[Canvas]:
+    def _canvas(
+        self, data: Any, matrix: np.ndarray, colour: tuple[float, ...] = WHITE, index: int = 0
+    ) -> Iterator[Canvas]:
         obj = bpy.data.objects.new("enfilade bake", data)
         obj.matrix_world = matrix.T.tolist()
+        obj.color, obj.pass_index = colour, index
         self._scene.collection.objects.link(obj)
         before = bpy.context.window.scene
         bpy.context.window.scene = self._scene
@@ -93,13 +100,13 @@ class Canvas:
         """New texture coordinates without overlap, (N, 3, 2)."""
         data = self._object.data
         layer = data.uv_layers.new(name="enfilade")
-        data.uv_layers.active = layer
+        data.uv_layers.active, name = layer, layer.name
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_all(action="SELECT")
         bpy.ops.uv.smart_project(angle_limit=SMART_ANGLE, island_margin=ISLAND_MARGIN, scale_to_bounds=False)
         bpy.ops.object.mode_set(mode="OBJECT")
         uv: F32 = np.empty(len(data.loops) * 2, np.float32)
-        data.uv_layers["enfilade"].uv.foreach_get("vector", uv)
+        data.uv_layers[name].uv.foreach_get("vector", uv)
         return uv.reshape(-1, 3, 2)
 
     def bake(
@@ -108,14 +115,14 @@ class Canvas:
         """Values of an output (size, size, 3), the first row on top, and the texels that the mesh covers."""
         image = bpy.data.images.new(TARGET, size, size, alpha=True, float_buffer=True)
         image.colorspace_settings.name = "Non-Color"
-        image.generated_color = (0.0, 0.0, 0.0, 0.0)
+        image.pixels.foreach_set(np.zeros(size * size * 4, np.float32))  # Blender clears to an alpha of 1
         copy = material.copy()
         _wire(copy.node_tree, output, image, is_normal=is_normal)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
-        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=True)
+        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=False)
         rgba = linear_pixels(image)
-        groups = [node.node_tree for node in copy.node_tree.nodes if node.type == "GROUP"]
+        groups = [n.node_tree for n in copy.node_tree.nodes if n.type == "GROUP" and n.node_tree is not None]
         bpy.data.materials.remove(copy)
         for group in groups:
             if group.users == 0:

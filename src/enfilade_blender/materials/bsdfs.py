@@ -99,9 +99,7 @@ def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> 
 
 def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, Element | float]:
     """Two roughnesses, and the share of the second; alpha is linear in between."""
-    if not isinstance(roughness, ImageValue | Texture):
-        return 0.5, 0.5, 0.5
-    if isinstance(roughness, ImageValue) and context.textures.is_missing(roughness):
+    if not context.textures.has_pixels(roughness):
         return 0.5, 0.5, 0.5
     pixels = context.textures.pixels(roughness).mean(axis=-1, keepdims=True)
     low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
@@ -113,6 +111,8 @@ def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, 
 
 def two_sided(bsdf: Element) -> Element:
     """The BSDF, whose opaque parts are seen from both sides."""
+    if bsdf.get("type") == "twosided":
+        return bsdf
     nested = [child for child in bsdf if child.tag == "bsdf"]
     kinds = {element.get("type") for element in bsdf.iter("bsdf")}
     if not kinds & TRANSMITTING:
@@ -208,9 +208,7 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
     if isinstance(roughness, Constant):
         alpha = min(max(roughness.number, 0.0), 1.0) ** 2
         return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
-    if isinstance(roughness, ImageValue) and context.textures.is_missing(roughness):
-        return 0.25
-    if isinstance(roughness, ImageValue | Texture):
+    if context.textures.has_pixels(roughness):
         squared = np.maximum(context.textures.pixels(roughness).mean(axis=-1, keepdims=True) ** 2, ALPHA_MIN)
         return context.textures.rewritten(roughness, squared, "alpha")
     return 0.25

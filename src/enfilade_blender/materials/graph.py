@@ -74,8 +74,8 @@ class Graph:
             return Nothing()
         node, inner = found.node, found.groups
         if node.type == "BSDF_PRINCIPLED":
-            names = mapping.principled_names([s.name for s in node.inputs])
-            inputs = {new: self.value(node.inputs[old], inner) for new, old in names.items()}
+            names = (name for name in mapping.PRINCIPLED if name in node.inputs)
+            inputs = {name: self.value(node.inputs[name], inner) for name in names}
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
             first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
@@ -126,7 +126,7 @@ class Graph:
                 self.value(node.inputs["Strength"], inner),
             )
             if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
-                return NormalMap(image, strength.number)
+                return NormalMap(image, strength.number, found)
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
             height = self.value(node.inputs["Height"], inner)
             strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))
@@ -242,8 +242,8 @@ def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] 
     return None
 
 
-def upstream(output: Output) -> Iterator[Output]:
-    """An output and all outputs that it depends on."""
+def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:
+    """An output and all outputs that it depends on, those of the coordinates of images included."""
     seen: set[Any] = set()
     waiting = [output]
     while waiting:
@@ -253,6 +253,8 @@ def upstream(output: Output) -> Iterator[Output]:
             continue
         seen.add(key)
         yield current
+        if current.node.type == "TEX_IMAGE" and not below_images:
+            continue
         for socket in current.node.inputs:
             found = follow(socket, current.groups) if socket.enabled else socket
             if isinstance(found, Output):
@@ -261,17 +263,21 @@ def upstream(output: Output) -> Iterator[Output]:
 
 def _dependence(output: Output) -> tuple[str | None, bool]:
     """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
-    is_of_uv, is_of_view, uv_maps = True, False, set()
-    for found in upstream(output):
+    is_of_uv, uv_maps = True, set()
+    for found in upstream(output, below_images=False):
         node = found.node
-        is_of_view |= node.type in table.VIEW_NODES
         if node.type == "TEX_IMAGE":
             coordinates = image_coordinates(node, found.groups)
             is_of_uv &= coordinates is not None and coordinates[1] == IDENTITY and node.extension == "REPEAT"
             uv_maps.add(coordinates[0] if coordinates else "")
         else:
-            is_of_uv &= node.type in table.COLOUR_NODES or node.type in ("TEX_COORD", "UVMAP")
+            is_of_uv &= node.type in table.COLOUR_NODES
     is_of_uv &= len(uv_maps) <= 1
+    is_of_view = any(
+        found.node.type in table.VIEW_NODES
+        or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
+        for found in upstream(output)
+    )
     return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view
 
 

@@ -9,31 +9,12 @@ import numpy as np
 
 from enfilade_blender.materials.values import Matrix3
 
-BLENDER_3 = {  # names of Blender 3 by those of Blender 4
-    "Subsurface Weight": "Subsurface",
-    "Specular IOR Level": "Specular",
-    "Transmission Weight": "Transmission",
-    "Coat Weight": "Clearcoat",
-    "Coat Roughness": "Clearcoat Roughness",
-    "Sheen Weight": "Sheen",
-    "Emission Color": "Emission",
-}
-PRINCIPLED = (
+PRINCIPLED = (  # inputs that are read; Blender 4.2 has not all of them
     "Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Diffuse Roughness", "Subsurface Weight",
     "Specular IOR Level", "Specular Tint", "Anisotropic", "Transmission Weight", "Coat Weight",
     "Coat Roughness", "Coat IOR", "Sheen Weight", "Sheen Tint", "Emission Color", "Emission Strength",
     "Thin Film Thickness",
 )  # fmt: skip
-
-
-def principled_names(sockets: list[str]) -> dict[str, str]:
-    """Names of the file's sockets, by names of Blender 4; those that the file lacks are left out."""
-    found = {}
-    for name in PRINCIPLED:
-        old = name if name in sockets else BLENDER_3.get(name, "")
-        if old in sockets:
-            found[name] = old
-    return found
 
 
 def interface_ior(ior: float, level: float) -> float:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from enfilade_blender.materials.bsdfs import (
+    ALMOST,
     Context,
     is_one,
     is_zero,
@@ -13,19 +14,19 @@ from enfilade_blender.materials.bsdfs import (
     lobe_bsdf,
     plastic_bsdf,
     two_sided,
+    with_normal,
 )
 from enfilade_blender.materials.principled import principled_bsdf
 from enfilade_blender.materials.values import (
     Add,
+    AttributeValue,
     Constant,
     Emission,
-    ImageValue,
     Lobe,
     Mix,
     Nothing,
     Principled,
     Shader,
-    Texture,
     Value,
 )
 from enfilade_blender.scene_xml import Element, plugin
@@ -90,11 +91,13 @@ class Surface:
         if isinstance(radiance.colour, Constant):
             r, g, b = (c * radiance.strength for c in radiance.colour.colour)
             return (r, g, b) if max(r, g, b) > 0.0 else None
-        if isinstance(radiance.colour, ImageValue) and context.textures.is_missing(radiance.colour):
+        is_as_is = abs(radiance.strength - 1.0) < 1e-3
+        if is_as_is and isinstance(radiance.colour, AttributeValue):
+            return context.textures.colour(radiance.colour)
+        if not context.textures.has_pixels(radiance.colour):
             return (0.5 * radiance.strength,) * 3
-        if abs(radiance.strength - 1.0) < 1e-3 or not isinstance(radiance.colour, ImageValue | Texture):
-            element = context.textures.colour(radiance.colour)
-            return element if isinstance(element, Element) else None
+        if is_as_is:
+            return context.textures.colour(radiance.colour)
         scaled = context.textures.pixels(radiance.colour) * radiance.strength
         return context.textures.rewritten(radiance.colour, scaled, f"emission {radiance.strength:.3g}")
 
@@ -107,29 +110,39 @@ def build(shader: Shader, context: Context) -> Surface:
         return Surface(None, emitted=_radiance(shader.colour, shader.strength, context))
     if isinstance(shader, Lobe):
         if shader.kind == "transparent":
-            return Surface(None, opacity=Constant((0.0,)))
+            return _transparent(shader, context)
         return Surface(lobe_bsdf(shader, context))
     if isinstance(shader, Principled):
         inputs = shader.inputs
         colour = inputs.get("Emission Color", WHITE)
         strength = inputs.get("Emission Strength", Constant((0.0,)))
         alpha = inputs.get("Alpha", WHITE)
-        return Surface(
-            principled_bsdf(shader, context), opacity=alpha, emitted=_radiance(colour, strength, context)
-        )
+        emitted = _radiance(colour, strength, context)
+        surface = Surface(principled_bsdf(shader, context), emitted=emitted)
+        return surface if is_one(alpha) else _cut_out(surface, alpha, shader.name, context)
     if isinstance(shader, Add):
         return _sum(shader, context)
     return _mix(shader, context)
 
 
 def inverted(value: Value, context: Context) -> float | Element:
-    """1 minus a value."""
+    """1 minus a value; 0.5 of a missing image or an attribute."""
     if isinstance(value, Constant):
         return 1.0 - value.number
-    if isinstance(value, ImageValue) and not context.textures.is_missing(value):
+    if context.textures.has_pixels(value):
         pixels = context.textures.pixels(value).mean(axis=-1, keepdims=True)
         return context.textures.rewritten(value, 1.0 - pixels, "inverted")
     return 0.5
+
+
+def _transparent(lobe: Lobe, context: Context) -> Surface:
+    if not isinstance(lobe.colour, Constant) or min(lobe.colour.colour) < ALMOST:
+        what, effect = (
+            "the colour of transparency is left out",
+            "what lies behind is neither dimmed nor tinted",
+        )
+        context.notes.add("not-carried", context.owner, lobe.name, what, effect)
+    return Surface(None, opacity=Constant((0.0,)))
 
 
 def _mix(mix: Mix, context: Context) -> Surface:
@@ -139,39 +152,52 @@ def _mix(mix: Mix, context: Context) -> Surface:
     if mix.fresnel_ior is not None and isinstance(mix.second, Lobe):
         return _interface(mix.first, mix.second, mix.fresnel_ior, context)
     first, second = build(mix.first, context), build(mix.second, context)
-    if first.is_invisible and not second.is_invisible:
-        return _cut_out(second, mix, context, is_inverted=False)
-    if second.is_invisible and not first.is_invisible:
-        return _cut_out(first, mix, context, is_inverted=True)
+    if first.is_invisible and not first.emitted:
+        return _cut_out(second, mix.factor, mix.name, context)
+    if second.is_invisible and not second.emitted:
+        return _cut_out(first, mix.factor, mix.name, context, is_inverted=True)
     return _blended(first, second, mix, context)
 
 
 def _interface(below: Shader, above: Lobe, ior: float, context: Context) -> Surface:
     """Glossy over a shader by Fresnel's factor: over diffuse it is plastic, over transparent thin glass."""
     if isinstance(below, Lobe) and below.kind == "diffuse":
-        return Surface(plastic_bsdf(below.colour, above.roughness, ior, context))
+        if min(context.textures.mean(above.colour)) < ALMOST:
+            what, effect = "the tint of reflections is left out", "reflections have the colour of the light"
+            context.notes.add("not-carried", context.owner, above.name, what, effect)
+        bsdf = plastic_bsdf(below.colour, above.roughness, ior, context)
+        return Surface(with_normal(bsdf, below.normal or above.normal, context))
+    if above.normal is not None:
+        what, effect = "the normals of the glossy layer are left out", "its reflections are even"
+        context.notes.add("not-carried", context.owner, above.name, what, effect)
     if isinstance(below, Lobe) and below.kind == "transparent":
-        tint = context.textures.colour(below.colour)
-        return Surface(
-            plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, specular_transmittance=tint)
-        )
+        tints = {
+            "specular_reflectance": context.textures.colour(above.colour),
+            "specular_transmittance": context.textures.colour(below.colour),
+        }
+        return Surface(plugin("bsdf", "thindielectric", int_ior=ior, ext_ior=1.0, **tints))
     surface = build(below, context)
     tint = context.textures.mean(above.colour)
     return replace(surface, bsdf=layered(surface.plain(), WHITE, ior, above.roughness, tint, context))
 
 
-def _cut_out(surface: Surface, mix: Mix, context: Context, *, is_inverted: bool) -> Surface:
+def _cut_out(
+    surface: Surface, factor: Value, node: str, context: Context, *, is_inverted: bool = False
+) -> Surface:
+    """A surface below an opacity, which also scales what it emits."""
+    if surface.is_invisible and not surface.emitted:
+        return surface
     if not is_one(surface.opacity):
         what, effect = "two opacities; the outer one is kept", "the surface is less transparent"
-        context.notes.add("approximated", context.owner, mix.name, what, effect)
+        context.notes.add("approximated", context.owner, node, what, effect)
     emitted = surface.emitted
-    if emitted and isinstance(mix.factor, Constant):
-        share = 1.0 - mix.factor.number if is_inverted else mix.factor.number
-        emitted = tuple(replace(part, strength=part.strength * share) for part in emitted)
+    if emitted and isinstance(factor, Constant):
+        share = 1.0 - factor.number if is_inverted else factor.number
+        emitted = tuple(replace(part, strength=part.strength * share) for part in emitted if share > 0.0)
     elif emitted:
         what, effect = "light is emitted where the surface is transparent, too", "the cut-out shines"
-        context.notes.add("approximated", context.owner, mix.name, what, effect)
-    return replace(surface, opacity=mix.factor, opacity_is_inverted=is_inverted, emitted=emitted)
+        context.notes.add("approximated", context.owner, node, what, effect)
+    return replace(surface, opacity=factor, opacity_is_inverted=is_inverted, emitted=emitted)
 
 
 def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Surface:
@@ -182,9 +208,9 @@ def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Sur
     if emitted and factor is None:
         what, effect = "emission by the mean of a textured factor", "light is even over the surface"
         context.notes.add("approximated", context.owner, mix.name, what, effect)
-    if first.bsdf is None and second.bsdf is None:
-        return Surface(None, emitted=_joined(emitted, mix, context))
-    parts = [part.plain() if is_one(part.opacity) else part.element(context) for part in (first, second)]
+    if first.bsdf is None and second.bsdf is None and first.opacity == second.opacity:
+        return replace(first, emitted=_joined(emitted, mix, context))
+    parts = [_masked(part, context) for part in (first, second)]
     weight = context.textures.number(mix.factor)
     bsdf = plugin("bsdf", "blendbsdf", *parts, weight=weight)
     return Surface(bsdf, emitted=_joined(emitted, mix, context))
@@ -197,10 +223,19 @@ def _sum(add: Add, context: Context) -> Surface:
         return replace(second, emitted=emitted)
     if second.bsdf is None and not second.is_invisible:
         return replace(first, emitted=emitted)
+    if first.is_invisible and second.is_invisible:
+        return replace(first, emitted=emitted)
     what, effect = "a sum of two BSDFs is a mix of equal shares", "the surface is darker"
+    if first.is_invisible or second.is_invisible:
+        effect = "half of the light passes through the surface, and the other half meets it"
     context.notes.add("approximated", context.owner, add.name, what, effect)
-    parts = [part.plain() for part in (first, second)]
+    parts = [_masked(part, context) for part in (first, second)]
     return Surface(plugin("bsdf", "blendbsdf", *parts, weight=0.5), emitted=emitted)
+
+
+def _masked(surface: Surface, context: Context) -> Element:
+    """BSDF with its opacity, as a part of another."""
+    return surface.plain() if is_one(surface.opacity) else surface.element(context)
 
 
 def _joined(emitted: list[Radiance], shader: Mix | Add, context: Context) -> tuple[Radiance, ...]:

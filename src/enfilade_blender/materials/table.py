@@ -29,7 +29,6 @@ class LobeKind:
 LOBES = {
     "BSDF_DIFFUSE": LobeKind("diffuse", "`diffuse`"),
     "BSDF_GLOSSY": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
-    "BSDF_ANISOTROPIC": LobeKind("glossy", "`conductor` or `roughconductor` without Fresnel"),
     "BSDF_METALLIC": LobeKind(
         "glossy",
         "`conductor` or `roughconductor`",
@@ -66,6 +65,12 @@ COLOUR_NODES = {  # functions of their inputs alone
     "COMBINE_COLOR", "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
 }  # fmt: skip
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
+VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming",)}
+OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate as Cycles does, and how it does
+    "PARTICLE_INFO": "data of particles are taken as 0",
+    "HAIR_INFO": "data of hairs are taken as 0",
+    "POINT_INFO": "data of points are taken as 0",
+}
 PRINCIPLED = (
     (
         "Base Color, Metallic 0",
@@ -85,7 +90,11 @@ PRINCIPLED = (
     ("IOR, Specular IOR Level", "mapped", "index of refraction of the interface"),
     ("Transmission Weight", "mapped", "`dielectric` or `roughdielectric`; `blendbsdf` in between"),
     ("Alpha", "mapped", "`mask`"),
-    ("Emission Color, Emission Strength", "mapped", "`area` emitter; open meshes shine on both sides"),
+    (
+        "Emission Color, Emission Strength",
+        "mapped",
+        "`area` emitter; meshes that are open, or around something, shine on both sides",
+    ),
     ("Normal: Normal Map, Bump of images", "mapped", "`normalmap`, `bumpmap`"),
     (
         "Coat",
@@ -119,6 +128,11 @@ INPUTS = (
         "`plastic`, `thindielectric` or a layer",
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
+    (
+        "Object Info: Random; properties; attributes but UV maps and colours; data of particles and hairs",
+        "approximated",
+        "another number, or 0",
+    ),
     ("Light Path", "approximated", "0: all rays see one material"),
     ("Missing image", "approximated", "a mid grey"),
 )
@@ -137,10 +151,11 @@ LIGHTS = (
     ("Area: square, rectangle, disk, ellipse", "mapped", "`rectangle` or `disk`; the camera sees it"),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
+    ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, light linking, nodes of lights but a plain emission",
+        "Spread, light and shadow linking, nodes of lights but a plain emission",
         "not carried",
         "light is distributed as without them",
     ),
@@ -152,8 +167,9 @@ OBJECTS = (
         "mapped",
         "merged, or `instance` where they are many",
     ),
-    ("Linked libraries", "mapped", "within the source's folder and the allowed ones"),
-    ("Animated objects", "not carried", "as in the first frame"),
+    ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
+    ("Animated objects, lamps, materials and worlds", "not carried", "as in the first frame"),
+    ("Gamma, curves and white balance of the view; frame step", "not carried", "left out"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -26,6 +26,8 @@ WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirro
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
 GREY = (0.5, 0.5, 0.5)  # of a missing image
 RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
+OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
+LONGEST_STEM = 120  # bytes of a file's name, to which a number and an ending are added
 
 
 class Textures:
@@ -57,8 +59,7 @@ class Textures:
         """A colour times a number, which may pass 1."""
         if isinstance(value, Constant):
             return colour(value.colour, scale)
-        is_missing = isinstance(value, ImageValue) and self.is_missing(value)
-        if abs(scale - 1.0) < 0.01 or is_missing or not isinstance(value, ImageValue | Texture):
+        if abs(scale - 1.0) < 0.01 or not self.has_pixels(value):
             return self._texture(value)
         return self.rewritten(value, self.pixels(value) * scale, f"times {scale:.3g}", raw=False)
 
@@ -66,9 +67,7 @@ class Textures:
         """A colour below a share of white."""
         if isinstance(value, Constant):
             return colour([white + (1.0 - white) * c for c in value.colour])
-        if not isinstance(value, ImageValue | Texture) or (
-            isinstance(value, ImageValue) and self.is_missing(value)
-        ):
+        if not self.has_pixels(value):
             return self._texture(value)
         image = white + (1.0 - white) * self.pixels(value)
         return self.rewritten(value, image, f"below {white:.3g}", raw=False)
@@ -83,20 +82,18 @@ class Textures:
         """A number times another."""
         if isinstance(value, Constant):
             return value.number * scale
-        if not isinstance(value, ImageValue | Texture) or (
-            isinstance(value, ImageValue) and self.is_missing(value)
-        ):
+        if not self.has_pixels(value):
             return 0.5 * scale
         grey = self.pixels(value).mean(axis=-1, keepdims=True)
         return self.rewritten(value, grey * scale, f"grey times {scale:.3g}")
 
     def mean(self, value: Value) -> tuple[float, float, float]:
-        """Mean linear colour of a value; mid grey of attributes."""
+        """Mean linear colour of a value; mid grey of a missing image or an attribute."""
         if isinstance(value, Constant):
             return value.colour
         if isinstance(value, Texture):
             return value.mean
-        if isinstance(value, ImageValue) and not self.is_missing(value):
+        if self.has_pixels(value):
             mean = self.pixels(value).reshape(-1, 3).mean(axis=0)
             return float(mean[0]), float(mean[1]), float(mean[2])
         return GREY
@@ -109,8 +106,17 @@ class Textures:
             image = bpy.data.images.load(str(self._folder / value.file), check_existing=True)
             image.colorspace_settings.name = "Non-Color" if value.raw else "sRGB"
             return linear_pixels(image)[..., :3]
-        rgba = linear_pixels(value.image)
-        return np.repeat(rgba[..., 3:], 3, axis=-1) if value.output.socket.name == "Alpha" else rgba[..., :3]
+        if value.output.socket.name == "Alpha":
+            return np.repeat(linear_pixels(value.image)[..., 3:], 3, axis=-1)
+        return image_colours(value.output.node)
+
+    def has_pixels(self, value: Value) -> TypeGuard[ImageValue | Texture]:
+        """Whether numbers can be computed of a value's; that a mid grey is in their place is noted."""
+        if isinstance(value, AttributeValue):
+            what = "a colour attribute is taken as a mid grey, where numbers are computed of its own"
+            owner = value.name or "active colour attribute"
+            self._notes.add("approximated", owner, value.output.node.name, what, "its pattern is missing")
+        return isinstance(value, Texture) or (isinstance(value, ImageValue) and not self.is_missing(value))
 
     def is_missing(self, value: ImageValue) -> bool:
         """Whether an image has no pixels; this is noted."""
@@ -131,18 +137,19 @@ class Textures:
         Without `raw` the values of a PNG are sRGB, as Mitsuba expects.
         """
         if image.max(initial=0.0) > 1.0:
-            file = f"textures/{self._names.unique(name)}.exr"
+            file = f"textures/{self._names.unique(file_stem(name))}.exr"
             write_exr(self._folder / file, np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float32))
         else:
-            file = f"textures/{self._names.unique(name)}.png"
+            file = f"textures/{self._names.unique(file_stem(name))}.png"
             write_png(self._folder / file, image if raw else srgb_from_linear(image))
         return file
 
     def rewritten(self, value: ImageValue | Texture, image: F32, name: str, *, raw: bool = True) -> Element:
         """A texture in the place of another, of other numbers (H, W, 1 or 3); colours are not `raw`."""
-        key = (value.file if isinstance(value, Texture) else value.image.name_full), name
+        key = (value.file,) if isinstance(value, Texture) else _key(value)
+        key = *key, name
         if key not in self._files:
-            stem = Path(str(key[0])).stem
+            stem = Path(key[0]).stem
             self._files[key] = self.write(f"{stem} {name}", image.astype(np.float32), raw=raw)
         raw = raw or self._files[key].endswith(".exr")
         if isinstance(value, Texture):
@@ -182,15 +189,15 @@ class Textures:
         """Name of a value's file, and whether its numbers are linear."""
         image, is_alpha = value.image, value.output.socket.name == "Alpha"
         raw = is_alpha or image.colorspace_settings.name in RAW_SPACES
-        key = image.name_full, is_alpha
+        key = _key(value)
         if key not in self._files:
             name = Path(image.name).stem or "image"
             if is_alpha:
-                self._files[key] = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
+                file = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
             else:
-                self._files[key] = self._copied(image, name) or self.write(
-                    name, linear_pixels(image)[..., :3], raw=raw
-                )
+                file = self._copied(image, name) if _is_as_stored(value.output.node) else ""
+                file = file or self.write(name, image_colours(value.output.node), raw=raw)
+            self._files[key] = file
         return self._files[key], raw
 
     def _copied(self, image: Any, name: str) -> str:
@@ -201,7 +208,7 @@ class Textures:
         suffix = source.suffix.lower()
         if image.source != "FILE" or image.is_dirty or suffix not in READABLE:
             return ""
-        file = f"textures/{self._names.unique(name)}{suffix}"
+        file = f"textures/{self._names.unique(file_stem(name))}{suffix}"
         if image.packed_file is not None:
             (self._folder / file).write_bytes(image.packed_file.data)
         elif source.is_file():
@@ -219,8 +226,58 @@ def bitmap(file: str, *, raw: bool, wrap: str, matrix: np.ndarray, smooth: bool 
     )
 
 
+def file_stem(name: str) -> str:
+    """A name of a file without its ending: letters and digits of any script, spaces, - and _."""
+    plain = "".join(c if c.isalnum() or c in " -_" else "_" for c in name)
+    return plain.encode()[:LONGEST_STEM].decode(errors="ignore")
+
+
+def image_colours(node: Any) -> F32:
+    """Linear RGB of an image node (H, W, 3), the first row on top, as Cycles has it.
+
+    Colours are multiplied by alpha, before they are decoded, unless the node's output Alpha is used. Blender
+    keeps images of bytes without that product, and those of floats with it.
+    """
+    image = node.image
+    rgba = _stored_pixels(image)
+    colours, alpha = rgba[..., :3], rgba[..., 3:]
+    if _has_alpha(image):
+        is_alone = not node.outputs["Alpha"].is_linked
+        if is_alone and not image.is_float:
+            colours = colours * alpha
+        elif image.is_float and not is_alone:
+            colours = colours / np.where(alpha > 0.0, alpha, 1.0)
+    return np.ascontiguousarray(_decoded(colours, image))
+
+
+def _has_alpha(image: Any) -> bool:
+    """Whether Cycles takes an image's fourth channel as alpha, and it may be below 1."""
+    is_channel = image.alpha_mode in ("CHANNEL_PACKED", "NONE") or image.colorspace_settings.is_data
+    return not is_channel and image.depth not in OPAQUE_DEPTHS
+
+
+def _is_as_stored(node: Any) -> bool:
+    """Whether an image node's colours are those of the image's file."""
+    image = node.image
+    if not _has_alpha(image) or (image.alpha_mode == "PREMUL") != node.outputs["Alpha"].is_linked:
+        return True
+    return bool(_stored_pixels(image)[..., 3].min() >= 1.0)
+
+
+def _key(value: ImageValue) -> tuple[Any, ...]:
+    """What the numbers of a value depend on."""
+    outputs = value.output.node.outputs
+    return value.image.name_full, value.output.socket.name, outputs["Alpha"].is_linked
+
+
 def linear_pixels(image: Any) -> F32:
     """Linear RGBA of a Blender image (H, W, 4), the first row on top."""
+    rgba = _stored_pixels(image)
+    return np.ascontiguousarray(np.concatenate([_decoded(rgba[..., :3], image), rgba[..., 3:]], axis=-1))
+
+
+def _stored_pixels(image: Any) -> F32:
+    """Numbers of a Blender image (H, W, 4), the first row on top."""
     width, height = image.size
     values = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(values)
@@ -229,9 +286,13 @@ def linear_pixels(image: Any) -> F32:
         alpha = np.ones((height, width, 1), np.float32)
         colour = pixels if image.channels == 3 else np.repeat(pixels[..., :1], 3, axis=-1)
         pixels = np.concatenate([colour, alpha], axis=-1)
-    if not image.is_float and image.colorspace_settings.name not in RAW_SPACES:
-        pixels = np.concatenate([linear_from_srgb(pixels[..., :3]), pixels[..., 3:]], axis=-1)
-    return np.ascontiguousarray(pixels)
+    return pixels
+
+
+def _decoded(colours: F32, image: Any) -> F32:
+    """Linear colours of an image's numbers."""
+    is_linear = image.is_float or image.colorspace_settings.name in RAW_SPACES
+    return colours if is_linear else linear_from_srgb(colours)
 
 
 def linear_from_srgb(encoded: F32) -> F32:

@@ -107,10 +107,11 @@ Value = Constant | ImageValue | AttributeValue | Procedural | Texture
 
 @dataclass(frozen=True)
 class NormalMap:
-    """Tangent-space normals of an image."""
+    """Tangent-space normals of an image: `output` of a node Normal Map."""
 
     image: Value
     strength: float
+    output: Output
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ Normal = NormalMap | Bump | ProceduralNormal | None
 
 @dataclass(frozen=True)
 class Principled:
-    """Blender's Principled BSDF; `inputs` by names of Blender 4."""
+    """Blender's Principled BSDF; `inputs` by their names."""
 
     inputs: dict[str, Value]
     normal: Normal

@@ -8,11 +8,11 @@ from pathlib import Path
 
 sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from corpus import flat, lights, objects, surfaces  # noqa: E402
+from corpus import details, edges, flat, lights, objects, surfaces  # noqa: E402
 from corpus.stage import save  # noqa: E402
 
 CASES = {case.__name__: case for module in (surfaces, lights, objects) for case in module.CASES}
-LARGE = {case.__name__: case for case in flat.LARGE}  # not among those that `--list` names
+UNLISTED = {case.__name__: case for module in (details, edges, flat) for case in module.CASES}  # by `--list`
 
 if __name__ == "__main__":
     if sys.argv[1] == "--list":
@@ -21,7 +21,7 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     for name in sys.argv[2:] or CASES:
-        after = (CASES | LARGE)[name](folder)
+        after = (CASES | UNLISTED)[name](folder)
         save(folder, name)
         if after is not None:
             after()

@@ -101,4 +101,4 @@ def _daylight():
     aim(sun, (3.0, 2.0, 0.0))
 
 
-LARGE = (flat,)
+CASES = (flat,)

@@ -86,7 +86,7 @@ def test_the_job_and_the_environment(load, shot, monkeypatch, tmp_path):
         "export", "Second", None, [32, 24], [5, 6],
     )  # fmt: skip
     assert job["library_folders"] == ["/a", "/b"]
-    assert job["limits"] == {"instances": 7, "triangles": 50_000_000, "seconds": 1800.0}
+    assert job["limits"] == {"instances": 7, "triangles": 50_000_000}
     assert {"PYTHONPATH", "BLENDER_USER_SCRIPTS", "OCIO"}.isdisjoint(environ)
     assert environ["HOME"] != os.environ["HOME"]
     assert (made.camera, made.size, made.frames) == ("Second", (32, 24), (5, 6))
@@ -147,9 +147,15 @@ def test_a_process_that_hangs_at_its_end_is_ended(load, shot, monkeypatch):
     assert load(shot(do="hang after")).camera == "Cam"
 
 
+def test_a_process_that_is_left_behind_is_not_waited_for(load, shot):
+    made = load(shot(do="leave a process"))  # which has the pipe for a minute
+    os.killpg(int((made.folder / "left.pid").read_text()), signal.SIGKILL)
+    assert not (made.folder.parent / "shot.ended").exists()
+
+
 def test_strict_refuses_what_is_not_carried_over(load, shot, tmp_path):
     notes = [{"kind": "not-carried", **NOTE}, {"kind": "not-carried", **NOTE, "object": "Chair"}]
-    source = shot(notes=[*notes, {"kind": "mapped", **NOTE}])
+    source = shot(notes=[*notes, {"kind": "baked", **NOTE}])
     with pytest.raises(
         SceneError, match=r"Sofa / Noise Texture, Chair / Noise Texture: a procedural texture"
     ):
@@ -159,8 +165,8 @@ def test_strict_refuses_what_is_not_carried_over(load, shot, tmp_path):
     assert len(made.notes_of(NoteKind.NOT_CARRIED)) == 2
     first, second = grouped(made.notes)
     assert (first.kind, len(first.places)) == (NoteKind.NOT_CARRIED, 2)
-    assert (second.kind, second.listed) == (NoteKind.MAPPED, "Sofa / Noise Texture")
-    assert "2 not carried over, 0 approximated, 0 baked, 1 mapped" in made.summary
+    assert (second.kind, second.listed) == (NoteKind.BAKED, "Sofa / Noise Texture")
+    assert "2 not carried over, 0 approximated, 1 baked" in made.summary
 
 
 def test_a_view_that_is_not_there_is_a_note(load, shot):

@@ -85,11 +85,7 @@ def job_table(task: str, source: Path, out: Path, choices: Choices, limits: Limi
     """A job of the importer; the part that its tasks have in common."""
     folders = [folder for folder in limits.allow.split(os.pathsep) if folder]
     named = {name: value or None for name, value in asdict(choices).items()}
-    bounds = {
-        "instances": limits.import_instances,
-        "triangles": limits.import_triangles,
-        "seconds": limits.import_s,
-    }
+    bounds = {"instances": limits.import_instances, "triangles": limits.import_triangles}
     files = {"source": str(source.resolve()), "out": str(out.resolve())}
     return {"task": task, **files, **named, "limits": bounds, "library_folders": folders}
 
@@ -164,10 +160,13 @@ def _video(view: SourceView, blender: Blender, folder: Path) -> tuple[dict[str, 
 
 
 def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Tables of numbers and strings; JSON's strings are TOML's."""
+    """Tables of numbers and strings; JSON's strings are TOML's, but for escapes of surrogates."""
     lines = ["# Settings of the imported file, for --settings."]
     for name, table in tables.items():
-        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items())]
+        lines += [
+            f"[{name}]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""How the parts of a file were carried over: mapped, baked, approximated, or not at all."""
+"""Parts of a file that are not as they were: baked, approximated, or not carried over."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ LISTED = 4  # objects of a group
 
 
 class NoteKind(Enum):
-    """How a part of the file was carried over."""
+    """How a part of the file was carried over; one that is as it was has no note."""
 
-    MAPPED = "mapped"
     BAKED = "baked"
     APPROXIMATED = "approximated"
     NOT_CARRIED = "not-carried"
@@ -64,7 +63,6 @@ TITLES = {
     NoteKind.NOT_CARRIED: "not carried over",
     NoteKind.APPROXIMATED: "approximated",
     NoteKind.BAKED: "baked",
-    NoteKind.MAPPED: "mapped",
 }
 
 

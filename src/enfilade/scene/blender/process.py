@@ -70,15 +70,17 @@ def run_job(
         job_file.write_text(json.dumps(job), encoding="utf-8")
         own = [sys.executable, "-P", "-m", "enfilade.scene.blender.launcher"]
         line = [*own, str(os.getpid()), str(limits.import_mb), home, *blender.command(script, job_file)]
-        with subprocess.Popen(  # noqa: S603
+        # No `with`: at its end it closes the pipe, which waits for the reader while another process holds it.
+        process = subprocess.Popen(  # noqa: S603
             line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             start_new_session=True,
-        ) as process:  # fmt: skip
-            try:
-                last, is_late = _follow(process, answers, limits.import_s, monitor, name)
-            finally:
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
+        )  # fmt: skip
+        try:
+            last, is_late = _follow(process, answers, limits.import_s, monitor, name)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
     if answers[1].is_file():
         raise SceneError(_refusal(answers[1], about, str(job["source"])))
     if answers[0].is_file():
@@ -118,10 +120,11 @@ def _follow(
 
 
 def _read(stream: IO[bytes] | None, lines: queue.SimpleQueue[str | None]) -> None:
-    """Pass lines on, then None; longer lines come in parts."""
-    with suppress(ValueError):  # closed while reading
-        while stream and (line := stream.readline(LONGEST_LINE)):
-            lines.put(printable(line.decode(errors="replace").rstrip()))
+    """Pass lines on, close the stream, then pass None on; longer lines come in parts."""
+    if stream is not None:
+        with stream:
+            while line := stream.readline(LONGEST_LINE):
+                lines.put(printable(line.decode(errors="replace").rstrip()))
     lines.put(None)
 
 

@@ -1,0 +1,84 @@
+"""Materials that are easily lost, as they are exported."""
+
+import shutil
+from xml.etree import ElementTree as ET
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from enfilade.scene.mitsuba.files import check_scene
+from enfilade.settings import LimitSettings
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+NAME = "uncommon_materials"
+
+
+@pytest.fixture(scope="module")
+def made(blender):
+    """Folder, elements by id, and notes by material."""
+    code, out, result = blender.job(blender.make(NAME)[0], NAME)
+    assert code == 0, result
+    check_scene(out / "scene.xml", LimitSettings())
+    assert mi.load_file(str(out / "scene.xml")).shapes()
+    parsed = ET.parse(out / "scene.xml").iter()
+    elements = {e.get("id"): e for e in parsed if e.tag != "ref" and e.get("id")}
+    notes = {}
+    for note in result["notes"]:
+        notes.setdefault(note["object"], []).append(note["what"])
+    return out, elements, notes
+
+
+def pixels(folder, texture):
+    file = texture.find("string[@name='filename']").get("value")
+    return np.array(mi.Bitmap(str(folder / file))) / 255.0
+
+
+def test_an_inverted_opacity_is_that_of_the_baked_image(made):
+    out, elements, _ = made
+    found = pixels(out, elements["material cut out"].find("texture[@name='opacity']"))
+    linear = [(code / 1.055 + 0.055 / 1.055) ** 2.4 for code in (0.8, 0.4)]
+    # The texels beside the border of the halves are between them.
+    assert np.percentile(found, [5, 95]) == pytest.approx([1.0 - x**2 for x in linear], abs=0.01)
+
+
+def test_a_colour_is_multiplied_by_an_alpha_that_is_not_used(made):
+    out, elements, _ = made
+    found = pixels(out, elements["material premultiplied"].find(".//texture"))
+    assert found[0, [0, -1], 0] == pytest.approx([0.8, 0.4], abs=1e-2)
+
+
+def test_transparency_that_is_lost_is_noted(made):
+    _, elements, notes = made
+    assert "see-through" not in elements  # the shape is invisible
+    assert notes["see-through"] == ["the colour of transparency is left out"]
+    assert notes["sheer gloss"] == ["a sum of two BSDFs is a mix of equal shares"]
+    kinds = [e.get("type") for e in elements["material sheer gloss"].iter("bsdf")]
+    assert kinds == ["blendbsdf", "mask", "twosided", "diffuse", "twosided", "roughconductor"]
+
+
+def test_plastic_by_fresnel_keeps_its_normals(made):
+    _, elements, notes = made
+    plastic = elements["material bumpy plastic"].find(".//bsdf[@type='bumpmap']/bsdf")
+    assert plastic.get("type") == "roughplastic"
+    assert "the tint of reflections is left out" in notes["bumpy plastic"]
+
+
+def test_a_picture_of_another_folder_is_missing(blender, made, tmp_path):
+    _, _, notes = made
+    assert "picture.png" not in notes
+    apart = tmp_path / "apart.blend"
+    shutil.copyfile(blender.folder / "files" / f"{NAME}.blend", apart)
+    code, out, result = blender.job(apart, "apart")
+    (note,) = [
+        note for note in result["notes"] if note["kind"] == "not-carried" and "folders" in note["what"]
+    ]
+    assert (code, note["object"]) == (0, "picture.png")
+    assert note["effect"] == f"the image is missing; allow {blender.folder / 'files'}"
+    assert not list((out / "textures").glob("picture*"))
+
+
+def test_opacity_dims_what_is_emitted(made):
+    _, elements, _ = made
+    radiance = elements["faint glow"].find("emitter/rgb").get("value")
+    assert radiance.split() == ["1", "1", "1"]
