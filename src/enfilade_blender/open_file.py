@@ -55,7 +55,23 @@ def open_source(job: Job, notes: Notes) -> Selection:
             f"Blender can't open it: {reason}", str(job.source), "open it in Blender, and save it again"
         ) from error
     _detach_images(job, notes)
+    if suffix != ".blend":
+        _take_camera(notes)
     return _select(job)
+
+
+def _take_camera(notes: Notes) -> None:
+    """Choose the first camera, and the frames of its animation: importers leave the scene without them."""
+    scene = bpy.context.scene
+    cameras = sorted((one for one in scene.objects if one.type == "CAMERA"), key=lambda one: one.name)
+    if scene.camera is None and cameras:
+        scene.camera = cameras[0]
+        for other in cameras[1:]:
+            what = f"the file has several cameras, of which {cameras[0].name} is used"
+            notes.add("not-carried", other.name, "", what, "choose this one by blender.camera")
+    if scene.camera is not None and (animation := scene.camera.animation_data) and animation.action:
+        first, last = animation.action.frame_range
+        scene.frame_start, scene.frame_end = round(first), max(round(last), round(first))
 
 
 def _check_is_blend(file: Path) -> None:

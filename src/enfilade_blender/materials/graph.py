@@ -120,6 +120,8 @@ class Graph:
         if not isinstance(found, Output):
             return None
         node, inner = found.node, found.groups
+        if node.type == "NORMAL_MAP" and not node.inputs["Color"].is_linked:
+            return None  # as the importer of FBX files leaves it: its colour is the flat one
         if node.type == "NORMAL_MAP" and node.space == "TANGENT":
             image, strength = (
                 self.value(node.inputs["Color"], inner),
