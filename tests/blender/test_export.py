@@ -149,7 +149,7 @@ def test_a_point_light_in_sight_has_no_radius(exported):
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):
     apart = tmp_path / "library.blend"
     shutil.copyfile(files["library"], apart)
-    code, _, error = blender.job(apart, "apart")
+    code, _, error = blender.job(apart, "library apart")
     assert (code, "outside the allowed folders" in error["what"]) == (3, True)
     code, _, _ = blender.job(apart, "allowed", library_folders=[str(files["library"].parent)])
     assert code == 0
