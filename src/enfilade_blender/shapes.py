@@ -13,7 +13,7 @@ from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.surfaces import Surface, build
-from enfilade_blender.materials.textures import Textures
+from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
     AttributeValue,
     Constant,
@@ -144,7 +144,7 @@ class Shapes:
     def _shape(
         self, name: str, mesh: Mesh, bsdf: str, radiance: Any, uv: str | None, attribute: str | None
     ) -> Element:
-        file = f"meshes/{self._files.unique(_file_name(name))}.ply"
+        file = f"meshes/{self._files.unique(file_stem(name))}.ply"
         write_ply(self._out / file, mesh, uv, attribute)
         shape = plugin("shape", "ply", reference(bsdf), filename=file)
         if radiance is not None:
@@ -235,8 +235,3 @@ def _back(mesh: Mesh) -> Mesh:
         np.add.at(offsets, back.triangles[:, corner], normals)
     offsets /= np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-30)
     return replace(back, positions=back.positions + offsets * size * BACK_OFFSET, normals=-back.normals)
-
-
-def _file_name(name: str) -> str:
-    """A name of a file: letters, digits and a few marks of any script."""
-    return "".join(c if c.isalnum() or c in " -_" else "_" for c in name)[:80]

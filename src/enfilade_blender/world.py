@@ -13,7 +13,7 @@ import numpy as np
 from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
-from enfilade_blender.materials.textures import linear_pixels
+from enfilade_blender.materials.image_pixels import linear_pixels
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection

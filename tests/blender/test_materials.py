@@ -69,7 +69,7 @@ def test_a_picture_of_another_folder_is_missing(blender, made, tmp_path):
     assert "picture.png" not in notes
     apart = tmp_path / "apart.blend"
     shutil.copyfile(blender.folder / "files" / f"{NAME}.blend", apart)
-    code, out, result = blender.job(apart, "apart")
+    code, out, result = blender.job(apart, "apart picture")
     (note,) = [
         note for note in result["notes"] if note["kind"] == "not-carried" and "folders" in note["what"]
     ]

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from enfilade_blender.image_files import F32
-from enfilade_blender.materials.textures import linear_pixels
+from enfilade_blender.materials.image_pixels import linear_pixels
 from enfilade_blender.materials.values import Output
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed

@@ -50,9 +50,6 @@ LOBES = {
     "BSDF_SHEEN": LobeKind(
         "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
     ),
-    "BSDF_VELVET": LobeKind(
-        "diffuse", "`diffuse`", "diffuse reflection", "edges are not brighter than the middle"
-    ),
     "BSDF_TOON": LobeKind("diffuse", "`diffuse`", "diffuse reflection", "light has no steps"),
     "BSDF_HAIR": LobeKind("glossy", "`roughconductor`", "a glossy surface", "highlights of hair differ"),
     "BSDF_HAIR_PRINCIPLED": LobeKind(

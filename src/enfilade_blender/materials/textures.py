@@ -10,6 +10,12 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from enfilade_blender.image_files import F32, srgb_from_linear, write_exr, write_png
+from enfilade_blender.materials.image_pixels import (
+    RAW_SPACES,
+    image_colours,
+    is_as_stored,
+    linear_pixels,
+)
 from enfilade_blender.materials.values import (
     AttributeValue,
     Constant,
@@ -25,8 +31,6 @@ READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
 GREY = (0.5, 0.5, 0.5)  # of a missing image
-RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
-OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 LONGEST_STEM = 120  # bytes of a file's name, to which a number and an ending are added
 
 
@@ -195,7 +199,7 @@ class Textures:
             if is_alpha:
                 file = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
             else:
-                file = self._copied(image, name) if _is_as_stored(value.output.node) else ""
+                file = self._copied(image, name) if is_as_stored(value.output.node) else ""
                 file = file or self.write(name, image_colours(value.output.node), raw=raw)
             self._files[key] = file
         return self._files[key], raw
@@ -232,71 +236,7 @@ def file_stem(name: str) -> str:
     return plain.encode()[:LONGEST_STEM].decode(errors="ignore")
 
 
-def image_colours(node: Any) -> F32:
-    """Linear RGB of an image node (H, W, 3), the first row on top, as Cycles has it.
-
-    Colours are multiplied by alpha, before they are decoded, unless the node's output Alpha is used. Blender
-    keeps images of bytes without that product, and those of floats with it.
-    """
-    image = node.image
-    rgba = _stored_pixels(image)
-    colours, alpha = rgba[..., :3], rgba[..., 3:]
-    if _has_alpha(image):
-        is_alone = not node.outputs["Alpha"].is_linked
-        if is_alone and not image.is_float:
-            colours = colours * alpha
-        elif image.is_float and not is_alone:
-            colours = colours / np.where(alpha > 0.0, alpha, 1.0)
-    return np.ascontiguousarray(_decoded(colours, image))
-
-
-def _has_alpha(image: Any) -> bool:
-    """Whether Cycles takes an image's fourth channel as alpha, and it may be below 1."""
-    is_channel = image.alpha_mode in ("CHANNEL_PACKED", "NONE") or image.colorspace_settings.is_data
-    return not is_channel and image.depth not in OPAQUE_DEPTHS
-
-
-def _is_as_stored(node: Any) -> bool:
-    """Whether an image node's colours are those of the image's file."""
-    image = node.image
-    if not _has_alpha(image) or (image.alpha_mode == "PREMUL") != node.outputs["Alpha"].is_linked:
-        return True
-    return bool(_stored_pixels(image)[..., 3].min() >= 1.0)
-
-
 def _key(value: ImageValue) -> tuple[Any, ...]:
     """What the numbers of a value depend on."""
     outputs = value.output.node.outputs
     return value.image.name_full, value.output.socket.name, outputs["Alpha"].is_linked
-
-
-def linear_pixels(image: Any) -> F32:
-    """Linear RGBA of a Blender image (H, W, 4), the first row on top."""
-    rgba = _stored_pixels(image)
-    return np.ascontiguousarray(np.concatenate([_decoded(rgba[..., :3], image), rgba[..., 3:]], axis=-1))
-
-
-def _stored_pixels(image: Any) -> F32:
-    """Numbers of a Blender image (H, W, 4), the first row on top."""
-    width, height = image.size
-    values = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(values)
-    pixels = values.reshape(height, width, image.channels)[::-1]
-    if image.channels < 4:
-        alpha = np.ones((height, width, 1), np.float32)
-        colour = pixels if image.channels == 3 else np.repeat(pixels[..., :1], 3, axis=-1)
-        pixels = np.concatenate([colour, alpha], axis=-1)
-    return pixels
-
-
-def _decoded(colours: F32, image: Any) -> F32:
-    """Linear colours of an image's numbers."""
-    is_linear = image.is_float or image.colorspace_settings.name in RAW_SPACES
-    return colours if is_linear else linear_from_srgb(colours)
-
-
-def linear_from_srgb(encoded: F32) -> F32:
-    """IEC 61966-2-1, inverse."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(
-        np.float32
-    )

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linear pixels of Blender's images, as Cycles has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from enfilade_blender.image_files import F32
+
+RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
+OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
+
+
+def image_colours(node: Any) -> F32:
+    """Linear RGB of an image node (H, W, 3), the first row on top, as Cycles has it.
+
+    Colours are multiplied by alpha, before they are decoded, unless the node's output Alpha is used. Blender
+    keeps images of bytes without that product, and those of floats with it.
+    """
+    image = node.image
+    rgba = _stored_pixels(image)
+    colours, alpha = rgba[..., :3], rgba[..., 3:]
+    if _has_alpha(image):
+        is_alone = not node.outputs["Alpha"].is_linked
+        if is_alone and not image.is_float:
+            colours = colours * alpha
+        elif image.is_float and not is_alone:
+            colours = colours / np.where(alpha > 0.0, alpha, 1.0).astype(np.float32)
+    return np.ascontiguousarray(_decoded(colours, image))
+
+
+def _has_alpha(image: Any) -> bool:
+    """Whether Cycles takes an image's fourth channel as alpha, and it may be below 1."""
+    is_channel = image.alpha_mode in ("CHANNEL_PACKED", "NONE") or image.colorspace_settings.is_data
+    return not is_channel and image.depth not in OPAQUE_DEPTHS
+
+
+def is_as_stored(node: Any) -> bool:
+    """Whether an image node's colours are those of the image's file."""
+    image = node.image
+    if not _has_alpha(image) or (image.alpha_mode == "PREMUL") != node.outputs["Alpha"].is_linked:
+        return True
+    return bool(_stored_pixels(image)[..., 3].min() >= 1.0)
+
+
+def linear_pixels(image: Any) -> F32:
+    """Linear RGBA of a Blender image (H, W, 4), the first row on top."""
+    rgba = _stored_pixels(image)
+    return np.ascontiguousarray(np.concatenate([_decoded(rgba[..., :3], image), rgba[..., 3:]], axis=-1))
+
+
+def _stored_pixels(image: Any) -> F32:
+    """Numbers of a Blender image (H, W, 4), the first row on top."""
+    width, height = image.size
+    values = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    pixels = values.reshape(height, width, image.channels)[::-1]
+    if image.channels < 4:
+        alpha = np.ones((height, width, 1), np.float32)
+        colour = pixels if image.channels == 3 else np.repeat(pixels[..., :1], 3, axis=-1)
+        pixels = np.concatenate([colour, alpha], axis=-1)
+    return pixels
+
+
+def _decoded(colours: F32, image: Any) -> F32:
+    """Linear colours of an image's numbers."""
+    is_linear = image.is_float or image.colorspace_settings.name in RAW_SPACES
+    return colours if is_linear else linear_from_srgb(colours)
+
+
+def linear_from_srgb(encoded: F32) -> F32:
+    """IEC 61966-2-1, inverse."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )
