@@ -1,13 +1,18 @@
 """Functions from Blender's parameters to Mitsuba's."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
-from enfilade_blender.materials.textures import file_stem
+from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
+from enfilade_blender.materials.textures import Textures, file_stem
+from enfilade_blender.materials.values import AttributeValue, Output
+from enfilade_blender.notes import Notes
 
 
 @pytest.mark.parametrize(("level", "factor"), [(0.0, 0.0), (0.5, 1.0), (1.0, 2.0)])
@@ -75,3 +80,15 @@ def test_file_names_are_short_enough_for_any_disk(letter):
 
 def test_file_names_lack_the_characters_that_mitsuba_reads():
     assert file_stem("cost $5: a/b.c") == "cost _5_ a_b_c"
+
+
+def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_path):
+    notes = Notes()
+    context = Context("wall", Textures(tmp_path, notes), notes)
+    value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "Paint")
+    as_it_is = Surface(None, emitted=(Radiance(value, 1.0),)).radiance(context)
+    assert as_it_is.get("type") == "mesh_attribute"
+    assert notes.to_list() == []
+    assert inverted(value, context) == 0.5
+    assert Surface(None, emitted=(Radiance(value, 3.0),)).radiance(context) == (1.5, 1.5, 1.5)
+    assert [(note["object"], note["node"]) for note in notes.to_list()] == [("Paint", "Paint node")]
