@@ -4,7 +4,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from studies.blender.__main__ import read_exr
+from studies.blender.command import read_exr
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
