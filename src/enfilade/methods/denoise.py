@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -40,10 +41,7 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
     -----
     About 5 microseconds of CPU time a pixel at its highest quality, 1 at its fastest.
     """
-    if why := why_no_denoiser():
-        raise SettingsError(why)
-    import pyoidn
-
+    pyoidn = _library()
     guides = {
         name: np.ascontiguousarray(a, np.float32) for name, a in (("albedo", albedo), ("normal", normal))
     }
@@ -74,12 +72,17 @@ def denoise_displayed(color: F32) -> F32:
     -----
     About 2 microseconds of CPU time a pixel.
     """
+    pyoidn = _library()
+    found: F32 = pyoidn.denoise(np.ascontiguousarray(color, np.float32), hdr=False, quality="balanced")
+    return found
+
+
+def _library() -> Any:
     if why := why_no_denoiser():
         raise SettingsError(why)
     import pyoidn
 
-    found: F32 = pyoidn.denoise(np.ascontiguousarray(color, np.float32), hdr=False, quality="balanced")
-    return found
+    return pyoidn
 
 
 def denoiser_name() -> str:
