@@ -159,6 +159,30 @@ def test_limits_of_slurm(begun, slurm, monkeypatch):
         submit(begun, "slurm", 2, {"timeout_min": "1h"}, print)
 
 
+def test_a_command_that_has_just_been_started_ends_with_its_job(monkeypatch):
+    class Popen(subprocess.Popen):
+        """Out of time as soon as the process exists."""
+
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            started.append(self)
+            os.kill(os.getpid(), signal.SIGUSR2)
+
+    def out_of_time(*_):
+        raise SystemExit
+
+    started: list[subprocess.Popen] = []
+    monkeypatch.setattr(farm.subprocess, "Popen", Popen)
+    before = signal.signal(signal.SIGUSR2, out_of_time)
+    try:
+        with pytest.raises(SystemExit):
+            farm.Command(["sleep", "3600"])()
+        assert started[0].poll() == -signal.SIGKILL
+    finally:
+        signal.signal(signal.SIGUSR2, before)
+        started[0].kill()
+
+
 def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, monkeypatch):
     script(tmp_path / "enfilade", f"echo $$ > {tmp_path / 'pid'}; exec sleep 3600\n")
     monkeypatch.setattr(farm, "_executable", lambda: str(tmp_path / "enfilade"))
@@ -170,9 +194,7 @@ def test_a_command_that_is_out_of_time_is_queued_again(begun, slurm, tmp_path, m
         job.send_signal(signal.SIGUSR2)
         _, errors = job.communicate(timeout=120)
     assert (tmp_path / "requeued").read_text() == "100\n", errors
-    # It is signalled; when it is gone depends on the machine.
-    pid = (tmp_path / "pid").read_text().strip()
-    wait_for(lambda: not Path(f"/proc/{pid}").exists())
+    assert not Path(f"/proc/{(tmp_path / 'pid').read_text().strip()}").exists()
     assert (begun / "slurm" / "100_submitted.pkl").exists()
     assert not (begun / "slurm" / "100_0_result.pkl").exists()
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from collections import Counter, deque
@@ -108,12 +109,15 @@ class Command:
             It failed.
         """
         last: deque[str] = deque(maxlen=TAIL)
+        # submitit ends the job from within a handler of this signal: not before the process can be killed.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR2})
         with subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace") as process:  # noqa: S603
             try:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
                 for text in process.stderr or ():
                     sys.stderr.write(text)
                     last.append(text)
-            except BaseException:  # submitit ends the job from within a signal handler
+            except BaseException:
                 process.kill()
                 raise
         if process.returncode:
