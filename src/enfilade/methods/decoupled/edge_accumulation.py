@@ -20,7 +20,6 @@ from enfilade.records import F32, Geometry, Mask, SurfaceClass
 # Of the samples' deviation: rays are stratified, and textures have less noise than their contrast tells. With
 # the whole deviation pictures on a wall are blurred; half of it keeps nine tenths of the gain at metal edges.
 NOISE_SHARE = 0.5
-DISPLAY_STEP = 1.0 / 255.0  # of a display of 8 bits: smaller changes leave what is above white as it is
 
 
 def upload_displayed(
@@ -64,8 +63,7 @@ def accumulate_refined(
 ) -> F32:
     """Average the refined pixels of a frame with neighbouring frames.
 
-    A pixel above white that others show darker becomes as dark as the average. If it stayed white, while
-    darker pixels become brighter, edges before a sky would gain light.
+    Radiance above white stays: the sum of the frames' light is kept.
 
     Parameters
     ----------
@@ -84,7 +82,5 @@ def accumulate_refined(
     (H, W, 3) float32
         Linear radiance; pixels that are not refined stay.
     """
-    white = np.float32(2.0**-exposure_ev)
-    change = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
-    found: F32 = np.where(change < -DISPLAY_STEP, np.minimum(color, white), color) + change * white
-    return found
+    change: F32 = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
+    return color + change * np.float32(2.0**-exposure_ev)
