@@ -1,7 +1,5 @@
 """Mitsuba scenes of spheres of every material, and of panes, in an illuminated corner."""
 
-from functools import cache
-
 import numpy as np
 
 from enfilade.camera.pinhole import Camera, look_at
@@ -89,10 +87,13 @@ def pixels_of(camera: Camera) -> np.ndarray:
     return np.arange(camera.width * camera.height, dtype=np.uint32)
 
 
-@cache
 def integrator_of(renderer: MitsubaRenderer) -> Integrator:
-    """One integrator a renderer, whose kernels are recorded once."""
-    return Integrator(renderer)
+    """One integrator a renderer, whose kernels are recorded once; freed with its renderer."""
+    held = vars(renderer)
+    if "integrator" not in held:
+        held["integrator"] = Integrator(renderer)
+    integrator: Integrator = held["integrator"]
+    return integrator
 
 
 def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> list[Shading]:

@@ -7,90 +7,27 @@ from enfilade.arrays import lanes
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, positions
 from enfilade.images import write_exr
-from enfilade.kernels.estimate import Estimate
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
-from enfilade.records import Shading
-from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from support.material_scene import (
-    MATERIALS,
-    PIXEL_ANGLE,
-    front_camera,
-    integrator_of,
-    opened_scene,
-    pixels_of,
-    traced_irradiance,
+from support.integrated import (
+    EMPTY,
+    LUMINANCE,
+    assert_same_in_chunks,
+    cache_of,
+    estimated,
+    gathered,
+    shaded,
+    standard_errors,
+    traced,
 )
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-EMPTY = IrradianceCache()
+from support.material_scene import MATERIALS, front_camera, opened_scene, traced_irradiance
 
 
-def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> Shading:
-    """Diffuse and specular radiance together."""
-    integrator = integrator_of(renderer)
-
-    def radiance(rays, rng, qmc_point):
-        at = {"pixel_angle": PIXEL_ANGLE}
-        diffuse = integrator.diffuse_radiance(irradiance, irradiance, rays, rng, **at).layers[0]
-        specular = integrator.specular_radiance(irradiance, rays, rng, qmc_point, **at)
-        return diffuse + sum(specular.layers)
-
-    return estimated(radiance, camera, spp, **more)[0]
-
-
-def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> list[Shading]:
-    """Irradiance by final gathering, direct and indirect."""
-
-    def radiance(rays, rng, qmc_point):
-        return integrator_of(renderer).final_gather(irradiance, rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE)
-
-    return estimated(radiance, camera, spp, layers=2, **more)
-
-
-def estimated(
-    radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None
-):
-    estimate = Estimate(
-        camera,
-        pixels_of(camera)[:pixels],
-        radiance,
-        chunk=chunk,
-        pixel_filter=pixel_filter,
-        random=RandomKey(2, 0, Purpose.DIFFUSE),
-        layers=layers,
-        is_stratified=True,
-    )
-    estimate.add(spp)
-    return estimate.shadings
-
-
-def traced(renderer, camera: Camera, spp: int) -> Shading:
-    return renderer.trace(camera, pixels_of(camera), RandomKey(1, 0, Purpose.REFERENCE), spp=spp)
-
-
-def cache_of(*images) -> IrradianceCache:
-    return IrradianceCache.of([upload(*image) for image in images], [1.0] * len(images))
-
-
-def standard_errors(ours: Shading, reference: Shading, where=slice(None)) -> float:
-    """Difference of energy, in standard errors."""
-    difference = ((ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE)[where].sum()
-    variance = ours.variance.ravel() + reference.variance.ravel()
-    return float(difference / np.sqrt(variance[where].sum()))
-
-
-def test_without_a_cache_every_material_keeps_its_energy(materials):
-    renderer, camera = materials[0], front_camera()
-    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
-    shape_index = find_geometry(renderer, camera).shape_index.ravel()
-    names = renderer.describe().shapes
-    errors = {
-        names[number - 1]: standard_errors(ours, reference, shape_index == number)
-        for number in np.unique(shape_index[shape_index > 0])
-    }
-    assert set(MATERIALS) < set(errors)
-    # Of 15 shapes one exceeds four standard errors once in 1000 runs.
-    assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+@pytest.fixture(scope="module")
+def diffuse(tmp_path_factory):
+    """Diffuse balls, with the irradiance of two images: pairs of G-buffer and record."""
+    balls = {"one": MATERIALS["diffuse"], "two": MATERIALS["diffuse"]}
+    renderer = opened_scene(tmp_path_factory.mktemp("diffuse"), balls)
+    return renderer, [traced_irradiance(renderer, front_camera(x=x)) for x in (-0.5, 0.5)]
 
 
 def test_without_a_cache_partly_transparent_surfaces_keep_their_energy(tmp_path):
@@ -182,18 +119,6 @@ def test_surfaces_in_no_image_are_path_traced(diffuse):
     assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
 
 
-def test_final_gathering_converges_to_path_traced_irradiance(materials):
-    renderer, irradiance = materials
-    camera = front_camera()
-    filled = cache_of((find_geometry(renderer, camera), irradiance))
-    for cached, bias in ((EMPTY, 0.0), (filled, 0.02)):
-        found = gathered(renderer, cached, camera, 64)
-        for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
-            error = standard_errors(ours, reference)
-            deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
-            assert abs(error) < 4.0 + bias * (reference.color @ LUMINANCE).sum() / deviation
-
-
 def test_final_gathering_under_an_environment_map(tmp_path):
     # Directions in which the sampled lobe reflects nothing count as samples, too.
     rows = np.linspace(0.2, 0.6, 16, dtype=np.float32)
@@ -259,12 +184,6 @@ def test_other_scenes_may_be_open(tmp_path):
         np.testing.assert_array_equal(lobes(renderer), alone)
 
 
-def test_chunks_change_no_byte(materials, diffuse):
+def test_chunks_change_no_byte(diffuse):
     # The number of lanes of a recorded kernel is padded, also that of the last chunk.
-    camera = front_camera(24, 18)
-    for renderer, of in ((materials[0], EMPTY), (diffuse[0], cache_of(*diffuse[1]))):
-        one, many = (
-            shaded(renderer, of, camera, 4, chunk=chunk, pixel_filter=PixelFilter.GAUSSIAN)
-            for chunk in (1 << 20, 600)
-        )
-        np.testing.assert_array_equal(one.color, many.color)
+    assert_same_in_chunks(diffuse[0], cache_of(*diffuse[1]))

@@ -5,7 +5,7 @@ import numpy as np
 from enfilade.gbuffer import find_geometry
 from enfilade.methods.decoupled import surface_edges as kernel
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE
-from support.material_scene import front_camera, opened_scene
+from support.material_scene import MATERIALS, front_camera, opened_scene
 from twins import surface_edges as twin
 
 
@@ -18,8 +18,9 @@ def block(angle: float, width: float) -> str:
     )
 
 
-def test_the_kernel_finds_the_edges_of_the_loops(materials):
-    geometry = find_geometry(materials[0], front_camera(64, 48))
+def test_the_kernel_finds_the_edges_of_the_loops(tmp_path):
+    balls = dict.fromkeys("abcdefghijklm", MATERIALS["diffuse"])
+    geometry = find_geometry(opened_scene(tmp_path, balls), front_camera(64, 48))
     found = kernel.surface_edges(geometry)
     expected = twin.surface_edges(
         geometry,

@@ -1,0 +1,65 @@
+"""The integrator on every material: energy, irradiance, AOVs, the same bytes in chunks."""
+
+import numpy as np
+import pytest
+
+from enfilade.gbuffer import find_geometry
+from support.integrated import (
+    EMPTY,
+    LUMINANCE,
+    assert_same_in_chunks,
+    cache_of,
+    gathered,
+    shaded,
+    standard_errors,
+    traced,
+)
+from support.material_scene import MATERIALS, front_camera, opened_scene, specular_aovs, traced_irradiance
+
+# Alone in this file: while this scene is open, its materials are compiled into the kernels of all scenes.
+
+
+@pytest.fixture(scope="module")
+def materials(tmp_path_factory):
+    """Balls of all materials, and the path traced irradiance of an image."""
+    renderer = opened_scene(tmp_path_factory.mktemp("materials"), MATERIALS)
+    return renderer, traced_irradiance(renderer, front_camera())[1]
+
+
+def test_without_a_cache_every_material_keeps_its_energy(materials):
+    renderer, camera = materials[0], front_camera()
+    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    names = renderer.describe().shapes
+    errors = {
+        names[number - 1]: standard_errors(ours, reference, shape_index == number)
+        for number in np.unique(shape_index[shape_index > 0])
+    }
+    assert set(MATERIALS) < set(errors)
+    # Of 15 shapes one exceeds four standard errors once in 1000 runs.
+    assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+
+
+def test_final_gathering_converges_to_path_traced_irradiance(materials):
+    renderer, irradiance = materials
+    camera = front_camera()
+    filled = cache_of((find_geometry(renderer, camera), irradiance))
+    for cached, bias in ((EMPTY, 0.0), (filled, 0.02)):
+        found = gathered(renderer, cached, camera, 64)
+        for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
+            error = standard_errors(ours, reference)
+            deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+            assert abs(error) < 4.0 + bias * (reference.color @ LUMINANCE).sum() / deviation
+
+
+def test_only_clear_surfaces_have_a_transmission_aov(materials):
+    renderer, camera = materials[0], front_camera()
+    seen, (_, transmitted) = find_geometry(renderer, camera), specular_aovs(renderer, camera)
+    names = renderer.describe().shapes
+    clear = {names[k - 1] for k in np.unique(seen.shape_index.ravel()[transmitted.color.any(axis=1)])}
+    assert clear == {"dielectric", "thindielectric", "glowing air"}
+
+
+def test_chunks_change_no_byte(materials):
+    # The number of lanes of a recorded kernel is padded, also that of the last chunk.
+    assert_same_in_chunks(materials[0], EMPTY)

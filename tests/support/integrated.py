@@ -1,0 +1,76 @@
+"""Radiance and irradiance by the integrator, and by path tracing, of whole images."""
+
+import numpy as np
+
+from enfilade.camera.pinhole import Camera
+from enfilade.kernels.estimate import Estimate
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
+from enfilade.records import Shading
+from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from support.material_scene import PIXEL_ANGLE, front_camera, integrator_of, pixels_of
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+EMPTY = IrradianceCache()
+
+
+def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> Shading:
+    """Diffuse and specular radiance together."""
+    integrator = integrator_of(renderer)
+
+    def radiance(rays, rng, qmc_point):
+        at = {"pixel_angle": PIXEL_ANGLE}
+        diffuse = integrator.diffuse_radiance(irradiance, irradiance, rays, rng, **at).layers[0]
+        specular = integrator.specular_radiance(irradiance, rays, rng, qmc_point, **at)
+        return diffuse + sum(specular.layers)
+
+    return estimated(radiance, camera, spp, **more)[0]
+
+
+def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> list[Shading]:
+    """Irradiance by final gathering, direct and indirect."""
+
+    def radiance(rays, rng, qmc_point):
+        return integrator_of(renderer).final_gather(irradiance, rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE)
+
+    return estimated(radiance, camera, spp, layers=2, **more)
+
+
+def estimated(
+    radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None
+):
+    estimate = Estimate(
+        camera,
+        pixels_of(camera)[:pixels],
+        radiance,
+        chunk=chunk,
+        pixel_filter=pixel_filter,
+        random=RandomKey(2, 0, Purpose.DIFFUSE),
+        layers=layers,
+        is_stratified=True,
+    )
+    estimate.add(spp)
+    return estimate.shadings
+
+
+def traced(renderer, camera: Camera, spp: int) -> Shading:
+    return renderer.trace(camera, pixels_of(camera), RandomKey(1, 0, Purpose.REFERENCE), spp=spp)
+
+
+def cache_of(*images) -> IrradianceCache:
+    return IrradianceCache.of([upload(*image) for image in images], [1.0] * len(images))
+
+
+def standard_errors(ours: Shading, reference: Shading, where=slice(None)) -> float:
+    """Difference of energy, in standard errors."""
+    difference = ((ours.color.reshape(-1, 3) - reference.color.reshape(-1, 3)) @ LUMINANCE)[where].sum()
+    variance = ours.variance.ravel() + reference.variance.ravel()
+    return float(difference / np.sqrt(variance[where].sum()))
+
+
+def assert_same_in_chunks(renderer, irradiance: IrradianceCache) -> None:
+    """The image is the same with all samples at once, and in chunks of which the last is smaller."""
+    one, many = (
+        shaded(renderer, irradiance, front_camera(24, 18), 4, chunk=chunk, pixel_filter=PixelFilter.GAUSSIAN)
+        for chunk in (1 << 20, 600)
+    )
+    np.testing.assert_array_equal(one.color, many.color)
