@@ -11,8 +11,15 @@ sys.path[0] = str(Path(__file__).resolve().parents[1])
 from corpus import details, edges, flat, lights, objects, surfaces  # noqa: E402
 from corpus.stage import save  # noqa: E402
 
-CASES = {case.__name__: case for module in (surfaces, lights, objects) for case in module.CASES}
-UNLISTED = {case.__name__: case for module in (details, edges, flat) for case in module.CASES}  # by `--list`
+
+def cases(module):
+    """The functions of a module that make files, by name."""
+    own = {name: of for name, of in vars(module).items() if getattr(of, "__module__", "") == module.__name__}
+    return {name: of for name, of in own.items() if not name.startswith("_")}
+
+
+CASES = cases(surfaces) | cases(lights) | cases(objects)
+UNLISTED = cases(details) | cases(edges) | cases(flat)  # by `--list`
 
 if __name__ == "__main__":
     if sys.argv[1] == "--list":

@@ -4,7 +4,20 @@
 import bpy
 import numpy as np
 
-from corpus.stage import cube, image, light, node_of, plane, principled, shader, sphere, stage, tiles, world
+from corpus.stage import (
+    cube,
+    fill,
+    image,
+    light,
+    node_of,
+    plane,
+    principled,
+    shader,
+    sphere,
+    stage,
+    tiles,
+    world,
+)  # fmt: skip
 
 
 def details(folder):
@@ -15,8 +28,8 @@ def details(folder):
     key = light("POINT", "Key", (-2.0, -3.0, 4.0), 100.0, shadow_soft_size=0.0)
     key.light_linking.receiver_collection = bpy.data.collections.new("only these")
     _keyed(key.data, "energy", 100.0, 50.0)
-    sphere("Dome", (0.0, 0.0, 0.0), 20.0, shader("dome", "ShaderNodeEmission", Strength=0.3)[0])
-    sphere("Bulb", (1.5, -1.0, 1.5), 0.1, shader("bulb", "ShaderNodeEmission", Strength=9.0)[0])
+    sphere("Dome", (0.0, 0.0, 0.0), 20.0, shader("dome", "Emission", Strength=0.3)[0])
+    sphere("Bulb", (1.5, -1.0, 1.5), 0.1, shader("bulb", "Emission", Strength=9.0)[0])
     cube("material floor", (2.5, 0.0, 0.25), 0.5, principled("plain"))
     cube("cost $5", (-2.5, 0.0, 0.25), 0.5, principled("$5"))
     _procedural_slots()
@@ -48,22 +61,20 @@ def _hidden_world():
     _keyed(value.node_tree.nodes["Background"].inputs[1], "default_value", 1.0, 2.0)
     group = bpy.data.node_groups.new("by ray", "ShaderNodeTree")
     group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
-    ray, end = group.nodes.new("ShaderNodeLightPath"), group.nodes.new("NodeGroupOutput")
-    mix = node_of(group, "ShaderNodeMixRGB", Color1=(0.2, 0.2, 0.2, 1.0), Color2=(0.0, 1.0, 0.0, 1.0))
-    group.links.new(ray.outputs["Is Camera Ray"], mix.inputs["Fac"])
-    group.links.new(mix.outputs[0], end.inputs[0])
-    node = value.node_tree.nodes.new("ShaderNodeGroup")
+    ray, end = node_of(group, "LightPath"), group.nodes.new("NodeGroupOutput")
+    mix = node_of(group, "MixRGB", Color1=(0.2, 0.2, 0.2, 1.0), Color2=(0.0, 1.0, 0.0, 1.0))
+    fill(group, mix, {"Fac": ray.outputs["Is Camera Ray"]})
+    fill(group, end, {0: mix})
+    node = node_of(value.node_tree, "Group")
     node.node_tree = group
-    value.node_tree.links.new(node.outputs[0], value.node_tree.nodes["Background"].inputs[0])
+    fill(value.node_tree, value.node_tree.nodes["Background"], {0: node})
 
 
 def _procedural_slots():
     """One procedural material in two slots, of a mesh with all the UV maps that Blender has."""
-    noise = principled("noise", Roughness=0.9)
-    tree = noise.node_tree
-    texture = node_of(tree, "ShaderNodeTexNoise", Scale=6.0)
-    tree.links.new(texture.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
-    tree.nodes.new("ShaderNodeGroup")  # without a tree
+    noise, tree, bsdf = shader("noise", "BsdfPrincipled", Roughness=0.9)
+    fill(tree, bsdf, {"Base Color": node_of(tree, "TexNoise", Scale=6.0).outputs["Color"]})
+    node_of(tree, "Group")  # without a tree
     box = cube("Slots", (0.0, 0.0, 0.5), 0.8, noise)
     box.data.materials.append(noise)
     for polygon in box.data.polygons:
@@ -74,12 +85,8 @@ def _procedural_slots():
 
 def _corrected_images():
     """One inverted image, on UV maps of different names."""
-    corrected = principled("corrected", **{"Base Color": image("tiles", tiles, 64), "Roughness": 0.9})
-    tree = corrected.node_tree
-    invert = tree.nodes.new("ShaderNodeInvert")
-    source = next(node for node in tree.nodes if node.type == "TEX_IMAGE")
-    tree.links.new(source.outputs["Color"], invert.inputs["Color"])
-    tree.links.new(invert.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    corrected, tree, bsdf = shader("corrected", "BsdfPrincipled", Roughness=0.9)
+    fill(tree, bsdf, {"Base Color": node_of(tree, "Invert", Color=image("tiles", tiles, 64))})
     for x, name in ((-1.0, "UVMap"), (1.0, "another")):
         box = cube(f"corrected {name}", (x, -1.0, 0.2), 0.4, corrected)
         box.data.uv_layers[0].name = name
@@ -88,15 +95,9 @@ def _corrected_images():
 def _tilted_normals():
     """A normal map tilted along u, on UVs that are turned by 90 degrees, beside a procedural roughness."""
     flat = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.8, 0.5, 0.9)), 16, space="Non-Color")
-    tilted = principled("tilted")
-    tree = tilted.node_tree
-    texture, normal = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
-    texture.image = flat
-    noise = node_of(tree, "ShaderNodeTexNoise", Scale=6.0)
-    bsdf = tree.nodes["Principled BSDF"]
-    tree.links.new(texture.outputs["Color"], normal.inputs["Color"])
-    tree.links.new(normal.outputs[0], bsdf.inputs["Normal"])
-    tree.links.new(noise.outputs[0], bsdf.inputs["Roughness"])
+    tilted, tree, bsdf = shader("tilted", "BsdfPrincipled")
+    normal, noise = node_of(tree, "NormalMap", Color=flat), node_of(tree, "TexNoise", Scale=6.0)
+    fill(tree, bsdf, {"Normal": normal, "Roughness": noise})
     board = plane("Tilted", (0.0, -1.5, 0.05), 0.5, tilted)
     for loop in board.data.uv_layers[0].uv:
         u, v = loop.vector
@@ -104,24 +105,19 @@ def _tilted_normals():
 
 
 def _object_colour():
-    coloured, tree, node = shader("coloured", "ShaderNodeBsdfDiffuse")
-    info = tree.nodes.new("ShaderNodeObjectInfo")
-    tree.links.new(info.outputs["Color"], node.inputs["Color"])
-    tree.links.new(info.outputs["Random"], node.inputs["Roughness"])
+    coloured, tree, node = shader("coloured", "BsdfDiffuse")
+    info = node_of(tree, "ObjectInfo")
+    fill(tree, node, {"Color": info.outputs["Color"], "Roughness": info.outputs["Random"]})
     cube("Coloured", (2.0, -1.5, 0.2), 0.3, coloured).color = (0.6, 0.1, 0.2, 1.0)
 
 
 def _animated_gradient():
     """Generated coordinates, scaled by an animated number: no function of the UV map."""
-    rising, tree, node = shader("rising", "ShaderNodeBsdfDiffuse")
-    coordinates, split = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
-    scaled = tree.nodes.new("ShaderNodeMath")
+    rising, tree, node = shader("rising", "BsdfDiffuse")
+    split = node_of(tree, "SeparateXYZ", Vector=node_of(tree, "TexCoord").outputs["Generated"])
+    scaled = node_of(tree, "Math")
     scaled.operation = "MULTIPLY"
     _keyed(scaled.inputs[1], "default_value", 1.0, 0.0)
-    tree.links.new(coordinates.outputs["Generated"], split.inputs[0])
-    tree.links.new(split.outputs["Z"], scaled.inputs[0])
-    tree.links.new(scaled.outputs[0], node.inputs["Color"])
+    fill(tree, scaled, {0: split.outputs["Z"]})
+    fill(tree, node, {"Color": scaled})
     cube("Rising", (-2.0, -1.5, 0.2), 0.3, rising)
-
-
-CASES = (details,)

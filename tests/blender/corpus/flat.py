@@ -7,7 +7,7 @@ import random
 import bpy
 import numpy as np
 
-from corpus.stage import aim, camera, image, light, new_file, node_of, principled, world
+from corpus.stage import aim, camera, fill, image, light, new_file, node_of, shader, world
 
 ROOMS, ROOM_M, HEIGHT_M = 3, 5.0, 2.7
 
@@ -34,18 +34,15 @@ def _materials(chance):
     paints = []
     for i in range(40):
         colour = (*(chance.uniform(0.1, 0.8) for _ in range(3)), 1.0)
-        material = principled(f"paint {i}", **{"Base Color": colour, "Roughness": chance.uniform(0.15, 0.9)})
-        node, tree = material.node_tree.nodes["Principled BSDF"], material.node_tree
+        finish = {"Base_Color": colour, "Roughness": chance.uniform(0.15, 0.9)}
+        material, tree, node = shader(f"paint {i}", "BsdfPrincipled", **finish)
         if i % 3 == 0:
-            noise = node_of(tree, "ShaderNodeTexNoise", Scale=chance.uniform(2.0, 9.0))
-            ramp = tree.nodes.new("ShaderNodeValToRGB")
+            noise = node_of(tree, "TexNoise", Scale=chance.uniform(2.0, 9.0))
+            ramp = node_of(tree, "ValToRGB", Fac=noise)
             ramp.color_ramp.elements[1].color = colour
-            tree.links.new(noise.outputs[0], ramp.inputs[0])
-            tree.links.new(ramp.outputs[0], node.inputs["Base Color"])
+            fill(tree, node, {"Base Color": ramp})
         elif i % 3 == 1:
-            texture = tree.nodes.new("ShaderNodeTexImage")
-            texture.image = image(f"print {i}", lambda x, y, k=i: _print(x, y, k), 128)
-            tree.links.new(texture.outputs[0], node.inputs["Base Color"])
+            fill(tree, node, {"Base Color": image(f"print {i}", lambda x, y, k=i: _print(x, y, k), 128)})
         elif i % 2:
             node.inputs["Metallic"].default_value = 1.0
         paints.append(material)
@@ -94,11 +91,8 @@ def _box(name, place, size, material):
 
 def _daylight():
     tree = world((1.0, 1.0, 1.0), 1.0).node_tree
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture = node_of(tree, "TexEnvironment")
     texture.image = image("sky", lambda _x, y: np.stack([0.4 + 0.3 * y, 0.5 + 0.3 * y, 0.7 + 0.3 * y], -1))
-    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs[0])
+    fill(tree, tree.nodes["Background"], {0: texture})
     sun = light("SUN", "Sun", (0.0, -5.0, 6.0), 2.0, angle=math.radians(0.5))
     aim(sun, (3.0, 2.0, 0.0))
-
-
-CASES = (flat,)

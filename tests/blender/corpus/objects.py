@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of instances, modifiers, cameras, names and links."""
 
-import math
 from pathlib import Path
 
 import bpy
@@ -22,21 +21,14 @@ from corpus.stage import (
     tiles,
 )
 
+COLOURS = (0.7, 0.1, 0.1, 1), (0.1, 0.7, 0.1, 1), (0.1, 0.1, 0.7, 1)
+
 
 def instances(folder):
     stage()
-    chair = cube(
-        "Chair",
-        (0.0, 0.0, 0.25),
-        0.5,
-        principled("chair", **{"Base Color": (0.7, 0.3, 0.1, 1), "Roughness": 0.5}),
-    )
-    knob = sphere(
-        "Knob",
-        (0.0, 0.0, 0.65),
-        0.15,
-        principled("knob", **{"Base Color": (0.8, 0.8, 0.8, 1), "Metallic": 1.0, "Roughness": 0.2}),
-    )
+    brown = principled("chair", (0.7, 0.3, 0.1, 1), Roughness=0.5)
+    chair = cube("Chair", (0.0, 0.0, 0.25), 0.5, brown)
+    knob = sphere("Knob", (0.0, 0.0, 0.65), 0.15, principled("knob", Metallic=1.0, Roughness=0.2))
     group = bpy.data.collections.new("Chairs")
     for obj in (chair, knob):
         bpy.context.scene.collection.objects.unlink(obj)
@@ -49,15 +41,14 @@ def instances(folder):
 
 def modifiers(folder):
     stage()
-    three([principled(f"grey {i}", **{"Base Color": (0.6, 0.5, 0.4, 1), "Roughness": 0.4}) for i in range(3)])
+    three(*(principled(f"grey {i}", (0.6, 0.5, 0.4, 1), Roughness=0.4) for i in range(3)))
     soft = bpy.data.objects["Middle"]
     level = soft.modifiers.new("Subdivision", "SUBSURF")
     level.levels, level.render_levels = 0, 3
     row = bpy.data.objects["Left"].modifiers.new("Array", "ARRAY")
     row.count, row.relative_offset_displace = 2, (0.0, 1.1, 0.0)
-    bevel = cube("Box", (0.0, -1.2, 0.25), 0.5, principled("box", Roughness=0.6)).modifiers.new(
-        "Bevel", "BEVEL"
-    )
+    box = cube("Box", (0.0, -1.2, 0.25), 0.5, principled("box", Roughness=0.6))
+    bevel = box.modifiers.new("Bevel", "BEVEL")
     bevel.width, bevel.segments = 0.1, 3
     hidden = cube("Hidden", (0.0, -1.8, 0.8), 0.8, principled("hidden"))
     hidden.hide_render = True
@@ -67,12 +58,7 @@ def modifiers(folder):
 
 def geometry_nodes(folder):
     stage()
-    pebble = sphere(
-        "Pebble",
-        (0.0, 0.0, -5.0),
-        0.12,
-        principled("pebble", **{"Base Color": (0.6, 0.2, 0.5, 1), "Roughness": 0.4}),
-    )
+    pebble = sphere("Pebble", (0.0, 0.0, -5.0), 0.12, principled("pebble", (0.6, 0.2, 0.5, 1), Roughness=0.4))
     pebble.hide_render = True
     ground = plane("Ground", (0.0, 0.0, 0.05), 3.0, principled("ground", Roughness=0.9))
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
@@ -95,12 +81,7 @@ def geometry_nodes(folder):
 
 def markers(folder):
     scene, _ = stage()
-    three(
-        [
-            principled(f"colour {i}", **{"Base Color": (*c, 1)})
-            for i, c in enumerate([(0.7, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.1, 0.7)])
-        ]
-    )
+    three(*(principled(f"colour {i}", c) for i, c in enumerate(COLOURS)))
     scene.frame_start, scene.frame_end = 5, 12
     first = scene.camera
     first.name = "Wide"
@@ -116,31 +97,22 @@ def markers(folder):
 
 def lens_shift(folder):
     scene, _ = stage()
-    three(
-        [
-            principled(f"colour {i}", **{"Base Color": (*c, 1)})
-            for i, c in enumerate([(0.7, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.1, 0.7)])
-        ]
-    )
+    three(*(principled(f"colour {i}", c) for i, c in enumerate(COLOURS)))
     data = scene.camera.data
     data.shift_x, data.shift_y, data.sensor_fit, data.sensor_height = 0.15, -0.1, "VERTICAL", 22.0
 
 
 def agx(folder):
     scene, _ = stage()
-    three([principled(f"grey {i}", **{"Base Color": (0.5, 0.5, 0.5, 1)}) for i in range(3)])
+    three(*(principled(f"grey {i}", (0.5, 0.5, 0.5, 1)) for i in range(3)))
     scene.view_settings.view_transform, scene.view_settings.look = "AgX", "AgX - Punchy"
     scene.view_settings.exposure = 0.7
 
 
 def names(folder):
     stage()
-    three(
-        [
-            principled(name, **{"Base Color": image(f"bild {name}", tiles), "Roughness": 0.7})
-            for name in ("grün", "模型 1", 'a/b: <c> & "d".001')
-        ]
-    )
+    scripts = ("grün", "模型 1", 'a/b: <c> & "d".001')
+    three(*(principled(name, image(f"bild {name}", tiles), Roughness=0.7) for name in scripts))
     bpy.data.objects["Left"].name = "Stühle é.001"
     bpy.data.objects["Middle"].name = "椅子 <1>"
     bpy.data.objects["Right"].name = "a/b\\c"
@@ -149,30 +121,19 @@ def names(folder):
 def missing_image(folder):
     stage()
     lost = bpy.data.images.load(str(_written(folder, "lost.png")))
-    three(
-        [
-            principled("lost", **{"Base Color": lost, "Roughness": 0.7}),
-            principled("kept"),
-            principled("lost too", **{"Base Color": lost}),
-        ]
-    )
+    three(principled("lost", lost, Roughness=0.7), principled("kept"), principled("lost too", lost))
     return (Path(folder) / "lost.png").unlink
 
 
 def image_file(folder):
     stage()
     picture = bpy.data.images.load(str(_written(folder, "picture é.png")))
-    three([principled(f"picture {r}", **{"Base Color": picture, "Roughness": r}) for r in (0.3, 0.6, 0.9)])
+    three(*(principled(f"picture {r}", picture, Roughness=r) for r in (0.3, 0.6, 0.9)))
 
 
 def library(folder):
     new_file()
-    shelf = cube(
-        "Shelf",
-        (0.0, 0.0, 0.0),
-        0.9,
-        principled("shelf", **{"Base Color": (0.2, 0.5, 0.3, 1), "Roughness": 0.5}),
-    )
+    shelf = cube("Shelf", (0.0, 0.0, 0.0), 0.9, principled("shelf", (0.2, 0.5, 0.3, 1), Roughness=0.5))
     shelf.rotation_euler = (0.0, 0.0, 0.3)
     file = save(folder, "shelf of a library")
     stage()
@@ -188,17 +149,14 @@ def library(folder):
 
 def two_slots(folder):
     stage()
-    three([principled("paint", **{"Base Color": (0.7, 0.2, 0.1, 1), "Roughness": 0.4}) for _ in range(3)])
+    three(*(principled("paint", (0.7, 0.2, 0.1, 1), Roughness=0.4) for _ in range(3)))
     for name in ("Left", "Middle", "Right"):
         data = bpy.data.objects[name].data
-        data.materials.append(
-            principled(
-                f"second {name}", **{"Base Color": (0.9, 0.9, 0.9, 1), "Metallic": 1.0, "Roughness": 0.25}
-            )
-        )
+        steel = {"colour": (0.9, 0.9, 0.9, 1), "Metallic": 1.0, "Roughness": 0.25}
+        data.materials.append(principled(f"second {name}", **steel))
         for polygon in data.polygons:
             polygon.material_index = int(polygon.center.z > 0.1)
-    aim(bpy.data.objects["Camera"], (0.0, 0.0, 0.6 * math.sqrt(1.0)))
+    aim(bpy.data.objects["Camera"], (0.0, 0.0, 0.6))
 
 
 def _written(folder, name):
@@ -206,18 +164,3 @@ def _written(folder, name):
     picture.filepath_raw, picture.file_format = str(Path(folder) / name), "PNG"
     picture.save()
     return Path(folder) / name
-
-
-CASES = (
-    instances,
-    modifiers,
-    geometry_nodes,
-    markers,
-    lens_shift,
-    agx,
-    names,
-    missing_image,
-    image_file,
-    library,
-    two_slots,
-)

@@ -24,22 +24,9 @@ def new_file():
 
 def stage(*, lit=True):
     scene = new_file()
-    floor = plane(
-        "Floor",
-        (0.0, 0.0, 0.0),
-        8.0,
-        principled(
-            "floor", **{"Base Color": (0.45, 0.42, 0.4, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
-        ),
-    )
-    wall = plane(
-        "Wall",
-        (0.0, 3.0, 2.0),
-        8.0,
-        principled(
-            "wall", **{"Base Color": (0.3, 0.45, 0.6, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
-        ),
-    )
+    matt = {"Roughness": 1.0, "Specular_IOR_Level": 0.0}
+    floor = plane("Floor", (0.0, 0.0, 0.0), 8.0, principled("floor", (0.45, 0.42, 0.4, 1), **matt))
+    wall = plane("Wall", (0.0, 3.0, 2.0), 8.0, principled("wall", (0.3, 0.45, 0.6, 1), **matt))
     wall.rotation_euler = (math.pi / 2, 0.0, 0.0)
     if lit:
         light("AREA", "Key", (-2.0, -3.0, 4.0), 150.0, target=(0, 0, 0.5), size=1.5)
@@ -111,46 +98,52 @@ def finish(name, material):
     return obj
 
 
-def three(materials):
-    """Three objects in a row: a sphere, a cube, and a sphere."""
-    first, second, third = materials
+def three(first, second, third):
+    """Three objects of three materials in a row: a sphere, a cube, and a sphere."""
     sphere("Left", (-1.35, 0.0, 0.61), 0.6, first)
     cube("Middle", (0.0, 0.2, 0.46), 0.9, second).rotation_euler = (0.0, 0.0, 0.5)
     sphere("Right", (1.35, 0.0, 0.61), 0.6, third)
 
 
-def principled(name, **inputs):
-    """A Principled material; an image or an output of a node is linked."""
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    tree = material.node_tree
-    node = tree.nodes["Principled BSDF"]
-    for key, value in inputs.items():
-        if isinstance(value, bpy.types.Image):
-            texture = tree.nodes.new("ShaderNodeTexImage")
-            texture.image = value
-            tree.links.new(texture.outputs["Color"], node.inputs[key])
-        else:
-            node.inputs[key].default_value = value
-    return material
+def principled(name, colour=(0.8, 0.8, 0.8, 1), **inputs):
+    """A material of one Principled BSDF, see :func:`node_of`."""
+    return shader(name, "BsdfPrincipled", Base_Color=colour, **inputs)[0]
 
 
 def shader(name, kind, **inputs):
-    """A material of one shader node; its tree and that node."""
+    """A material of one shader node, see :func:`node_of`; its tree and that node."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
     tree.nodes.remove(tree.nodes["Principled BSDF"])
     node = node_of(tree, kind, **inputs)
-    tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    fill(tree, tree.nodes["Material Output"], {"Surface": node})
     return material, tree, node
 
 
 def node_of(tree, kind, **inputs):
-    node = tree.nodes.new(kind)
-    for key, value in inputs.items():
-        node.inputs[key].default_value = value
+    """A node of a kind of shader nodes; `_` in the name of an input is a space, see :func:`fill`."""
+    node = tree.nodes.new(f"ShaderNode{kind}")
+    fill(tree, node, {key.replace("_", " "): value for key, value in inputs.items()})
     return node
+
+
+def fill(tree, node, inputs):
+    """Set inputs of a node, by name or number: to a value, an image, a node's first output, or an output."""
+    for key, value in inputs.items():
+        source = picture(tree, value) if isinstance(value, bpy.types.Image) else value
+        source = source.outputs[0] if isinstance(source, bpy.types.Node) else source
+        if isinstance(source, bpy.types.NodeSocket):
+            tree.links.new(source, node.inputs[key])
+        else:
+            node.inputs[key].default_value = value
+
+
+def picture(tree, of):
+    """An Image Texture."""
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = of
+    return texture
 
 
 def image(name, function, size=256, *, space="sRGB", alpha=None):

@@ -4,159 +4,90 @@
 import bpy
 import numpy as np
 
-from corpus.stage import image, light, node_of, plane, principled, shader, stage, three, tiles
+from corpus.stage import fill, image, light, node_of, picture, plane, principled, shader, stage, three, tiles
 
 
 def diffuse(folder):
     stage()
-    three(
-        [
-            shader(f"diffuse {i}", "ShaderNodeBsdfDiffuse", Color=(*c, 1))[0]
-            for i, c in enumerate([(0.8, 0.2, 0.2), (0.7, 0.7, 0.7), (0.1, 0.5, 0.2)])
-        ]
-    )
+    colours = (0.8, 0.2, 0.2, 1), (0.7, 0.7, 0.7, 1), (0.1, 0.5, 0.2, 1)
+    three(*(shader(f"diffuse {i}", "BsdfDiffuse", Color=c)[0] for i, c in enumerate(colours)))
 
 
 def plastic(folder):
     stage()
-    three(
-        [
-            principled(f"plastic {r}", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": r})
-            for r in (0.15, 0.3, 0.6)
-        ]
-    )
+    three(*(principled(f"plastic {r}", (0.7, 0.15, 0.1, 1), Roughness=r) for r in (0.15, 0.3, 0.6)))
 
 
 def plastic_smooth(folder):
     stage()
     three(
-        [
-            principled("red", **{"Base Color": (0.7, 0.15, 0.1, 1), "Roughness": 0.0}),
-            principled("white", **{"Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.5, "IOR": 1.7}),
-            principled(
-                "black", **{"Base Color": (0.01, 0.01, 0.01, 1), "Roughness": 0.1, "Specular IOR Level": 1.0}
-            ),
-        ]
+        principled("red", (0.7, 0.15, 0.1, 1), Roughness=0.0),
+        principled("white", Roughness=0.5, IOR=1.7),
+        principled("black", (0.01, 0.01, 0.01, 1), Roughness=0.1, Specular_IOR_Level=1.0),
     )
 
 
 def metal(folder):
     stage()
-    three(
-        [
-            principled(f"metal {r}", **{"Base Color": (0.9, 0.65, 0.3, 1), "Metallic": 1.0, "Roughness": r})
-            for r in (0.0, 0.3, 0.7)
-        ]
-    )
+    gold = {"colour": (0.9, 0.65, 0.3, 1), "Metallic": 1.0}
+    three(*(principled(f"metal {r}", **gold, Roughness=r) for r in (0.0, 0.3, 0.7)))
 
 
 def metal_image(folder):
     stage()
-    colours = image("tiles", tiles)
-    three(
-        [
-            principled(f"metal {r}", **{"Base Color": colours, "Metallic": 1.0, "Roughness": r})
-            for r in (0.1, 0.3, 0.6)
-        ]
-    )
+    printed = {"colour": image("tiles", tiles), "Metallic": 1.0}
+    three(*(principled(f"metal {r}", **printed, Roughness=r) for r in (0.1, 0.3, 0.6)))
 
 
 def glossy(folder):
     stage()
-    three(
-        [
-            shader(f"glossy {r}", "ShaderNodeBsdfAnisotropic", Color=(0.8, 0.8, 0.7, 1), Roughness=r)[0]
-            for r in (0.05, 0.25, 0.6)
-        ]
-    )
+    grey = {"Color": (0.8, 0.8, 0.7, 1)}
+    three(*(shader(f"glossy {r}", "BsdfAnisotropic", **grey, Roughness=r)[0] for r in (0.05, 0.25, 0.6)))
 
 
 def glass(folder):
     stage()
-    clear = {"Transmission Weight": 1.0, "Roughness": 0.0, "IOR": 1.45}
+    clear = {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.45}
     three(
-        [
-            principled("clear", **clear, **{"Base Color": (1, 1, 1, 1)}),
-            principled("green", **clear, **{"Base Color": (0.5, 0.9, 0.6, 1)}),
-            shader("glass", "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.5)[0],
-        ]
+        principled("clear", (1, 1, 1, 1), **clear),
+        principled("green", (0.5, 0.9, 0.6, 1), **clear),
+        shader("glass", "BsdfGlass", Roughness=0.0, IOR=1.5)[0],
     )
 
 
 def glass_rough(folder):
     stage()
-    three(
-        [
-            principled(
-                f"rough {r}", **{"Base Color": (1, 1, 1, 1), "Transmission Weight": 1.0, "Roughness": r}
-            )
-            for r in (0.1, 0.3, 0.5)
-        ]
-    )
+    clear = {"colour": (1, 1, 1, 1), "Transmission_Weight": 1.0}
+    three(*(principled(f"rough {r}", **clear, Roughness=r) for r in (0.1, 0.3, 0.5)))
 
 
 def coat(folder):
     stage()
+    red, blue, yellow = (0.6, 0.05, 0.05, 1), (0.2, 0.3, 0.7, 1), (0.6, 0.5, 0.05, 1)
     three(
-        [
-            principled(
-                "coated plastic",
-                **{
-                    "Base Color": (0.6, 0.05, 0.05, 1),
-                    "Roughness": 0.8,
-                    "Coat Weight": 1.0,
-                    "Coat Roughness": 0.05,
-                },
-            ),
-            principled(
-                "coated metal",
-                **{"Base Color": (0.2, 0.3, 0.7, 1), "Metallic": 1.0, "Roughness": 0.5, "Coat Weight": 1.0},
-            ),
-            principled(
-                "half a coat", **{"Base Color": (0.6, 0.5, 0.05, 1), "Roughness": 0.5, "Coat Weight": 0.5}
-            ),
-        ]
+        principled("coated plastic", red, Roughness=0.8, Coat_Weight=1.0, Coat_Roughness=0.05),
+        principled("coated metal", blue, Metallic=1.0, Roughness=0.5, Coat_Weight=1.0),
+        principled("half a coat", yellow, Roughness=0.5, Coat_Weight=0.5),
     )
 
 
 def sheen(folder):
     stage()
-    three(
-        [
-            principled(
-                f"cloth {w}", **{"Base Color": (0.1, 0.12, 0.3, 1), "Roughness": 0.9, "Sheen Weight": w}
-            )
-            for w in (0.3, 0.6, 1.0)
-        ]
-    )
+    cloth = {"colour": (0.1, 0.12, 0.3, 1), "Roughness": 0.9}
+    three(*(principled(f"cloth {w}", **cloth, Sheen_Weight=w) for w in (0.3, 0.6, 1.0)))
 
 
 def emission(folder):
     stage()
     bpy.data.objects["Key"].data.energy = 20.0
+    orange, shown = (1, 0.6, 0.3, 1), image("tiles", tiles)
     three(
-        [
-            principled(
-                "glow",
-                **{"Base Color": (0, 0, 0, 1), "Emission Color": (1, 0.6, 0.3, 1), "Emission Strength": 3.0},
-            ),
-            shader("emission", "ShaderNodeEmission", Color=(0.2, 0.5, 1, 1), Strength=2.0)[0],
-            principled(
-                "picture",
-                **{
-                    "Base Color": (0.1, 0.1, 0.1, 1),
-                    "Emission Color": image("tiles", tiles),
-                    "Emission Strength": 1.0,
-                },
-            ),
-        ]
+        principled("glow", (0, 0, 0, 1), Emission_Color=orange, Emission_Strength=3.0),
+        shader("emission", "Emission", Color=(0.2, 0.5, 1, 1), Strength=2.0)[0],
+        principled("picture", (0.1, 0.1, 0.1, 1), Emission_Color=shown, Emission_Strength=1.0),
     )
-    screen = plane(
-        "Screen",
-        (0.0, 2.0, 1.9),
-        1.2,
-        shader("screen", "ShaderNodeEmission", Color=(1, 1, 1, 1), Strength=1.5)[0],
-    )
+    white = shader("screen", "Emission", Color=(1, 1, 1, 1), Strength=1.5)[0]
+    screen = plane("Screen", (0.0, 2.0, 1.9), 1.2, white)
     screen.rotation_euler = (-1.57, 0.0, 0.0)  # turned away: its back is seen
 
 
@@ -165,20 +96,13 @@ def alpha(folder):
     leaf = image(
         "leaf", tiles, alpha=lambda x, y: ((x - 0.5) ** 2 + (y - 0.5) ** 2 < 0.16).astype(np.float32)
     )
-    cut = principled("cut out", Roughness=0.9)
-    tree = cut.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = leaf
-    node = tree.nodes["Principled BSDF"]
-    tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
-    tree.links.new(texture.outputs["Alpha"], node.inputs["Alpha"])
-    mixed, tree, mix = shader("mixed", "ShaderNodeMixShader")
-    tree.links.new(node_of(tree, "ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
-    tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.3, 0.1, 1)).outputs[0], mix.inputs[2])
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = leaf
-    tree.links.new(texture.outputs["Alpha"], mix.inputs[0])
-    three([principled("half", Alpha=0.5, Roughness=0.9), cut, mixed])
+    cut, tree, node = shader("cut out", "BsdfPrincipled", Roughness=0.9)
+    texture = picture(tree, leaf)
+    fill(tree, node, {"Base Color": texture, "Alpha": texture.outputs["Alpha"]})
+    mixed, tree, mix = shader("mixed", "MixShader")
+    clear, paint = node_of(tree, "BsdfTransparent"), node_of(tree, "BsdfDiffuse", Color=(0.8, 0.3, 0.1, 1))
+    fill(tree, mix, {1: clear, 2: paint, 0: picture(tree, leaf).outputs["Alpha"]})
+    three(principled("half", Alpha=0.5, Roughness=0.9), cut, mixed)
 
 
 def normal_map(folder):
@@ -196,112 +120,78 @@ def normal_map(folder):
         ("half", 0.5, {"Roughness": 0.9}),
         ("metal", 1.0, {"Metallic": 1.0, "Roughness": 0.2}),
     ):
-        material = principled(name, **inputs)
-        tree = material.node_tree
-        texture = tree.nodes.new("ShaderNodeTexImage")
-        texture.image = normals
-        node = node_of(tree, "ShaderNodeNormalMap", Strength=strength)
-        tree.links.new(texture.outputs["Color"], node.inputs["Color"])
-        tree.links.new(node.outputs["Normal"], tree.nodes["Principled BSDF"].inputs["Normal"])
+        material, tree, node = shader(name, "BsdfPrincipled", **inputs)
+        fill(tree, node, {"Normal": node_of(tree, "NormalMap", Strength=strength, Color=normals)})
         materials.append(material)
-    three(materials)
+    three(*materials)
 
 
 def bump(folder):
     stage()
     heights = image(
-        "heights",
-        lambda x, y: np.repeat((0.5 + 0.5 * np.sin(40 * x) * np.sin(30 * y))[..., None], 3, -1),
-        256,
-        space="Non-Color",
+        "heights", _grey(lambda x, y: 0.5 + 0.5 * np.sin(40 * x) * np.sin(30 * y)), space="Non-Color"
     )
     materials = []
     for name, strength, distance in (("low", 1.0, 0.02), ("half", 0.5, 0.05), ("high", 1.0, 0.05)):
-        material = principled(name, Roughness=0.5)
-        tree = material.node_tree
-        texture = tree.nodes.new("ShaderNodeTexImage")
-        texture.image = heights
-        node = node_of(tree, "ShaderNodeBump", Strength=strength, Distance=distance)
-        tree.links.new(texture.outputs["Color"], node.inputs["Height"])
-        tree.links.new(node.outputs["Normal"], tree.nodes["Principled BSDF"].inputs["Normal"])
+        material, tree, node = shader(name, "BsdfPrincipled", Roughness=0.5)
+        bumps = node_of(tree, "Bump", Strength=strength, Distance=distance, Height=heights)
+        fill(tree, node, {"Normal": bumps})
         materials.append(material)
-    three(materials)
+    three(*materials)
 
 
 def roughness_image(folder):
     stage()
-    stripes = image(
-        "stripes",
-        lambda _x, y: np.repeat((0.15 + 0.5 * (np.sin(30 * y) > 0))[..., None], 3, -1),
-        space="Non-Color",
-    )
-    ramp = image("ramp", lambda x, _y: np.repeat((0.1 + 0.7 * x)[..., None], 3, -1), space="Non-Color")
+    stripes = image("stripes", _grey(lambda _x, y: 0.15 + 0.5 * (np.sin(30 * y) > 0)), space="Non-Color")
+    ramp = image("ramp", _grey(lambda x, _y: 0.1 + 0.7 * x), space="Non-Color")
     three(
-        [
-            principled("stripes", **{"Base Color": (0.1, 0.3, 0.35, 1), "Roughness": stripes}),
-            principled("ramp", **{"Base Color": (0.3, 0.3, 0.3, 1), "Roughness": ramp}),
-            principled("metal", **{"Base Color": (0.8, 0.8, 0.8, 1), "Metallic": 1.0, "Roughness": stripes}),
-        ]
+        principled("stripes", (0.1, 0.3, 0.35, 1), Roughness=stripes),
+        principled("ramp", (0.3, 0.3, 0.3, 1), Roughness=ramp),
+        principled("metal", Metallic=1.0, Roughness=stripes),
     )
 
 
 def metallic_image(folder):
     stage()
     spots = image(
-        "spots",
-        lambda x, y: np.repeat((np.sin(30 * x) * np.sin(30 * y) > 0).astype(float)[..., None], 3, -1),
-        space="Non-Color",
+        "spots", _grey(lambda x, y: (np.sin(30 * x) * np.sin(30 * y) > 0).astype(float)), space="Non-Color"
     )
+    bronze = {"colour": (0.8, 0.5, 0.2, 1), "Roughness": 0.3}
     three(
-        [
-            principled("spots", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": spots}),
-            principled("half", **{"Base Color": (0.8, 0.5, 0.2, 1), "Roughness": 0.3, "Metallic": 0.5}),
-            principled(
-                "tinted",
-                **{
-                    "Base Color": (0.8, 0.5, 0.2, 1),
-                    "Roughness": 0.3,
-                    "Metallic": 1.0,
-                    "Specular Tint": (0.2, 0.2, 0.2, 1),
-                },
-            ),
-        ]
+        principled("spots", **bronze, Metallic=spots),
+        principled("half", **bronze, Metallic=0.5),
+        principled("tinted", **bronze, Metallic=1.0, Specular_Tint=(0.2, 0.2, 0.2, 1)),
     )
 
 
 def mixes(folder):
     stage()
-    plain, tree, mix = shader("plain", "ShaderNodeMixShader", Fac=0.3)
-    tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.2, 0.1, 1)).outputs[0], mix.inputs[1])
-    tree.links.new(
-        node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.3).outputs[0],
-        mix.inputs[2],
-    )
-    fresnel, tree, mix = shader("fresnel", "ShaderNodeMixShader")
-    tree.links.new(node_of(tree, "ShaderNodeFresnel", IOR=1.5).outputs[0], mix.inputs[0])
-    tree.links.new(node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.1, 0.2, 0.6, 1)).outputs[0], mix.inputs[1])
-    tree.links.new(
-        node_of(tree, "ShaderNodeBsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.2).outputs[0],
-        mix.inputs[2],
-    )
-    glow, tree, total = shader("sum", "ShaderNodeAddShader")
-    tree.links.new(
-        node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.2, 0.6, 0.2, 1)).outputs[0], total.inputs[0]
-    )
-    tree.links.new(
-        node_of(tree, "ShaderNodeEmission", Color=(1, 0.5, 0.2, 1), Strength=0.3).outputs[0], total.inputs[1]
-    )
-    three([plain, fresnel, glow])
+    plain, tree, mix = shader("plain", "MixShader", Fac=0.3)
+    fill(tree, mix, {
+        1: node_of(tree, "BsdfDiffuse", Color=(0.8, 0.2, 0.1, 1)),
+        2: node_of(tree, "BsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.3),
+    })  # fmt: skip
+    fresnel, tree, mix = shader("fresnel", "MixShader")
+    fill(tree, mix, {
+        0: node_of(tree, "Fresnel", IOR=1.5),
+        1: node_of(tree, "BsdfDiffuse", Color=(0.1, 0.2, 0.6, 1)),
+        2: node_of(tree, "BsdfAnisotropic", Color=(1, 1, 1, 1), Roughness=0.2),
+    })  # fmt: skip
+    glow, tree, total = shader("sum", "AddShader")
+    fill(tree, total, {
+        0: node_of(tree, "BsdfDiffuse", Color=(0.2, 0.6, 0.2, 1)),
+        1: node_of(tree, "Emission", Color=(1, 0.5, 0.2, 1), Strength=0.3),
+    })  # fmt: skip
+    three(plain, fresnel, glow)
 
 
 def translucent(folder):
     stage()
-    half, tree, mix = shader("half", "ShaderNodeMixShader", Fac=0.5)
-    front = node_of(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.6, 1))
-    through = node_of(tree, "ShaderNodeBsdfTranslucent", Color=(0.8, 0.3, 0.2, 1))
-    tree.links.new(front.outputs[0], mix.inputs[1])
-    tree.links.new(through.outputs[0], mix.inputs[2])
-    whole, _, _ = shader("curtain", "ShaderNodeBsdfTranslucent", Color=(0.3, 0.7, 0.4, 1))
+    half, tree, mix = shader("half", "MixShader", Fac=0.5)
+    front = node_of(tree, "BsdfDiffuse", Color=(0.8, 0.8, 0.6, 1))
+    through = node_of(tree, "BsdfTranslucent", Color=(0.8, 0.3, 0.2, 1))
+    fill(tree, mix, {1: front, 2: through})
+    whole = shader("curtain", "BsdfTranslucent", Color=(0.3, 0.7, 0.4, 1))[0]
     light("POINT", "Bulb", (0.9, 1.2, 1.0), 60.0, shadow_soft_size=0.1)
     for x, material in ((-1.0, half), (0.9, whole)):
         curtain = plane("Curtain", (x, 0.0, 1.0), 1.6, material)
@@ -310,12 +200,11 @@ def translucent(folder):
 
 def vertex_colours(folder):
     stage()
-    material = principled("painted", Roughness=0.8)
-    tree = material.node_tree
-    node = tree.nodes.new("ShaderNodeVertexColor")
+    material, tree, bsdf = shader("painted", "BsdfPrincipled", Roughness=0.8)
+    node = node_of(tree, "VertexColor")
     node.layer_name = "Paint"
-    tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
-    three([material] * 3)
+    fill(tree, bsdf, {"Base Color": node})
+    three(material, material, material)
     for name in ("Left", "Middle", "Right"):
         data = bpy.data.objects[name].data
         paint = data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
@@ -332,115 +221,68 @@ def mapped_images(folder):
         ("texture", "TEXTURE", "MIRROR", (0.3, 0.0, 0), -0.3, (0.5, 0.5, 1)),
         ("extend", "POINT", "EXTEND", (-0.5, -0.5, 0), 0.0, (2, 2, 1)),
     ):
-        material = principled(name, **{"Base Color": colours, "Roughness": 0.8})
-        tree = material.node_tree
-        texture = next(node for node in tree.nodes if node.type == "TEX_IMAGE")
+        material, tree, node = shader(name, "BsdfPrincipled", Roughness=0.8)
+        texture = picture(tree, colours)
         texture.extension = extension
-        mapping = node_of(tree, "ShaderNodeMapping", Location=location, Rotation=(0, 0, angle), Scale=scale)
+        mapping = node_of(tree, "Mapping", Location=location, Rotation=(0, 0, angle), Scale=scale)
         mapping.vector_type = kind
-        coordinates = tree.nodes.new("ShaderNodeTexCoord")
-        tree.links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
-        tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+        fill(tree, mapping, {"Vector": node_of(tree, "TexCoord").outputs["UV"]})
+        fill(tree, texture, {"Vector": mapping})
+        fill(tree, node, {"Base Color": texture})
         materials.append(material)
-    three(materials)
-    floor.data.materials[0] = principled("tiled floor", **{"Base Color": colours, "Roughness": 0.7})
+    three(*materials)
+    floor.data.materials[0] = principled("tiled floor", colours, Roughness=0.7)
 
 
 def procedural(folder):
     stage()
-    noise = principled("noise", Roughness=0.7)
-    tree = noise.node_tree
-    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    noise, tree, node = shader("noise", "BsdfPrincipled", Roughness=0.7)
+    ramp = node_of(tree, "ValToRGB", Fac=node_of(tree, "TexNoise", Scale=4.0))
     ramp.color_ramp.elements[0].color = (0.5, 0.1, 0.05, 1)
     ramp.color_ramp.elements[1].color = (0.9, 0.8, 0.5, 1)
-    tree.links.new(node_of(tree, "ShaderNodeTexNoise", Scale=4.0).outputs[0], ramp.inputs[0])
-    tree.links.new(ramp.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
-    voronoi = principled("voronoi", **{"Base Color": (0.2, 0.4, 0.6, 1)})
-    tree = voronoi.node_tree
-    cells = node_of(tree, "ShaderNodeTexVoronoi", Scale=6.0)
-    coordinates = tree.nodes.new("ShaderNodeTexCoord")
-    tree.links.new(coordinates.outputs["Object"], cells.inputs["Vector"])
-    bumps = node_of(tree, "ShaderNodeBump", Strength=0.6, Distance=0.05)
-    tree.links.new(cells.outputs["Distance"], bumps.inputs["Height"])
-    tree.links.new(bumps.outputs[0], tree.nodes["Principled BSDF"].inputs["Normal"])
-    checker = principled("checker", Roughness=0.8)
-    tree = checker.node_tree
-    tree.links.new(
-        node_of(tree, "ShaderNodeTexChecker", Scale=7.0).outputs[0],
-        tree.nodes["Principled BSDF"].inputs["Base Color"],
-    )
-    three([noise, voronoi, checker])
+    fill(tree, node, {"Base Color": ramp})
+    voronoi, tree, node = shader("voronoi", "BsdfPrincipled", Base_Color=(0.2, 0.4, 0.6, 1))
+    cells = node_of(tree, "TexVoronoi", Scale=6.0, Vector=node_of(tree, "TexCoord").outputs["Object"])
+    fill(tree, node, {"Normal": node_of(tree, "Bump", Strength=0.6, Distance=0.05, Height=cells)})
+    checker, tree, node = shader("checker", "BsdfPrincipled", Roughness=0.8)
+    fill(tree, node, {"Base Color": node_of(tree, "TexChecker", Scale=7.0)})
+    three(noise, voronoi, checker)
 
 
 def corrected_images(folder):
     stage()
     colours = image("tiles", tiles)
-    hue = principled("hue", Roughness=0.8)
-    tree = hue.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = colours
-    turn = node_of(tree, "ShaderNodeHueSaturation", Hue=0.7, Saturation=1.2, Value=0.8)
-    tree.links.new(texture.outputs[0], turn.inputs["Color"])
-    tree.links.new(turn.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
-    packed = principled("occlusion roughness metallic")
-    tree = packed.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image(
+    hue, tree, node = shader("hue", "BsdfPrincipled", Roughness=0.8)
+    turn = node_of(tree, "HueSaturation", Hue=0.7, Saturation=1.2, Value=0.8, Color=colours)
+    fill(tree, node, {"Base Color": turn})
+    packed, tree, node = shader("occlusion roughness metallic", "BsdfPrincipled")
+    layers = image(
         "orm",
         lambda x, y: np.stack([np.ones_like(x), 0.2 + 0.6 * x, (y > 0.5).astype(float)], -1),
         space="Non-Color",
     )
-    parts = tree.nodes.new("ShaderNodeSeparateColor")
-    tree.links.new(texture.outputs[0], parts.inputs[0])
-    tree.links.new(parts.outputs[1], tree.nodes["Principled BSDF"].inputs["Roughness"])
-    tree.links.new(parts.outputs[2], tree.nodes["Principled BSDF"].inputs["Metallic"])
-    three([hue, packed, grouped(colours)])
+    parts = node_of(tree, "SeparateColor", Color=layers)
+    fill(tree, node, {"Roughness": parts.outputs[1], "Metallic": parts.outputs[2]})
+    three(hue, packed, _grouped(colours))
 
 
-def grouped(colours):
+def _grouped(colours):
     """A group that mixes an image with a colour by a factor of its own."""
     group = bpy.data.node_groups.new("Tint", "ShaderNodeTree")
     group.interface.new_socket("Colour", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Result", in_out="OUTPUT", socket_type="NodeSocketColor")
     start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    mix = group.nodes.new("ShaderNodeMixRGB")
+    mix = node_of(group, "MixRGB", Fac=1.0, Color1=start, Color2=(0.4, 0.9, 0.5, 1.0))
     mix.blend_type = "MULTIPLY"
-    mix.inputs[0].default_value = 1.0
-    mix.inputs[2].default_value = (0.4, 0.9, 0.5, 1.0)
-    group.links.new(start.outputs[0], mix.inputs[1])
-    group.links.new(mix.outputs[0], end.inputs[0])
-    material = principled("group", Roughness=0.6)
-    tree = material.node_tree
-    node = tree.nodes.new("ShaderNodeGroup")
+    fill(group, end, {0: mix})
+    material, tree, bsdf = shader("group", "BsdfPrincipled", Roughness=0.6)
+    node = node_of(tree, "Group")
     node.node_tree = group
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = colours
-    tree.links.new(texture.outputs[0], node.inputs[0])
-    tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    fill(tree, node, {0: colours})
+    fill(tree, bsdf, {"Base Color": node})
     return material
 
 
-CASES = (
-    diffuse,
-    plastic,
-    plastic_smooth,
-    metal,
-    metal_image,
-    glossy,
-    glass,
-    glass_rough,
-    coat,
-    sheen,
-    emission,
-    alpha,
-    normal_map,
-    bump,
-    roughness_image,
-    metallic_image,
-    mixes,
-    translucent,
-    vertex_colours,
-    mapped_images,
-    procedural,
-    corrected_images,
-)
+def _grey(function):
+    """A function of x and y as an image's three channels."""
+    return lambda x, y: np.repeat(function(x, y)[..., None], 3, -1)

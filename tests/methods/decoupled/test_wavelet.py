@@ -18,7 +18,7 @@ from twins import wavelet as twin
 HEIGHT, WIDTH = 18, 24
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
 OPTIONS = {"levels": 3, "deviations": 3.0}
-SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64.0}
+SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64}
 
 
 @dataclasses.dataclass

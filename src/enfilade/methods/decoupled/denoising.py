@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import drjit as dr
 import numpy as np
+import scipy.ndimage
 
 from enfilade.arrays import Array3f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.irradiance_cache import guide_of
-from enfilade.methods.decoupled.wavelet import ALL, smooth
+from enfilade.methods.decoupled.wavelet import smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
+MARGIN = 8  # pixels around those with light, which are denoised with them
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
@@ -40,16 +42,18 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     -------
     (H, W, 3) float32
     """
-    # Denoise.
+    # Denoise the part of the image that has light.
     white = np.repeat(where[..., None], 3, axis=2).astype(np.float32)
     normal = np.where(where[..., None], geometry.normal, np.float32(0))
-    clean = denoise(light.color, white, normal, quality=quality)
+    clean = np.zeros_like(light.color)
+    for part in _bounding_box(np.any(light.color, axis=2)):
+        clean[part] = denoise(light.color[part], white[part], normal[part], quality=quality)
 
     # Smooth the difference.
     limited = np.minimum(light.color, np.float32(outlier) * clean)
     guide = guide_of(geometry, np.where(where, geometry.shape_index, np.uint32(0)))
     difference, variance = smooth(
-        lanes(limited - clean), lanes(light.variance), guide, levels=LEVELS, deviations=ALL
+        lanes(limited - clean), lanes(light.variance), guide, levels=LEVELS, deviations=None
     )
 
     # Add it as far as it is significant.
@@ -57,3 +61,14 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     correction = difference * squared / dr.maximum(squared + variance, 1e-20)
     corrected: F32 = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
     return np.maximum(corrected, np.float32(0))
+
+
+def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:
+    """The smallest rectangle around a mask and its margin; none if it is empty."""
+    return [
+        (
+            slice(max(rows.start - MARGIN, 0), rows.stop + MARGIN),
+            slice(max(columns.start - MARGIN, 0), columns.stop + MARGIN),
+        )
+        for rows, columns in scipy.ndimage.find_objects(mask.astype(np.int8))
+    ]

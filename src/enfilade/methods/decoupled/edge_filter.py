@@ -11,13 +11,13 @@ import scipy.ndimage
 
 from enfilade.kernels.tone import luminance
 from enfilade.methods.denoise import denoise_displayed
-from enfilade.records import F32, Mask
+from enfilade.records import F32
 
 DEVIATIONS = 2.0  # of an estimate, by which the filter changes it at most
 MEAN_PX = 2.0  # standard deviation of the Gaussian over which the mean is kept
 
 
-def filter_edges(color: F32, variance: F32, where: Mask, *, exposure_ev: float) -> F32:
+def filter_edges(color: F32, variance: F32, *, exposure_ev: float) -> F32:
     """Difference between a frame whose refined pixels are denoised and the frame.
 
     The frame is denoised after exposure and clipping at white. The mean over the refined pixels around is
@@ -29,9 +29,7 @@ def filter_edges(color: F32, variance: F32, where: Mask, *, exposure_ev: float) 
     color : (H, W, 3) float32
         Linear radiance of the frame.
     variance : (H, W) float32
-        Of the luminance of refined pixels.
-    where : (H, W) bool
-        Refined pixels.
+        Of the luminance of refined pixels; 0 elsewhere.
     exposure_ev
         In stops.
 
@@ -40,11 +38,11 @@ def filter_edges(color: F32, variance: F32, where: Mask, *, exposure_ev: float) 
     (H, W, 3) float32
         Linear radiance; 0 elsewhere.
     """
-    if not where.any():
+    if not variance.any():
         return np.zeros_like(color)
     scale = np.float32(2.0**exposure_ev)
     shown = np.clip(color * scale, np.float32(0), np.float32(1))
-    error = np.where(where, np.sqrt(variance) * scale, np.float32(0))
+    error = np.sqrt(variance) * scale
 
     # Denoise, and keep the mean of what is displayed: the more uncertain a pixel, the more it is corrected.
     change = _limited(denoise_displayed(shown) - shown, error)

@@ -11,6 +11,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, upload_displayed
 from enfilade.methods.decoupled.edge_filter import filter_edges
 from enfilade.methods.decoupled.edges import (
     EdgeRays,
@@ -28,7 +29,7 @@ from enfilade.methods.decoupled.specular import (
     upload_aov,
 )
 from enfilade.methods.decoupled.specular_rays import shade_specular
-from enfilade.records import U8, Frame, Geometry, Mask, Provenance
+from enfilade.records import F32, U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings, ViewingSettings
 
@@ -44,6 +45,7 @@ class Frames:
     def __init__(self) -> None:
         self._virtual: LruCache[int, list[Geometry]] = LruCache(2)
         self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 2)
+        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH + 2)
         self._last: LruCache[int, Frame] = LruCache(1)
 
     def shade(self, shot: ShotContext, frame: int) -> Output:
@@ -59,19 +61,17 @@ class Frames:
         aovs, specular, refined_aovs = shade_specular(shot, frame, cache, where, virtual, luminance(color))
 
         # Denoise what is left of the noise at edges.
+        variance = diffuse.shading.variance.reshape(where.shape) + refined_aovs.variance
+        variance = np.where(refined | refined_aovs.is_refined, variance, np.float32(0))
         if shot.settings.denoiser != "none":
-            color += filter_edges(
-                color + sum(to_float(aov.color) for aov in aovs),
-                diffuse.shading.variance.reshape(where.shape) + refined_aovs.variance,
-                refined | refined_aovs.is_refined,
-                exposure_ev=shot.walk.settings[ViewingSettings].exposure_ev,
-            )
+            total = color + sum(to_float(aov.color) for aov in aovs)
+            color += filter_edges(total, variance, exposure_ev=_exposure_ev(shot))
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
         provenance = _provenance(geometry, reprojected, diffuse.is_marked, is_keyframe=is_keyframe)
         transmission = aovs[1] if len(aovs) > 1 else None
-        shaded = ShadedFrame(to_half(color), aovs[0], transmission, provenance)
+        shaded = ShadedFrame(to_half(color), aovs[0], transmission, to_half(np.sqrt(variance)), provenance)
         rays = {"camera": diffuse.paths, "specular": sum(one.paths for one in specular)}
         dropped = diffuse.shading.dropped + sum(one.shading.dropped for one in specular)
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
@@ -87,16 +87,36 @@ class Frames:
     def _accumulated(self, shot: ShotContext, frame: int) -> Frame:
         """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
-        color = to_float(shaded.diffuse)
+        geometry, color = shot.walk.view(frame).geometry, to_float(shaded.diffuse)
+        others = [f for f in window(path, path.shots()[shot.number], frame) if f != frame]
+        weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
         if np.any(shaded.provenance == Provenance.SPECULAR):
-            others = [f for f in window(path, path.shots()[shot.number], frame) if f != frame]
-            weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
             for k, here in enumerate(self._aovs(shot, frame)):
                 neighbours = [(aovs[k], weights[f]) for f in others if k < len(aovs := self._aovs(shot, f))]
-                geometry = shot.walk.view(frame).geometry
                 color = color + accumulate_temporally(geometry, here, neighbours)
+
+        # Average refined pixels.
+        if shaded.deviation.any():
+            here = self._display(shot, frame, color, shaded.deviation > 0)
+            neighbours = [(self._displayed_image(shot, f), weights[f]) for f in others]
+            color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
+
         # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
+
+    def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
+        """A shaded frame as it is displayed, on the device."""
+
+        def make() -> UploadedImage:
+            color = self._record(shot, frame).color
+            return self._display(shot, frame, color, np.ones(color.shape[:2], np.bool_))
+
+        return self._displayed.get(frame, make)
+
+    def _display(self, shot: ShotContext, frame: int, color: F32, where: Mask) -> UploadedImage:
+        deviation = to_float(self._record(shot, frame).deviation)
+        virtual = self._virtual_geometry(shot, frame)
+        return upload_displayed(virtual, color, deviation, where, exposure_ev=_exposure_ev(shot))
 
     def _aovs(self, shot: ShotContext, frame: int) -> list[UploadedImage]:
         """Specular AOVs of a shaded frame, on the device."""
@@ -117,6 +137,10 @@ class Frames:
     def _virtual_geometry(self, shot: ShotContext, frame: int) -> list[Geometry]:
         """G-buffers of a frame with the virtual images of its AOVs."""
         return self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
+
+
+def _exposure_ev(shot: ShotContext) -> float:
+    return shot.walk.settings[ViewingSettings].exposure_ev
 
 
 def _shade_diffuse(

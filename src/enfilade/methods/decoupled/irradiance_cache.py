@@ -23,7 +23,7 @@ FIREFLY = 2.0  # times the second brightest neighbour: brighter pixels are firef
 FIREFLY_LEVELS = 5  # of the wavelet that distributes their energy
 SMOOTHING_LEVELS = 4
 SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
-NORMAL_EXPONENT = 64.0  # of the cosine: normals 12 degrees apart have a weight of a quarter
+NORMAL_EXPONENT = 64  # of the cosine: normals 12 degrees apart have a weight of a quarter
 
 Layer = tuple[Any, Any]  # Array3f: values, Float: variance of its luminance
 

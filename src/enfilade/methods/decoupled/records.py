@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.records import U8, Mask, Shading
+from enfilade.arrays import to_float
+from enfilade.records import F32, U8, Mask, Shading
 
 F16 = npt.NDArray[np.float16]
 
@@ -60,6 +61,8 @@ class ShadedFrame:
     reflection : SpecularAov
     transmission : SpecularAov or None
         Straight through clear surfaces; None for frames without any.
+    deviation : (H, W) float16
+        Standard deviation of the luminance of refined pixels; 0 elsewhere.
     provenance : (H, W) uint8
         :class:`enfilade.records.Provenance`.
     """
@@ -67,9 +70,15 @@ class ShadedFrame:
     diffuse: F16
     reflection: SpecularAov
     transmission: SpecularAov | None
+    deviation: F16
     provenance: U8
 
     @property
     def specular(self) -> list[SpecularAov]:
         """The specular AOVs of the frame."""
         return [aov for aov in (self.reflection, self.transmission) if aov is not None]
+
+    @property
+    def color(self) -> F32:
+        """Sum of all AOVs, (H, W, 3)."""
+        return sum((to_float(aov.color) for aov in self.specular), to_float(self.diffuse))

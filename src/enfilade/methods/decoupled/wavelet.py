@@ -12,7 +12,6 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 TINY = 1e-8
-ALL = 1e12  # deviations: no difference of luminance counts
 # Neighbours at later levels are correlated, since they are averages over common pixels. They reduce the
 # logarithm of the variance by this part of the reduction by independent ones (exact for a flat image).
 INDEPENDENT, INDEPENDENT_BEYOND = (1.0, 0.613, 0.552, 0.539), 0.535
@@ -33,7 +32,7 @@ class Guide:
     width, height : int
     plane_tolerance : float
         Distance from the tangent plane, by depth, at which a neighbour's weight falls to 1/e.
-    normal_exponent : float
+    normal_exponent : int
         Of the cosine between two normals.
     """
 
@@ -44,10 +43,12 @@ class Guide:
     width: int
     height: int
     plane_tolerance: float
-    normal_exponent: float
+    normal_exponent: int
 
 
-def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: float) -> tuple[Any, Any]:
+def smooth(
+    color: Any, variance: Any, guide: Guide, *, levels: int, deviations: float | None
+) -> tuple[Any, Any]:
     """Smooth an image along its surfaces, where it differs within its noise.
 
     Edge-avoiding a-trous wavelets (Dammertz et al. 2010), guided by the variance (Schied et al. 2017).
@@ -61,7 +62,8 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
     levels
         Of the wavelet; the last one reaches 2 ** levels pixels to each side.
     deviations
-        Difference of luminance, in standard deviations, at which a pixel's weight falls to 1/e.
+        Difference of luminance, in standard deviations, at which a pixel's weight falls to 1/e. None: no
+        difference counts.
 
     Returns
     -------
@@ -79,14 +81,15 @@ def smooth(color: Any, variance: Any, guide: Guide, *, levels: int, deviations: 
 
 
 def _filter_level(
-    color: Any, variance: Any, guide: Guide, step: Any, deviations: float
+    color: Any, variance: Any, guide: Guide, step: Any, deviations: float | None
 ) -> tuple[Any, Any, Any]:
     """One level: colour, variance as if pixels were independent, and the ratio of that to the one before."""
-    # Blur the variance, and compute the luminance.
     lane, column, row = pixel_grid(guide.height, guide.width)
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
-    blurred = _blurred(variance, column, row, width, height)
+
+    # Blur the variance, and compute the luminance.
+    blurred = _blurred(variance, column, row, width, height) if deviations else Float(0)
     dr.eval(blurred)
     luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
 
@@ -107,14 +110,9 @@ def _filter_level(
             if not across and not down:
                 weight += Float(weight_x * weight_y)
                 continue
-            # Weight the tap by the difference of luminance in units of the noise of both pixels.
+            # Weight the tap by the distance from the tangent plane, and by the cosine of the normals.
             tap = UInt(dr.select(is_inside, j * width + i, 0))
             is_same = is_inside & (dr.gather(UInt, guide.shape_indices, tap) == shape_index)
-            other = dr.gather(Array3f, color, tap)
-            deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
-            difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance) / deviation
-
-            # Weight it by the distance from the tangent plane, and by the cosine of the normals.
             beyond = dr.gather(Float, guide.depths, tap) * dr.dot(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
@@ -122,8 +120,14 @@ def _filter_level(
             surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**guide.normal_exponent
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
+            # Weight it by the difference of luminance in units of the noise of both pixels.
+            other, of_tap = dr.gather(Array3f, color, tap), surface
+            if deviations:
+                deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
+                difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance)
+                of_tap = surface * dr.exp(-difference / deviation)
+
             # Accumulate.
-            of_tap = surface * dr.exp(-difference)
             total += of_tap * other
             total_variance += of_tap * of_tap * dr.gather(Float, variance, tap)
             squares += of_tap * of_tap
@@ -167,7 +171,7 @@ def redistribute_fireflies(
 
     # Smooth the remainder, and add it again.
     smoothed, smoothed_variance = smooth(
-        beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=ALL
+        beyond * color, beyond * beyond * variance, guide, levels=levels, deviations=None
     )
     return kept * color + smoothed, kept * kept * variance + smoothed_variance
 

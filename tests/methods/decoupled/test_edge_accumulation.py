@@ -1,0 +1,79 @@
+"""Refined pixels averaged over frames: less noise, no light of a bright sky, no mix of frames that differ."""
+
+import numpy as np
+import pytest
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, upload_displayed
+from support.analytic_truth import geometry_of
+from support.example_scenes import wall
+
+WIDTH, HEIGHT = 96, 64
+SKY = 40.0  # times white
+NOISE = 0.05
+WEIGHTS = (0.25, 0.5, 0.75, 0.75, 0.5, 0.25)
+# A camera that moves by half a pixel from frame to frame; the first is the frame itself.
+STEP = 0.5 * 2.0 * 4.0 * np.tan(np.radians(22.5)) / HEIGHT
+GEOMETRIES = [
+    geometry_of(wall(), Camera(look_at((x, 0, 4), (x, 0, 0)), 45, WIDTH, HEIGHT))
+    for x in STEP * np.array([0, -3, -2, -1, 1, 2, 3])
+]
+RIGHT = np.arange(WIDTH) > WIDTH // 2
+WHERE = np.broadcast_to(RIGHT, (HEIGHT, WIDTH))
+
+
+def changed(values, exposure_ev=0.0):
+    """The change of the first of seven frames, of which the right half is refined."""
+    deviation = np.where(WHERE, np.float32(NOISE / 2.0**exposure_ev), np.float32(0))
+    shown = [
+        upload_displayed(
+            [g, g], color, deviation, WHERE if k == 0 else np.ones_like(WHERE), exposure_ev=exposure_ev
+        )
+        for k, (g, color) in enumerate(zip(GEOMETRIES, values, strict=True))
+    ]
+    others = list(zip(shown[1:], WEIGHTS, strict=True))
+    found = accumulate_refined(GEOMETRIES[0], values[0], shown[0], others, exposure_ev=exposure_ev)
+    return found - values[0]
+
+
+def frames(light):
+    rng = np.random.default_rng(2)
+    noise = rng.normal(0.0, NOISE, (7, HEIGHT, WIDTH, 1)) * WHERE[..., None]
+    return [(light + of).astype(np.float32).repeat(3, axis=2) for of in noise]
+
+
+def test_noise_of_refined_pixels_falls_and_others_stay():
+    made = frames(np.full((HEIGHT, WIDTH, 1), 0.4))
+    change = changed(made)
+    assert not change[~WHERE].any()
+    inner = np.broadcast_to(np.arange(WIDTH) > WIDTH // 2 + 4, WHERE.shape)
+    assert (made[0] + change - 0.4)[inner].std() < 0.6 * NOISE
+    assert (made[0] + change)[inner].mean() == pytest.approx(0.4, abs=0.002)
+
+
+def test_the_exposure_is_undone():
+    change = changed(frames(np.full((HEIGHT, WIDTH, 1), 0.4)))
+    exposed = [0.5 * one for one in frames(np.full((HEIGHT, WIDTH, 1), 0.4))]
+    np.testing.assert_allclose(changed(exposed, exposure_ev=1.0), 0.5 * change, atol=1e-3)
+
+
+def test_dark_bars_before_a_bright_sky_stay_dark():
+    bars = (np.arange(WIDTH) // 8 % 2 == 0)[None, :, None]
+    made = frames(np.where(np.broadcast_to(bars, (HEIGHT, WIDTH, 1)), 0.05, SKY))
+    change = changed(made)
+    assert np.abs(change[made[0] < 1.0]).max() < 4.0 * NOISE
+
+
+def test_frames_that_differ_by_more_than_their_noise_do_not_count():
+    first, *others = frames(np.full((HEIGHT, WIDTH, 1), 0.4))
+    change = changed([first, *[one + np.float32(0.5) for one in others]])
+    assert np.abs(change[WHERE].mean()) < 0.5 * NOISE
+
+
+def test_the_mean_of_uncertain_edges_before_a_sky_is_kept():
+    rng = np.random.default_rng(4)
+    sky_shows = rng.random((7, HEIGHT, WIDTH, 1)) < 0.5
+    made = [np.where(of, np.float32(SKY), np.float32(0.9)).repeat(3, axis=2) for of in sky_shows]
+    found = np.minimum(made[0] + changed(made), 1.0)
+    assert found[WHERE].std() < 0.7 * np.minimum(made[0], 1.0)[WHERE].std()
+    assert found[WHERE].mean() == pytest.approx(0.95, abs=0.01)
