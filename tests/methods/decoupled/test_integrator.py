@@ -121,6 +121,15 @@ def test_surfaces_in_no_image_are_path_traced(diffuse):
     assert abs(difference) < 4.0 * deviation + 0.01 * reference.color.mean()
 
 
+def test_final_gathering_from_a_cache_has_little_bias(diffuse):
+    renderer, ((geometry, irradiance), _) = diffuse
+    found = gathered(renderer, cache_of((geometry, irradiance)), geometry.camera, 64)
+    for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
+        deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+        bias = 0.02 * (reference.color @ LUMINANCE).sum()
+        assert abs(standard_errors(ours, reference)) < 4.0 + bias / deviation
+
+
 def test_final_gathering_under_an_environment_map(tmp_path):
     # Directions in which the sampled lobe reflects nothing count as samples, too.
     rows = np.linspace(0.2, 0.6, 16, dtype=np.float32)
