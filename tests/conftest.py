@@ -1,5 +1,6 @@
 """The device is chosen before any test module imports a kernel: Dr.Jit binds its array types at import."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -19,6 +20,12 @@ hypothesis.settings.load_profile("enfilade")
 
 
 THREADS = dr.thread_count()
+
+
+def pytest_collection_finish():
+    """Spare the garbage collector, which runs often here, all modules and collected tests."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

@@ -182,8 +182,8 @@ def target(number: int) -> Float64Array:
     return WHOLE[number](x, y)
 
 
-def measure(mode: Mode, monitor: Monitor) -> Thresholds:
-    """Thresholds of the metric for all 41 targets, beside those of the observers.
+def measure(mode: Mode, monitor: Monitor, *, every: int = 1) -> Thresholds:
+    """Thresholds of the metric for the 41 targets, beside those of the observers.
 
     Parameters
     ----------
@@ -191,6 +191,8 @@ def measure(mode: Mode, monitor: Monitor) -> Thresholds:
         The metric.
     monitor : Monitor
         Shows the progress over the targets.
+    every : int
+        2: only every second target, and so on.
 
     Returns
     -------
@@ -200,16 +202,12 @@ def measure(mode: Mode, monitor: Monitor) -> Thresholds:
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     _, observers = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
     numbers = observers["target"].astype(np.int64)
-    is_chosen = ~np.isin(numbers, IMAGES)
+    chosen = np.flatnonzero(~np.isin(numbers, IMAGES))[::every]
+    numbers, observers_db = numbers[chosen], observers["sensitivity_db"][chosen]
     sensitivities_db = []
-    targets = list(zip(numbers[is_chosen], observers["sensitivity_db"][is_chosen], strict=True))
+    targets = list(zip(numbers, observers_db, strict=True))
     for number, observed_db in counted(targets, f"ModelFest, {mode.name}", monitor):
         guess = 10.0 ** (-observed_db / 20.0)
         contrast = threshold_contrast(observer, target(int(number)), MEAN_CD_M2, guess=guess)
         sensitivities_db.append(-20.0 * math.log10(contrast))
-    return Thresholds(
-        numbers[is_chosen],
-        observers["sensitivity_db"][is_chosen],
-        np.array(sensitivities_db),
-        observers["spread_db"][is_chosen],
-    )
+    return Thresholds(numbers, observers_db, np.array(sensitivities_db), observers["spread_db"][chosen])

@@ -1,4 +1,4 @@
-"""The Mitsuba backend: shapes, classes, masks, and traced pixels against Mitsuba's own renderer."""
+"""The Mitsuba backend: traced pixels against Mitsuba's own renderer, kernels, scenes that are refused."""
 
 import gc
 import math
@@ -11,211 +11,23 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, rows
+from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
 from enfilade.gbuffer import find_geometry
-from enfilade.images import write_exr
-from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
-from support.analytic_truth import projected
-
-HEAD = """<scene version="3.0.0">
-<integrator type="path"><integer name="max_depth" value="6"/></integrator>
-"""
-REC709 = np.array([0.2126, 0.7152, 0.0722])
-
-
-def placed(kind, name, at, inside, scale=0.4):
-    """A shape of a kind at a place."""
-    x, y, z = at
-    return f"""<shape type="{kind}" id="{name}"><transform name="to_world">
-<scale value="{scale}"/><translate x="{x}" y="{y}" z="{z}"/></transform>{inside}</shape>
-"""
-
-
-def rgb(name, *values):
-    return f'<rgb name="{name}" value="{", ".join(map(str, values))}"/>'
-
-
-DIFFUSE = f'<bsdf type="diffuse">{rgb("reflectance", 0.2, 0.5, 0.7)}</bsdf>'
-HOLES = """<texture name="{}" type="bitmap"><string name="filename" value="holes.exr"/>
-<string name="filter_type" value="{}"/><boolean name="raw" value="true"/></texture>"""
-BITMAP_MASK = f'<bsdf type="mask">{HOLES.format("opacity", "nearest")}{DIFFUSE}</bsdf>'
-
-
-def veil(opacity):
-    return f'<bsdf type="mask"><float name="opacity" value="{opacity}"/>{DIFFUSE}</bsdf>'
-
-
-MATERIALS = {
-    "paint": (DIFFUSE, SurfaceClass.DIFFUSE),
-    "both sides": (f'<bsdf type="twosided">{DIFFUSE}</bsdf>', SurfaceClass.DIFFUSE),
-    "brushed": ('<bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf>', SurfaceClass.GLOSSY),
-    "chrome": ('<bsdf type="conductor"/>', SurfaceClass.MIRROR),
-    "chrome both sides": ('<bsdf type="twosided"><bsdf type="conductor"/></bsdf>', SurfaceClass.MIRROR),
-    "glass": ('<bsdf type="dielectric"/>', SurfaceClass.TRANSPARENT),
-    "frosted": ('<bsdf type="roughdielectric"/>', SurfaceClass.TRANSPARENT),
-    "pane": ('<bsdf type="thindielectric"/>', SurfaceClass.TRANSPARENT),
-    "plastic": ('<bsdf type="plastic"/>', SurfaceClass.GLOSSY),
-    "rough plastic": ('<bsdf type="roughplastic"/>', SurfaceClass.GLOSSY),
-    "principled": (
-        '<bsdf type="principled"/>',
-        SurfaceClass.GLOSSY,
-    ),
-    "bumpy": (
-        f'<bsdf type="bumpmap">{HOLES.format("bumps", "bilinear")}{DIFFUSE}</bsdf>',
-        SurfaceClass.DIFFUSE,
-    ),
-    "lamp": (f'<emitter type="area">{rgb("radiance", 3, 2, 1)}</emitter>{DIFFUSE}', SurfaceClass.EMISSIVE),
-    "opaque mask": (veil(1.0), SurfaceClass.DIFFUSE),
-    "mostly opaque": (veil(0.7), SurfaceClass.DIFFUSE),
-}
-COLUMNS = 5
-SKY = f'<emitter type="constant">{rgb("radiance", 0.6, 0.7, 0.9)}</emitter>'
-
-
-def write(folder, *shapes, head=HEAD, sky=SKY, name="scene.xml"):
-    file = folder / name
-    file.write_text(head + "".join(shapes) + sky + "</scene>")
-    return file
-
-
-def opened(file, **settings):
-    return MitsubaRenderer(file, **settings)
-
-
-def write_holes(folder):
-    """A texture whose left half is 1 and whose right half is 0."""
-    write_exr(folder / "holes.exr", {"": np.array([[[1.0] * 3, [0.0] * 3]], np.float32)}, is_portable=True)
-
-
-def place(index):
-    return (1.2 * (index % COLUMNS), 1.2 * (index // COLUMNS), 0.0)
-
-
-@pytest.fixture(scope="module")
-def swatches(tmp_path_factory):
-    """Every material on a square of its own, and a camera that sees them all."""
-    shapes = [placed("rectangle", name, place(i), m) for i, (name, (m, _)) in enumerate(MATERIALS.items())]
-    folder = tmp_path_factory.mktemp("swatches")
-    write_holes(folder)
-    renderer = opened(write(folder, *shapes))
-    camera = Camera(look_at((2.4, 1.2, 8), (2.4, 1.2, 0)), 40.0, 160, 120)
-    return renderer, camera, find_geometry(renderer, camera)
-
-
-def pixel_of(camera, point):
-    at, _ = projected(camera, np.array(point, float))
-    return int(at[1]), int(at[0])
-
-
-@pytest.mark.parametrize("name", MATERIALS)
-def test_shapes_and_classes(swatches, name):
-    renderer, camera, geometry = swatches
-    index = list(MATERIALS).index(name)
-    at = pixel_of(camera, place(index))
-    assert renderer.describe().shapes[index] == name
-    assert geometry.shape_index[at] == index + 1
-    assert SurfaceClass(geometry.surface[at]) == MATERIALS[name][1]
-    assert geometry.depth[at] == pytest.approx(8.0, rel=1e-5)
-    if name != "bumpy":
-        np.testing.assert_allclose(geometry.normal[at], (0, 0, 1), atol=1e-6)
-
-
-def test_albedo_is_the_diffuse_reflectance(swatches):
-    _, camera, geometry = swatches
-    names = list(MATERIALS)
-    for name in ("paint", "both sides", "opaque mask", "lamp"):
-        at = pixel_of(camera, place(names.index(name)))
-        np.testing.assert_allclose(geometry.albedo[at], (0.2, 0.5, 0.7), rtol=1e-5)
-    for name in ("chrome", "glass", "pane", "brushed"):
-        assert not geometry.albedo[pixel_of(camera, place(names.index(name)))].any()
-
-
-def test_the_sky_is_no_shape(swatches):
-    _, _, geometry = swatches
-    assert geometry.shape_index[0, 0] == 0
-    assert geometry.surface[0, 0] == SurfaceClass.NONE
-    assert geometry.depth[0, 0] == 0.0
-    for values in (geometry.depth, geometry.normal, geometry.albedo):
-        assert np.isfinite(values).all()
-
-
-@pytest.fixture(scope="module")
-def screens(tmp_path_factory):
-    """Masks before a wall and before the sky, one of them an instance, one behind another."""
-    folder = tmp_path_factory.mktemp("screens")
-    write_holes(folder)
-    group = f"""<shape type="shapegroup" id="group">
-{placed("rectangle", "leaf", (0, 0, 0), veil(0.2))}</shape>
-<shape type="instance" id="tree"><ref id="group"/>
-<transform name="to_world"><translate x="1.2" y="0" z="1"/></transform></shape>"""
-    file = write(
-        folder,
-        placed("rectangle", "wall", (0, 0, -1), DIFFUSE, scale=3),
-        placed("rectangle", "pierced", (0, 0, 1), BITMAP_MASK),
-        placed("rectangle", "thin", (-1.2, 0, 1), veil(0.2)),
-        placed("rectangle", "thin behind", (-1.2, 0, 0.5), veil(0.3)),
-        placed("rectangle", "above the wall", (0, 4, 1), veil(0.1)),
-        group,
-    )
-    renderer = opened(file)
-    camera = Camera(look_at((0, 1, 12), (0, 1, 0)), 45.0, 200, 200)
-    return renderer, camera, find_geometry(renderer, camera)
-
-
-@pytest.mark.parametrize(
-    ("point", "seen", "depth"),
-    [
-        ((-0.2, 0, 1), "pierced", 11.0),
-        ((0.2, 0, 1), "wall", 13.0),
-        ((-1.2, 0, 1), "wall", 13.0),  # through two
-        ((1.2, 0, 1), "wall", 13.0),  # through an instance
-        ((0, 4, 1), None, 0.0),
-        ((2.2, 0, -1), "wall", 13.0),
-    ],
+from support.mitsuba_scene import (
+    DIFFUSE,
+    opened,
+    placed,
+    rgb,
+    veil,
+    write,
+    write_holes,
 )
-def test_masked_out_surfaces_are_looked_through(screens, point, seen, depth):
-    renderer, camera, geometry = screens
-    at = pixel_of(camera, point)
-    assert geometry.shape_index[at] == (renderer.describe().shapes.index(seen) + 1 if seen else 0)
-    assert geometry.depth[at] == pytest.approx(depth, rel=1e-4)  # Mitsuba begins anew a little beyond
 
-
-def test_an_instance_is_one_shape(tmp_path):
-    file = write(
-        tmp_path,
-        f"""<shape type="shapegroup" id="group">{placed("sphere", "a", (0, 0, 0), DIFFUSE)}</shape>""",
-        *(
-            f"""<shape type="instance" id="copy {k}"><ref id="group"/>
-<transform name="to_world"><translate x="{k}"/></transform></shape>"""
-            for k in (-1, 1)
-        ),
-    )
-    renderer = opened(file)
-    camera = Camera(look_at((0, 0, 8), (0, 0, 0)), 40.0, 64, 48)
-    geometry = find_geometry(renderer, camera)
-    names = renderer.describe().shapes
-    assert [names[geometry.shape_index[pixel_of(camera, (k, 0, 0))] - 1] for k in (-1, 1)] == [
-        "copy -1",
-        "copy 1",
-    ]
-
-
-def test_equal_materials_stay_separate_shapes(tmp_path):
-    # Mitsuba joins meshes that share a material, unless it is told not to.
-    shared = f'<bsdf type="diffuse" id="grey"/>{placed("cube", "a", (-1, 0, 0), "<ref id=%sgrey%s/>")}'
-    shared += placed("cube", "b", (1, 0, 0), "<ref id=%sgrey%s/>")
-    renderer = opened(write(tmp_path, shared.replace("%s", '"')))
-    assert renderer.describe().shapes == ("a", "b")
-
-
-def test_distance_counts_in_lengths_of_the_direction(swatches):
-    renderer, _, _ = swatches
-    found = renderer.surfaces(Rays(Array3f(0, 0, 6), Array3f(0, 0, -2)))
-    assert found.distance[0] == pytest.approx(3.0, rel=1e-5)
+REC709 = np.array([0.2126, 0.7152, 0.0722])
 
 
 @pytest.fixture(scope="module")
@@ -294,15 +106,15 @@ def test_pixels_are_those_that_mitsuba_renders(corner):
 
 
 @pytest.mark.parametrize("at", list(PixelFilter))
-def test_random_numbers_depend_on_the_pixel_alone(corner, corner_file, at):
+def test_random_numbers_depend_on_the_pixel_alone(corner, monkeypatch, at):
     renderer, camera = corner
-    in_chunks = opened(corner_file, chunk=1024)
     whole = traced(renderer, camera, spp=70, at=at)  # two passes
     order = np.random.default_rng(4).permutation(everything(camera))
     shuffled = traced(renderer, camera, order, spp=70, at=at)
     assert shuffled.color.tobytes() == whole.color[order].tobytes()
     assert shuffled.variance.tobytes() == whole.variance[order].tobytes()
-    few = traced(in_chunks, camera, order[:37], spp=70, at=at)
+    monkeypatch.setattr(renderer, "_chunk", 1024)
+    few = traced(renderer, camera, order[:37], spp=70, at=at)
     assert few.color.tobytes() == whole.color[order[:37]].tobytes()
 
 
@@ -323,77 +135,6 @@ def test_the_longest_path_is_the_setting(corner, corner_file):
     emitted = traced(opened(corner_file, max_depth=1), camera, spp=64).color.mean()
     assert emitted < 0.8 * direct
     assert direct < traced(renderer, camera, spp=64).color.mean()
-
-
-HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
-SPOT = '<emitter type="spot"/>'
-THREE = '<integer name="max_depth" value="3"/>'
-FOG = '<medium type="homogeneous" name="interior"/>'
-
-
-def of_integrator(folder, integrator, inside=DIFFUSE):
-    file = folder / "scene.xml"
-    file.write_text(
-        f'<scene version="3.0.0">{integrator}{placed("sphere", "ball", (0, 0, 0), inside)}'
-        f'<emitter type="constant"/></scene>'
-    )
-    return file
-
-
-@pytest.mark.parametrize(
-    ("integrator", "inside", "words"),
-    [
-        ('<integrator type="path"/>', DIFFUSE, ""),
-        ('<integrator type="volpath"/>', DIFFUSE, ""),
-        ("", DIFFUSE, ""),
-        ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
-        (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3, below 4"),
-        (HIDDEN.format("path"), DIFFUSE, "hides"),
-        ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "participating media"),
-        ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
-        ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
-        (f'<integrator type="volpath"/>{SPOT}', DIFFUSE, ""),
-        (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', "through null interactions"),
-        (f'<integrator type="path"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
-    ],
-)  # fmt: skip
-def test_why_lobes_are_inseparable(tmp_path, integrator, inside, words):
-    why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable
-    assert (words in why) if words else (why == "")
-
-
-@pytest.mark.parametrize("opacity", [1.0, 0.6])
-def test_a_mask_is_as_diffuse_as_it_is_opaque(tmp_path, opacity):
-    """An opaque mask has no specular lobes to sample."""
-    renderer = opened(of_integrator(tmp_path, "", f'<bsdf type="twosided">{DIFFUSE}</bsdf>'))
-    leaf = opened(of_integrator(tmp_path, "", veil(opacity)))
-    rays = Rays(Array3f(0, 0, 6), Array3f(0, 0, -1))
-    whole, pierced = renderer.intersect(rays), leaf.intersect(rays)
-    np.testing.assert_allclose(
-        rows(pierced.surfaces.albedo), opacity * rows(whole.surfaces.albedo), rtol=1e-5
-    )
-    assert not whole.has_specular[0]
-    assert pierced.has_specular[0] == (opacity < 1.0)
-
-
-def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):
-    unknown = (
-        '<integrator type="direct"><integer name="a" value="8"/><integer name="b" value="9"/></integrator>'
-    )
-    with pytest.raises(SceneError, match=r'2 unreferenced .* type "direct": integer "a": 8, integer "b": 9$'):
-        opened(of_integrator(tmp_path, unknown))
-
-
-def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
-    integrator = opened(of_integrator(tmp_path, HIDDEN.format("volpath")), max_depth=7)._integrator
-    assert (integrator.class_name(), integrator.hide_emitters) == ("VolumetricPathIntegrator", True)
-    assert "max_depth = 7" in str(integrator)
-    direct = of_integrator(tmp_path, '<integrator type="direct"/>')
-    with pytest.raises(SceneError, match="DirectIntegrator, has no limit of the path depth: leave --max"):
-        opened(direct, max_depth=7)
-    for name in ("ptracer", "prb", "prbvolpath"):
-        with pytest.raises(SceneError, match="can't render single pixels"):
-            opened(of_integrator(tmp_path, f'<integrator type="{name}"/>'))
 
 
 def test_fog_around_the_camera_is_that_of_the_scenes_camera(tmp_path):
@@ -453,7 +194,6 @@ def test_no_kernel_is_compiled_from_frame_to_frame(corner):
 
 def test_kernels_of_masked_materials_serve_any_number_of_lanes(tmp_path):
     """A reduction over channels and lanes would compile their number."""
-    gc.collect()
     renderer = opened(write(tmp_path, placed("sphere", "ball", (0, 0, 0), veil(0.3))))
 
     def albedo(count):

@@ -1,0 +1,79 @@
+"""Integrators of Mitsuba scenes: which are accepted, and whose lobes are separable."""
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import Array3f, rows
+from enfilade.errors import SceneError
+from enfilade.renderer import Rays
+from support.mitsuba_scene import DIFFUSE, opened, placed, veil
+
+HIDDEN = '<integrator type="{}"><boolean name="hide_emitters" value="true"/></integrator>'
+SPOT = '<emitter type="spot"/>'
+THREE = '<integer name="max_depth" value="3"/>'
+FOG = '<medium type="homogeneous" name="interior"/>'
+
+
+def of_integrator(folder, integrator, inside=DIFFUSE):
+    file = folder / "scene.xml"
+    file.write_text(
+        f'<scene version="3.0.0">{integrator}{placed("sphere", "ball", (0, 0, 0), inside)}'
+        f'<emitter type="constant"/></scene>'
+    )
+    return file
+
+
+@pytest.mark.parametrize(
+    ("integrator", "inside", "words"),
+    [
+        ('<integrator type="path"/>', DIFFUSE, ""),
+        ('<integrator type="volpath"/>', DIFFUSE, ""),
+        ("", DIFFUSE, ""),
+        ('<integrator type="direct"/>', DIFFUSE, "DirectIntegrator, not a path tracer"),
+        (f'<integrator type="path">{THREE}</integrator>', DIFFUSE, "depth 3, below 4"),
+        (HIDDEN.format("path"), DIFFUSE, "hides"),
+        ('<integrator type="volpath"/>', f'<bsdf type="null"/>{FOG}', "participating media"),
+        ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
+        ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
+        (f'<integrator type="volpath"/>{SPOT}', DIFFUSE, ""),
+        (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', "through null interactions"),
+        (f'<integrator type="path"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
+    ],
+)  # fmt: skip
+def test_why_lobes_are_inseparable(tmp_path, integrator, inside, words):
+    why = opened(of_integrator(tmp_path, integrator, inside)).why_inseparable
+    assert (words in why) if words else (why == "")
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.6])
+def test_a_mask_is_as_diffuse_as_it_is_opaque(tmp_path, opacity):
+    """An opaque mask has no specular lobes to sample."""
+    renderer = opened(of_integrator(tmp_path, "", f'<bsdf type="twosided">{DIFFUSE}</bsdf>'))
+    leaf = opened(of_integrator(tmp_path, "", veil(opacity)))
+    rays = Rays(Array3f(0, 0, 6), Array3f(0, 0, -1))
+    whole, pierced = renderer.intersect(rays), leaf.intersect(rays)
+    np.testing.assert_allclose(
+        rows(pierced.surfaces.albedo), opacity * rows(whole.surfaces.albedo), rtol=1e-5
+    )
+    assert not whole.has_specular[0]
+    assert pierced.has_specular[0] == (opacity < 1.0)
+
+
+def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):
+    unknown = (
+        '<integrator type="direct"><integer name="a" value="8"/><integer name="b" value="9"/></integrator>'
+    )
+    with pytest.raises(SceneError, match=r'2 unreferenced .* type "direct": integer "a": 8, integer "b": 9$'):
+        opened(of_integrator(tmp_path, unknown))
+
+
+def test_a_limit_of_edges_leaves_the_integrator_what_it_is(tmp_path):
+    integrator = opened(of_integrator(tmp_path, HIDDEN.format("volpath")), max_depth=7)._integrator
+    assert (integrator.class_name(), integrator.hide_emitters) == ("VolumetricPathIntegrator", True)
+    assert "max_depth = 7" in str(integrator)
+    direct = of_integrator(tmp_path, '<integrator type="direct"/>')
+    with pytest.raises(SceneError, match="DirectIntegrator, has no limit of the path depth: leave --max"):
+        opened(direct, max_depth=7)
+    for name in ("ptracer", "prb", "prbvolpath"):
+        with pytest.raises(SceneError, match="can't render single pixels"):
+            opened(of_integrator(tmp_path, f'<integrator type="{name}"/>'))
