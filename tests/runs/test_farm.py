@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -167,6 +168,7 @@ def test_a_command_that_has_just_been_started_ends_with_its_job(monkeypatch):
             super().__init__(*args, **options)
             started.append(self)
             os.kill(os.getpid(), signal.SIGUSR2)
+            time.sleep(0.2)  # for the main thread to run the handler
 
     def out_of_time(*_):
         raise SystemExit
@@ -177,7 +179,7 @@ def test_a_command_that_has_just_been_started_ends_with_its_job(monkeypatch):
     try:
         with pytest.raises(SystemExit):
             farm.Command(["sleep", "3600"])()
-        assert started[0].poll() == -signal.SIGKILL
+        assert started[0].returncode == -signal.SIGKILL
     finally:
         signal.signal(signal.SIGUSR2, before)
         started[0].kill()

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from collections import Counter, deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -109,19 +109,32 @@ class Command:
             It failed.
         """
         last: deque[str] = deque(maxlen=TAIL)
-        # submitit ends the job from within a handler of this signal: not before the process can be killed.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR2})
-        with subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace") as process:  # noqa: S603
+        started: list[subprocess.Popen[str]] = []
+
+        def start() -> None:
+            started.append(
+                subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace")  # noqa: S603
+            )
+
+        # submitit ends the job by an exception from a signal handler. Handlers run in the main thread: in
+        # another one the process is started and noted, or neither.
+        with ThreadPoolExecutor(1) as starter:
             try:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-                for text in process.stderr or ():
+                starter.submit(start).result()
+                for text in started[0].stderr or ():
                     sys.stderr.write(text)
                     last.append(text)
             except BaseException:
-                process.kill()
+                starter.shutdown()
+                for process in started:
+                    process.kill()
                 raise
-        if process.returncode:
-            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {process.returncode}")
+            finally:
+                for process in started:
+                    with process:  # wait for it, and close its pipe
+                        pass
+        if code := started[0].returncode:
+            raise EnfiladeError("".join(last).strip() or f"it ended with exit code {code}")
 
     def checkpoint(self) -> Any:
         """The same again: finished tasks of the run are not done again."""
