@@ -34,7 +34,7 @@ from studies.bench.tables import ratio_text
 
 HERE = Path(__file__).resolve().parent
 QUICK_FRAMES, FRAMES, LARGE_FRAMES = 16, 40, 8
-QUICK_SPP = "512"
+REFERENCE_SPP = "512"
 
 
 def main() -> int:
@@ -53,8 +53,8 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
-    if arguments.quick and not any(option.startswith("--reference-spp") for option in options):
-        options += ["--reference-spp", QUICK_SPP]
+    if not any(option.startswith("--reference-spp") for option in options):
+        options += ["--reference-spp", REFERENCE_SPP]
     names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
     benches: list[dict[str, Any]] = []
     failed = []

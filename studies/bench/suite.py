@@ -21,12 +21,11 @@ PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixe
 FIRST_FRAME = 11  # where the path is long enough
 LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
-    *(f"denoised-{spp}" for spp in (2, 4, 8, 16, 32)), "denoised-2-fast", "denoised-4-fast",
-    *(f"denoised-{name}" for name in ("4-accumulated", "4-accumulated-after", "8-accumulated-after")),
-    "paper-16", "decoupled-*",
+    *(f"denoised-{name}" for name in ("2", "4", "8", "16", "32", "8-accumulated-after")),
+    "paper-16", "decoupled-60", "decoupled-15",
 )  # fmt: skip
 LARGE = (
-    *(f"denoised-{name}" for name in ("2-fast", "4-fast", "4", "8", "4-accumulated-after")),
+    *(f"denoised-{name}" for name in ("2-fast", "4", "8", "16", "4-accumulated-after")),
     "decoupled-60", "decoupled-15",
 )  # fmt: skip
 QUICK = ("denoised-2", "denoised-4", "denoised-8", "decoupled-60", "decoupled-15")
