@@ -10,6 +10,7 @@ from typing import Any
 from enfilade_blender.materials import mapping, table
 from enfilade_blender.materials.values import (
     IDENTITY,
+    PRINCIPLED,
     Add,
     AttributeValue,
     Bump,
@@ -74,7 +75,7 @@ class Graph:
             return Nothing()
         node, inner = found.node, found.groups
         if node.type == "BSDF_PRINCIPLED":
-            names = (name for name in mapping.PRINCIPLED if name in node.inputs)
+            names = (name for name in PRINCIPLED if name in node.inputs)
             inputs = {name: self.value(node.inputs[name], inner) for name in names}
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":

@@ -9,13 +9,6 @@ import numpy as np
 
 from enfilade_blender.materials.values import Matrix3
 
-PRINCIPLED = (  # inputs that are read; Blender 4.2 has not all of them
-    "Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Diffuse Roughness", "Subsurface Weight",
-    "Specular IOR Level", "Specular Tint", "Anisotropic", "Transmission Weight", "Coat Weight",
-    "Coat Roughness", "Coat IOR", "Sheen Weight", "Sheen Tint", "Emission Color", "Emission Strength",
-    "Thin Film Thickness",
-)  # fmt: skip
-
 
 def interface_ior(ior: float, level: float) -> float:
     """Index of refraction of the Principled BSDF's interface; its level scales the reflectance at the normal.

@@ -113,11 +113,8 @@ def build(shader: Shader, context: Context) -> Surface:
             return _transparent(shader, context)
         return Surface(lobe_bsdf(shader, context))
     if isinstance(shader, Principled):
-        inputs = shader.inputs
-        colour = inputs.get("Emission Color", WHITE)
-        strength = inputs.get("Emission Strength", Constant((0.0,)))
-        alpha = inputs.get("Alpha", WHITE)
-        emitted = _radiance(colour, strength, context)
+        alpha = shader["Alpha"]
+        emitted = _radiance(shader["Emission Color"], shader["Emission Strength"], context)
         surface = Surface(principled_bsdf(shader, context), emitted=emitted)
         return surface if is_one(alpha) else _cut_out(surface, alpha, shader.name, context)
     if isinstance(shader, Add):
