@@ -28,7 +28,7 @@ from enfilade_blender.ply import Mesh, joined, write_ply
 from enfilade_blender.records import Placed, Selection, View
 from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, reference
 
-DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), Constant((0.0,)), Constant((1.0,)), None, "no material")
+DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances

@@ -12,12 +12,12 @@ from enfilade_blender.materials import ggx, mapping
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     AttributeValue,
-    Bump,
     Constant,
     ImageValue,
     Lobe,
     Normal,
     NormalMap,
+    ProceduralNormal,
     Texture,
     Value,
 )
@@ -53,13 +53,21 @@ class Context:
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
     """BSDF of a closure with one lobe."""
-    builders = {
-        "diffuse": _diffuse_lobe,
-        "glossy": _glossy_lobe,
-        "glass": _glass_lobe,
-        "translucent": _translucent_lobe,
-    }
-    return with_normal(builders[lobe.kind](lobe, context), lobe.normal, context)
+    match lobe.kind:
+        case "glossy":
+            bsdf = conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
+        case "glass":
+            ior = float(np.mean(context.textures.mean(lobe.ior)))
+            bsdf = glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
+        case "translucent":  # diffuse transmission alone: the thin principled BSDF without an interface
+            thin = {"diff_trans": 2.0, "eta": NO_INTERFACE, "roughness": 0.5}
+            bsdf = plugin("bsdf", "principledthin", base_color=context.textures.colour(lobe.colour), **thin)
+        case _:
+            if not is_zero(lobe.roughness):
+                what, effect = "the roughness of diffuse reflection is left out", "the surface is Lambertian"
+                context.notes.add("approximated", context.owner, lobe.name, what, effect)
+            bsdf = plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour))
+    return with_normal(bsdf, lobe.normal, context)
 
 
 def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) -> Element:
@@ -134,32 +142,6 @@ def is_zero(value: Value) -> bool:
     return isinstance(value, Constant) and value.number <= 1.0 - ALMOST
 
 
-def _diffuse_lobe(lobe: Lobe, context: Context) -> Element:
-    if not is_zero(lobe.roughness):
-        what, effect = "the roughness of diffuse reflection is left out", "the surface is Lambertian"
-        context.notes.add("approximated", context.owner, lobe.name, what, effect)
-    return plugin("bsdf", "diffuse", reflectance=context.textures.colour(lobe.colour))
-
-
-def _translucent_lobe(lobe: Lobe, context: Context) -> Element:
-    """Diffuse transmission alone: the thin principled BSDF without an interface."""
-    colour_value = context.textures.colour(lobe.colour)
-    return plugin(
-        "bsdf", "principledthin", base_color=colour_value, diff_trans=2.0, eta=NO_INTERFACE, roughness=0.5
-    )
-
-
-def _glossy_lobe(lobe: Lobe, context: Context) -> Element:
-    return conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
-
-
-def _glass_lobe(lobe: Lobe, context: Context) -> Element:
-    ior = (
-        lobe.ior.number if isinstance(lobe.ior, Constant) else float(np.mean(context.textures.mean(lobe.ior)))
-    )
-    return glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
-
-
 def glass_bsdf(
     transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context
 ) -> Element:
@@ -172,11 +154,7 @@ def glass_bsdf(
         tint = colour(value.colour, scale) if isinstance(value, Constant) else context.textures.colour(value)
         if tint != WHITE:
             tints[name] = tint
-    if isinstance(alpha, float) and alpha < SMOOTH:
-        return plugin("bsdf", "dielectric", int_ior=ior, ext_ior=1.0, **tints)
-    return plugin(
-        "bsdf", "roughdielectric", distribution="ggx", alpha=alpha, int_ior=ior, ext_ior=1.0, **tints
-    )
+    return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
 
 
 def conductor_bsdf(
@@ -185,7 +163,7 @@ def conductor_bsdf(
 ) -> Element:  # fmt: skip
     """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
     alpha = _alpha(roughness, context)
-    typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
+    typical = _typical(alpha, roughness, context)
     optics: dict[str, Property] = {"material": "none"}
     if isinstance(reflectance, Constant):
         r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
@@ -197,10 +175,16 @@ def conductor_bsdf(
             optics["specular_reflectance"] = colour(r * gain)
     else:
         optics["specular_reflectance"] = context.textures.colour(reflectance)
+    return _microfacets("conductor", alpha, extra, **optics)
+
+
+def _microfacets(
+    kind: str, alpha: float | Element, extra: dict[str, Property] | None = None, **optics: Property
+) -> Element:
+    """A smooth BSDF, or a rough one of GGX microfacets, whose `extra` alphas stand in place of the one."""
     if isinstance(alpha, float) and alpha < SMOOTH:
-        return plugin("bsdf", "conductor", **optics)
-    lobe: dict[str, Property] = extra or {"alpha": alpha}
-    return plugin("bsdf", "roughconductor", distribution="ggx", **lobe, **optics)
+        return plugin("bsdf", kind, **optics)
+    return plugin("bsdf", f"rough{kind}", distribution="ggx", **(extra or {"alpha": alpha}), **optics)
 
 
 def _alpha(roughness: Value, context: Context) -> float | Element:
@@ -212,6 +196,11 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
         squared = np.maximum(context.textures.pixels(roughness).mean(axis=-1, keepdims=True) ** 2, ALPHA_MIN)
         return context.textures.rewritten(roughness, squared, "alpha")
     return 0.25
+
+
+def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:
+    """An alpha; that of the mean roughness of a texture."""
+    return alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
 
 
 def layered(
@@ -228,67 +217,41 @@ def layered(
     dimmed by the rest, and no colour of it is scaled.
     """
     alpha = _alpha(roughness, context)
-    typical = alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
-    mean = ggx.mean_reflectance(round(typical, 3), round(ior, 3))
+    mean = ggx.mean_reflectance(round(_typical(alpha, roughness, context), 3), round(ior, 3))
     if is_zero(weight) or mean < 1e-3:
         return base
-    optics: dict[str, Property] = {
-        "eta": (ior,) * 3,
-        "k": (0.0,) * 3,
-        "specular_reflectance": colour(tint, 1.0 / mean),
-    }
-    if isinstance(alpha, float) and alpha < SMOOTH:
-        layer = plugin("bsdf", "conductor", **optics)
-    else:
-        layer = plugin("bsdf", "roughconductor", distribution="ggx", alpha=alpha, **optics)
+    reflectance = colour(tint, 1.0 / mean)
+    layer = _microfacets("conductor", alpha, eta=(ior,) * 3, k=(0.0,) * 3, specular_reflectance=reflectance)
     return plugin("bsdf", "blendbsdf", base, layer, weight=context.textures.scaled_number(weight, mean))
 
 
 def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
     """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
-    if normal is None or (isinstance(normal, NormalMap | Bump) and _is_void(normal, context)):
+    if isinstance(normal, ProceduralNormal):
+        raise TypeError("procedural normals are baked before they are written")
+    if normal is None or _is_void(normal.image, context):
         return bsdf
     if isinstance(normal, NormalMap):
-        return plugin(
-            "bsdf",
-            "normalmap",
-            bsdf,
-            normalmap=_normal_texture(normal, context),
-            use_shadowing_function=False,
-        )
-    if isinstance(normal, Bump):
-        height = _height(normal, context)
-        return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
-    raise TypeError("procedural normals are baked before they are written")
+        texture = _normal_texture(normal, context)
+        return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=False)
+    height = context.textures.number(normal.image)
+    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
 
 
-def _is_void(normal: NormalMap | Bump, context: Context) -> bool:
-    value = normal.image if isinstance(normal, NormalMap) else normal.height
-    if isinstance(value, Constant):
-        return True
-    return isinstance(value, ImageValue) and context.textures.is_missing(value)
-
-
-def _height(bump: Bump, context: Context) -> Element:
-    element = context.textures.number(bump.height)
-    if not isinstance(element, Element):
-        raise TypeError("a constant height is no bump map")
-    return element
+def _is_void(value: Value, context: Context) -> bool:
+    return isinstance(value, Constant) or (
+        isinstance(value, ImageValue) and context.textures.is_missing(value)
+    )
 
 
 def _normal_texture(normal: NormalMap, context: Context) -> Element:
     value = normal.image
-    if isinstance(value, ImageValue | Texture) and abs(normal.strength - 1.0) > 1e-3:
-        n = context.textures.pixels(value) * 2.0 - 1.0
-        n = np.concatenate(
-            [n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1
-        )
-        n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
-        return context.textures.rewritten(value, 0.5 * n + 0.5, f"normal {normal.strength:.3g}")
-    element = context.textures.colour(value)
-    if not isinstance(element, Element):
-        raise TypeError("a constant normal is no normal map")
-    return element
+    if abs(normal.strength - 1.0) < 1e-3 or not isinstance(value, ImageValue | Texture):
+        return context.textures.colour(value)
+    n = context.textures.pixels(value) * 2.0 - 1.0
+    n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
+    n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
+    return context.textures.rewritten(value, 0.5 * n + 0.5, f"normal {normal.strength:.3g}")
 
 
 def blend(

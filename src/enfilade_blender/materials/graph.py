@@ -64,8 +64,7 @@ class Graph:
             if output.inputs[name].is_linked:
                 self._notes.add("not-carried", self._owner, name, f"{name.lower()} is not exported", effect)
         if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
-            white, nothing = Constant((1.0, 1.0, 1.0)), Constant((0.0,))
-            return Lobe("transparent", white, nothing, nothing, None, output.name)
+            return Lobe("transparent", Constant((1.0, 1.0, 1.0)), output.name)
         return self.shader(output.inputs["Surface"], ())
 
     def shader(self, socket: Any, groups: tuple[Any, ...]) -> Shader:
@@ -145,9 +144,7 @@ class Graph:
         if kind is None:
             what, effect = "this shader has no counterpart", "its surface is a neutral grey"
             self._notes.add("not-carried", self._owner, f"{node.name} ({node.type})", what, effect)
-            return Lobe(
-                "diffuse", Constant((0.5, 0.5, 0.5)), Constant((0.0,)), Constant((1.0,)), None, node.name
-            )
+            return Lobe("diffuse", Constant((0.5, 0.5, 0.5)), node.name)
         if kind.note:
             self._notes.add("approximated", self._owner, node.name, kind.note, kind.effect)
 
@@ -157,7 +154,7 @@ class Graph:
         colour = named("Base Color" if "Base Color" in node.inputs else "Color", (0.8, 0.8, 0.8))
         normal = self.normal(node.inputs["Normal"], groups) if "Normal" in node.inputs else None
         ior = named("IOR", (DIELECTRIC_IOR,))
-        return Lobe(kind.lobe, colour, named("Roughness", (0.0,)), ior, normal, node.name)
+        return Lobe(kind.lobe, colour, node.name, named("Roughness", (0.0,)), ior, normal)
 
     def _fresnel(self, socket: Any, groups: tuple[Any, ...]) -> float | None:
         """IOR of a factor that is Fresnel's reflectance."""
@@ -212,14 +209,13 @@ def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
 def image_coordinates(node: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] | None:
     """UV map and affine map of an image texture, or None where a bitmap can't look it up so."""
     image = node.image
+    if image is None:
+        return "", IDENTITY
     is_plain = (
-        image is not None
-        and node.projection == "FLAT"
+        node.projection == "FLAT"
         and image.source in PLAIN_SOURCES
         and image.colorspace_settings.name in PLAIN_SPACES
     )
-    if image is None:
-        return "", IDENTITY
     return uv_coordinates(node.inputs["Vector"], groups) if is_plain else None
 
 

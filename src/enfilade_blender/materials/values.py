@@ -125,7 +125,7 @@ class NormalMap:
 class Bump:
     """Heights of an image, scene units for each unit of the image."""
 
-    height: Value
+    image: Value
     scale: float
 
 
@@ -165,18 +165,18 @@ class Lobe:
     ----------
     kind : str
         "diffuse", "glossy", "glass", "transparent" or "translucent".
-    colour, roughness, ior
-    normal
+    colour
     name : str
         Of the node.
+    roughness, ior, normal
     """
 
     kind: str
     colour: Value
-    roughness: Value
-    ior: Value
-    normal: Normal
     name: str
+    roughness: Value = Constant((0.0,))
+    ior: Value = Constant((1.0,))
+    normal: Normal = None
 
 
 @dataclass(frozen=True)
