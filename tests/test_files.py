@@ -1,14 +1,13 @@
 """Atomic writes, the sweeping of what killed processes leave, and errors of the disk."""
 
-import contextlib
 import errno
 import os
-import resource
 import socket
 import stat
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -18,20 +17,10 @@ from enfilade import files
 from enfilade.errors import NoSpaceError, RunFolderError
 from enfilade.files import json_bytes, read_json, sweep, unwritable, whole_file, whole_folder, write_json
 from enfilade.images import write_exr
+from support.toys import little_room
 
 ROOM = 20_000  # bytes
 NOISE = np.random.default_rng(1).random((120, 160, 3), np.float32)
-
-
-@contextlib.contextmanager
-def little_room(size=ROOM):
-    """Let no file grow beyond a bound: the kernel answers as at the end of a quota."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_file_is_replaced_when_the_block_ends_and_not_after_an_error(tmp_path):
@@ -91,7 +80,7 @@ def test_temporary_files_are_swept_when_their_writer_is_gone_or_they_are_a_day_o
 )
 def test_a_full_disk(tmp_path, write):
     file = tmp_path / "deep" / "file.exr"
-    with little_room(), pytest.raises(NoSpaceError, match=r"file\.exr: no room on the disk"):
+    with little_room(ROOM), pytest.raises(NoSpaceError, match=r"file\.exr: no room on the disk"):
         write(file)
     assert not list(file.parent.iterdir())
     write(file)
@@ -144,7 +133,7 @@ def test_only_folders_need_not_be_flushed_where_the_file_system_can_not(tmp_path
         really(handle)
 
     monkeypatch.setattr(os, "fsync", fsync)
-    with contextlib.nullcontext() if number != errno.EIO else pytest.raises(RunFolderError, match="error"):
+    with nullcontext() if number != errno.EIO else pytest.raises(RunFolderError, match="error"):
         write_json(tmp_path / "file.json", {})
     refused[0] = stat.S_ISREG
     with pytest.raises(RunFolderError, match=os.strerror(number)):

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
@@ -19,16 +18,9 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.processes import Processes
 from enfilade.runs.render import prepare, render
 from enfilade.settings import LimitSettings
-from support.toys import Recorder, attempts, command, digest, environment, order, toy_job, wait_for
+from support.toys import Recorder, attempts, command, digest, environment, is_alive, order, toy_job, wait_for
 
 LIGHT = [Task("light", frame) for frame in range(4)]
-
-
-def is_alive(pid):
-    try:
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
 
 
 @pytest.fixture

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from enfilade.camera.path import CameraPath
 from enfilade.methods.analysis import Analysis, analyze
-from enfilade.methods.base import FRAMES, Method, Task, TaskId
+from enfilade.methods.base import FRAMES, Method, TaskId
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.renderer import Renderer
 from enfilade.settings import Settings
@@ -48,39 +47,20 @@ class InMemory:
         return np.stack([self.record(FRAMES, f).color for f in range(len(self.analysis.path))]).astype(float)
 
 
-def run_passes(
-    method: Method,
-    walk: Walkthrough,
-    *,
-    last: str = FRAMES,
-    before: Callable[[Task], object] = id,
-) -> InMemory:
-    """Run all tasks up to a pass, in the order of the passes, and check what each task is given and writes.
-
-    Parameters
-    ----------
-    method
-    walk
-    last
-        The last pass.
-    before
-        Called before each task.
-    """
+def run_passes(method: Method, walk: Walkthrough) -> InMemory:
+    """Run all tasks, in the order of the passes, and check what each task is given and writes."""
     results = InMemory(walk)
     order = [one.name for one in method.passes]
     tasks = sorted(method.tasks(results.analysis), key=lambda task: (order.index(task.pass_name), task.frame))
     assert len({task.id for task in tasks}) == len(tasks)
     for task in tasks:
         assert all(need in results.task_facts for need in task.needs), task
-        before(task)
         output = method.run(task, results, walk)
         for frame, record in output.records.items():
             assert isinstance(record, method.passes[order.index(task.pass_name)].record), task
             assert TaskId(task.pass_name, frame) not in results.records, task
             results.records[TaskId(task.pass_name, frame)] = record
         results.task_facts[task.id] = dict(output.facts)
-        if task is tasks[-1] or tasks[tasks.index(task) + 1].pass_name not in order[: order.index(last) + 1]:
-            break
     return results
 
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
+from enfilade.renderer import Rays, SceneFacts, Surfaces
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad
 from support.example_scenes import slide
@@ -52,17 +49,9 @@ class PlantedWall:
     def surfaces(self, rays: Rays) -> Surfaces:
         return self._seen[_is_beyond(rays.origin.x[0])].surfaces(rays)
 
-    def trace(
-        self,
-        camera: Camera,
-        pixels: npt.NDArray[np.uint32],
-        random: RandomKey,
-        *,
-        spp: int,
-        pixel_filter: PixelFilter = PixelFilter.CENTRE,
-    ) -> Shading:
+    def trace(self, camera: Camera, *pixels_and_random: Any, **terms: Any) -> Shading:
         by_side = self._light[_is_beyond(camera.eye[0])]
-        return by_side.trace(camera, pixels, random, spp=spp, pixel_filter=pixel_filter)
+        return by_side.trace(camera, *pixels_and_random, **terms)
 
 
 def planted_path() -> CameraPath:

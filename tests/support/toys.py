@@ -73,12 +73,20 @@ def flip(file: Path, place: int = -1) -> None:
     file.write_bytes(data)
 
 
-def wait_for(condition: Callable[[], object], seconds: float = 120.0) -> None:
+def wait_for(condition: Callable[[], object]) -> None:
     """Wait until a condition holds."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + 120.0
     while not condition():
         assert time.monotonic() < until, "it does not come"
         time.sleep(0.02)
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process has not ended."""
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
 
 
 def command(folder: Path, executor: str, workers: int | None = None) -> list[str]:

@@ -5,8 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -20,6 +18,7 @@ from enfilade.scene.blender.notes import NoteKind, grouped
 from enfilade.scene.blender.source import Choices, Source
 from enfilade.settings import LimitSettings, VideoSettings, read_tables
 from support.fake_blender import NOTE
+from support.toys import is_alive, wait_for
 
 OUTSIDE = (
     '<scene version="3.0.0"><shape type="obj"><string name="filename" value="/etc/passwd"/></shape></scene>'
@@ -267,25 +266,11 @@ def test_blender_ends_with_the_command(shot, program, tmp_path, way):
     with subprocess.Popen(line, stderr=subprocess.DEVNULL) as command:  # noqa: S603
         try:
             wait_for(lambda: calls.exists() and calls.read_text().endswith("\n"))
-            assert is_running(int(calls.read_text()))
+            assert is_alive(int(calls.read_text()))
             command.send_signal(way)
             command.wait(60)
         finally:
             command.kill()
-    wait_for(lambda: not is_running(int(calls.read_text())))
+    wait_for(lambda: not is_alive(int(calls.read_text())))
     if way == signal.SIGINT:
         assert left(tmp_path) == ["blender", "shot.blend"]
-
-
-def is_running(pid):
-    try:
-        return bool(Path(f"/proc/{pid}/cmdline").read_bytes())  # empty of a process that has ended
-    except OSError:
-        return False
-
-
-def wait_for(condition, seconds=60.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
