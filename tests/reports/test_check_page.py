@@ -1,12 +1,9 @@
 """The page of ``enfilade import --check``, in a real browser."""
 
-import os
 import re
-import shutil
 
 import numpy as np
 import pytest
-from playwright.sync_api import sync_playwright
 
 from enfilade.reports.fidelity import differences_of, write_check
 from enfilade.runs.fidelity import CheckedFrame, Cost, ImportCheck
@@ -62,34 +59,11 @@ def test_the_page_says_what_differs(page_file):
     assert "no light under the surface" in text
 
 
-@pytest.fixture(scope="module")
-def browser():
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    assert program, "the tests of the page need Chromium; install it: sudo apt-get install chromium"
-    sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []  # which Chromium refuses to root
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=program, args=sandbox)
-        yield opened
-        opened.close()
-
-
 @pytest.fixture
-def page(browser, page_file):
-    """In the end there must have been no request to a network, and no message."""
-    complaints = []
-    context = browser.new_context(viewport={"width": 1440, "height": 900})
-    opened = context.new_page()
-    opened.on("console", lambda message: complaints.append(message.text))
-    opened.on("pageerror", lambda error: complaints.append(str(error)))
-    opened.on(
-        "request",
-        lambda one: one.url.startswith(("data:", page_file.as_uri())) or complaints.append(one.url),
-    )
-    opened.goto(page_file.as_uri())
+def page(open_page):
+    opened = open_page()
     opened.wait_for_selector('#pair[data-shown="11"]')
-    yield opened
-    context.close()
-    assert complaints == []
+    return opened
 
 
 def test_the_boundary_moves(page):
