@@ -339,13 +339,13 @@ def _is_finished(job: Job, folder: Path) -> bool:
 
 def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:
     """Render; return the CPU seconds of this process from its start, its peak memory, and new kernels."""
-    before = _cached_kernels()
+    before = cached_kernels()
     with watch(quiet=quiet) as monitor:
         render(job, folder, Prefixed(monitor, folder.name))
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    return {"cpu_s": time.process_time(), "peak_mib": peak_mib, "kernels": _cached_kernels() - before}
+    return {"cpu_s": time.process_time(), "peak_mib": peak_mib, "kernels": cached_kernels() - before}
 
 
-def _cached_kernels() -> int:
+def cached_kernels() -> int:
     """Number of compiled kernels in Dr.Jit's cache on disk."""
     return sum(1 for _ in KERNELS.glob("*"))

@@ -8,7 +8,6 @@ enfilade that compiled kernels is made again. Let nothing else run at the same t
 
 from __future__ import annotations
 
-import resource
 import shutil
 import subprocess
 import sys
@@ -32,10 +31,10 @@ from enfilade.records import F32
 from enfilade.scene.blender.find import find_blender
 from enfilade.scene.blender.imported import PATH_FILE, SCENE_FILE
 from enfilade.scene.blender.importer import import_file, job_table
-from enfilade.scene.blender.process import CYCLES_FILE, run_job
+from enfilade.scene.blender.process import CYCLES_FILE, cpu_of_children_s, run_job
 from enfilade.scene.blender.source import Choices
 from enfilade.settings import LimitSettings
-from studies.bench.bench import KERNELS
+from studies.bench.bench import cached_kernels
 from studies.versions import machine, origin
 
 LIMITS = LimitSettings(import_s=86_400.0)
@@ -121,9 +120,9 @@ class CyclesBench:
         """Do work, and note its cost, unless its folder is finished; once more if it compiled kernels."""
         if (out / COST).is_file():
             return out
-        kernels = _cached_kernels()
+        kernels = cached_kernels()
         self._do(out, work)
-        if is_repeated and _cached_kernels() != kernels:  # they are in the cache on disk now
+        if is_repeated and cached_kernels() != kernels:  # they are in the cache on disk now
             self._do(out, work)
         return out
 
@@ -131,9 +130,9 @@ class CyclesBench:
         """Do work in a new folder, and note its cost."""
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir(parents=True)
-        began, cpu_began = time.monotonic(), _cpu_of_children()
+        began, cpu_began = time.monotonic(), cpu_of_children_s()
         work()
-        cpu_s = _cpu_of_children() - cpu_began
+        cpu_s = cpu_of_children_s() - cpu_began
         write_json(out / COST, {"cpu_s": cpu_s, "wall_s": time.monotonic() - began})
 
 
@@ -158,15 +157,6 @@ def _image(run: Path, number: int) -> F32:
     name = f"cycles-{number:04d}.exr" if (run / CYCLES_FILE).exists() else f"run/frames/{number:04d}.exr"
     image: F32 = read_exr(run / name)["RGB"].astype(np.float32)
     return image
-
-
-def _cached_kernels() -> int:
-    return sum(1 for _ in KERNELS.glob("*"))
-
-
-def _cpu_of_children() -> float:
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
 
 
 @click.command()

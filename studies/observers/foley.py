@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
-from studies.observers.screen import screen
+from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
@@ -68,22 +68,15 @@ class Masking:
 
 def sine(angle_deg: float = 0.0) -> Float64Array:
     """Mask at contrast 1, (240, 240) float64: in phase with the target, upright bars turned by an angle."""
-    x, y = _plane()
+    x, y = plane(SIZE_PX, PIXELS_PER_DEGREE)
     theta = math.radians(angle_deg)
     return np.cos(2.0 * np.pi * FREQUENCY_CPD * (x * math.cos(theta) + y * math.sin(theta)))
 
 
 def gabor() -> Float64Array:
     """Target at contrast 1, (240, 240) float64: upright bars."""
-    x, y = _plane()
+    x, y = plane(SIZE_PX, PIXELS_PER_DEGREE)
     return sine() * np.exp(-0.5 * (x**2 + y**2) / SIGMA_DEG**2)
-
-
-def _plane() -> tuple[Float64Array, Float64Array]:
-    """Degrees from the centre, which is a pixel: x to the right, y down."""
-    steps = (np.arange(SIZE_PX) - SIZE_PX // 2) / PIXELS_PER_DEGREE
-    x, y = np.meshgrid(steps, steps)
-    return x, y
 
 
 def measure(mode: Mode, monitor: Monitor, *, angle_deg: int = 0) -> Masking:

@@ -16,7 +16,7 @@ import scipy.special
 
 from enfilade.monitor import Monitor
 from studies.observers.mode import Mode
-from studies.observers.screen import screen
+from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
@@ -97,13 +97,6 @@ class Thresholds:
         return float(np.sqrt(np.mean(errors_db**2)))
 
 
-def _plane() -> tuple[Float64Array, Float64Array]:
-    """Degrees from the centre, which is a pixel: x to the right, y down."""
-    steps = (np.arange(SIZE_PX) - SIZE_PX // 2) / PIXELS_PER_DEGREE
-    x, y = np.meshgrid(steps, steps)
-    return x, y
-
-
 def _gauss(x: Float64Array, y: Float64Array, sigma_x: float, sigma_y: float) -> Float64Array:
     return np.exp(-0.5 * ((x / sigma_x) ** 2 + (y / sigma_y) ** 2))
 
@@ -164,7 +157,7 @@ def target(number: int) -> Float64Array:
     (256, 256) float64
         Relative deviation from the mean luminance, -1 to 1.
     """
-    x, y = _plane()
+    x, y = plane(SIZE_PX, PIXELS_PER_DEGREE)
     if number in GABORS:
         cpd, sigma_x, sigma_y = GABORS[number]
         return _wave(x, y, cpd) * _gauss(x, y, sigma_x, sigma_y)

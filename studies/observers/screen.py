@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from enfilade.viewing import Viewing
 
-__all__ = ["screen"]
+Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 DISTANCE_M = 1.0  # arbitrary: only the angle of a pixel matters
 
@@ -42,3 +46,10 @@ def screen(
         peak_cd_m2=peak_cd_m2,
         black_cd_m2=0.0,
     )
+
+
+def plane(size_px: int, pixels_per_degree: float) -> tuple[Float64Array, Float64Array]:
+    """Degrees from the centre of an image, which is a pixel: x to the right, y down."""
+    steps = (np.arange(size_px) - size_px // 2) / pixels_per_degree
+    x, y = np.meshgrid(steps, steps)
+    return x, y

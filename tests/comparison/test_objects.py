@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enfilade.comparison.objects import ImagePair, compare_objects
+from enfilade.comparison.objects import compare_objects
 
 NAMES = ("floor", "wall", "speck", "hidden")
 SIZE = (40, 60)
@@ -26,10 +26,9 @@ def noisy(image, seed, noise=0.5):
 
 
 def compared(reference, test, index, noise=0.5):
-    pairs = [
-        ImagePair(n, noisy(reference, 2 * n, noise), noisy(test, 2 * n + 1, noise), index) for n in range(4)
-    ]
-    return compare_objects(pairs, NAMES)
+    frames = (np.broadcast_to(of, (4, *of.shape)) for of in (reference, test))
+    halves = (noisy(of, seed, noise) for seed, of in enumerate(frames))
+    return compare_objects(*halves, np.broadcast_to(index, (4, *SIZE)), NAMES)
 
 
 def textured(level=0.5):

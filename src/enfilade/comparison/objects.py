@@ -24,25 +24,6 @@ DARKEST = 0.01  # of the mean of all pixels: differences of darker objects are r
 SIGMAS = 2.0  # of the stated noise
 
 
-@dataclass(frozen=True, eq=False)
-class ImagePair:
-    """A frame by a reference renderer and by the one under test, each in two halves.
-
-    Attributes
-    ----------
-    number : int
-    reference, test : tuple of two (H, W, 3) float32
-        Linear Rec.709.
-    shape_index : (H, W) uint32
-        Of the object at the centre of each pixel; 0: none.
-    """
-
-    number: int
-    reference: tuple[F32, F32]
-    test: tuple[F32, F32]
-    shape_index: U32
-
-
 @dataclass(frozen=True)
 class ObjectDifference:
     """How an object differs between two renderers.
@@ -80,13 +61,17 @@ class ObjectDifference:
         return max(self.color_percent - self.noise_percent, 0.0)
 
 
-def compare_objects(pairs: Sequence[ImagePair], names: Sequence[str]) -> list[ObjectDifference]:
+def compare_objects(
+    reference: Sequence[F32], test: Sequence[F32], shape_index: U32, names: Sequence[str]
+) -> list[ObjectDifference]:
     """Differences of all pixels together, and of each object with enough of them.
 
     Parameters
     ----------
-    pairs
-        Frames of one scene.
+    reference, test : two (F, H, W, 3) float32
+        Frames by a reference renderer and by the one under test, each in two halves; linear Rec.709.
+    shape_index : (F, H, W) uint32
+        Of the object at the centre of each pixel; 0: none.
     names
         Of objects 1, 2, ...
 
@@ -95,11 +80,8 @@ def compare_objects(pairs: Sequence[ImagePair], names: Sequence[str]) -> list[Ob
     list of ObjectDifference
         Everything first, then objects, that with the largest difference first.
     """
-    index = np.concatenate([pair.shape_index.ravel() for pair in pairs])
-    images = [
-        np.concatenate([half.reshape(-1, 3) for half in halves]).astype(np.float64)
-        for halves in zip(*((*pair.reference, *pair.test) for pair in pairs), strict=True)
-    ]
+    index = shape_index.ravel()
+    images = [half.reshape(-1, 3).astype(np.float64) for half in (*reference, *test)]
     floor = DARKEST * float(images[0].mean() + images[1].mean()) / 2.0
     whole = _difference("everything", 0, np.arange(len(index)), len(index), images, floor)
     found = [

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison.objects import ImagePair, ObjectDifference, compare_objects
+from enfilade.comparison.objects import ObjectDifference, compare_objects
 from enfilade.images.stills import encode_webp
 from enfilade.images.view import View, open_view
 from enfilade.records import F32, U8, U32
@@ -30,8 +30,11 @@ WEBP_QUALITY = 92
 
 def differences_of(check: ImportCheck) -> list[ObjectDifference]:
     """Everything first, then objects, that with the largest difference of colour first."""
-    pairs = [ImagePair(of.number, of.cycles, of.imported, of.shape_index) for of in check.frames]
-    return compare_objects(pairs, check.names)
+    cycles, imported = (
+        [np.stack(half) for half in zip(*halves, strict=True)]
+        for halves in ([of.cycles for of in check.frames], [of.imported for of in check.frames])
+    )
+    return compare_objects(cycles, imported, np.stack([of.shape_index for of in check.frames]), check.names)
 
 
 def write_check(imported: ImportedScene, check: ImportCheck, differences: Sequence[ObjectDifference]) -> Path:

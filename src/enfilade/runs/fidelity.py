@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.scene.blender.find import Blender
 from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.importer import job_table
-from enfilade.scene.blender.process import CYCLES_FILE, run_job
+from enfilade.scene.blender.process import CYCLES_FILE, cpu_of_children_s, run_job
 from enfilade.scene.blender.source import Choices
 from enfilade.scene.opener import Scene
 from enfilade.settings import LimitSettings, Settings, TraceSettings
@@ -190,11 +189,7 @@ def _traced(walk: Walkthrough, spp: int, monitor: Monitor) -> list[F32]:
 
 def _timed(work: Callable[[], T]) -> tuple[T, Cost]:
     """A result, with the time that this process and its children took for it."""
-    began, cpu_began = time.monotonic(), _cpu_s()
+    began, cpu_began = time.monotonic(), time.process_time() + cpu_of_children_s()
     result = work()
-    return result, Cost(time.monotonic() - began, _cpu_s() - cpu_began)
-
-
-def _cpu_s() -> float:
-    spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(of.ru_utime + of.ru_stime for of in spent)
+    cpu_s = time.process_time() + cpu_of_children_s() - cpu_began
+    return result, Cost(time.monotonic() - began, cpu_s)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import shutil
 import time
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import Blender, find_blender
 from enfilade.scene.blender.imported import SETTINGS_FILE, ImportedScene, SourceView
 from enfilade.scene.blender.notes import Note, NoteKind, grouped
-from enfilade.scene.blender.process import RESULT_FILE, run_job
+from enfilade.scene.blender.process import RESULT_FILE, cpu_of_children_s, run_job
 from enfilade.scene.blender.source import Choices, Source, check_source
 from enfilade.settings import LimitSettings, VideoSettings
 
@@ -69,14 +68,14 @@ def import_file(
     if blender.note:
         monitor.message(blender.note)
     before, began = Source.of(source, choices), time.monotonic()
-    cpu_began = _cpu_of_children()
+    cpu_began = cpu_of_children_s()
     with whole_folder(out) as beside:
         run_job(blender, job_table("export", source, beside, choices, limits), limits, monitor)
         imported = _with_view(ImportedScene.read(beside), blender)
         _check(imported, limits)
         if is_strict:
             check_strict(imported)
-        wall_s, cpu_s = time.monotonic() - began, _cpu_of_children() - cpu_began
+        wall_s, cpu_s = time.monotonic() - began, cpu_of_children_s() - cpu_began
         replace(before, wall_s=round(wall_s, 2), cpu_s=round(cpu_s, 2)).write(beside)
     return replace(imported, folder=out)
 
@@ -168,8 +167,3 @@ def _toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
             *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()),
         ]
     return "\n".join(lines) + "\n"
-
-
-def _cpu_of_children() -> float:
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime

@@ -6,6 +6,7 @@ import json
 import os
 import queue
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -90,6 +91,12 @@ def run_job(
             f"{about}: not finished in {limits.import_s:g} s; raise --set limits.import_s, or reduce the file"
         )
     raise SceneError(_crash(about, process.returncode, limits.import_mb, last))
+
+
+def cpu_of_children_s() -> float:
+    """CPU time of all processes that this one started and that have ended, seconds."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
 
 
 def _follow(
