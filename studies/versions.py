@@ -14,8 +14,6 @@ from typing import Any
 
 from enfilade import __version__
 
-__all__ = ["machine", "origin", "package_versions"]
-
 PACKAGES = ("mitsuba", "drjit", "numpy", "av", "OpenEXR", "pyoidn", "flip-evaluator", "cvvdp")
 ROOT = Path(__file__).parents[1]
 

@@ -22,11 +22,6 @@ from typing import Any
 
 from enfilade.errors import EnfiladeError, NoSpaceError, RunFolderError
 
-__all__ = [
-    "MARK", "flush", "is_full", "is_passing", "json_bytes", "read_json", "sweep", "unwritable", "whole_file",
-    "whole_folder", "write_json",
-]  # fmt: skip
-
 MARK = ".writing-"  # in the name of every temporary file
 WRITER = re.compile(re.escape(MARK) + r"(?P<host>.+)-(?P<pid>\d+)-[0-9a-f]{8}(\.[^.]*)?$")
 ABANDONED_S = 86_400.0  # a day without a write

@@ -8,8 +8,6 @@ import resource
 import signal
 import sys
 
-__all__ = ["die_with", "limit_memory"]
-
 MB = 1 << 20
 PR_SET_PDEATHSIG = 1  # prctl(2): the signal for this process when its parent dies
 

@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 from enfilade.errors import InputError
 
-__all__ = ["DISPLAYS", "Display", "Viewing", "display_named"]
-
 Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.float64])
 
 

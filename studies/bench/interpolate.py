@@ -15,8 +15,6 @@ from enfilade.images.ycbcr import BT709, frame_of, planes_from_rgb, planes_of, r
 from enfilade.kernels.tone import srgb_decode, srgb_encode
 from enfilade.records import F32
 
-__all__ = ["interpolate", "why_no_interpolation"]
-
 FILTER = "minterpolate"
 OPTIONS = "mi_mode=mci:mc_mode=aobmc:me_mode=bidir:vsbmc=1:scd=none"  # best quality
 PIXELS = "yuv444p"  # the filter supports 8 bits only

@@ -8,8 +8,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter
 
-__all__ = ["Fidelity", "compare", "displayed"]
-
 F32 = npt.NDArray[np.float32]
 WINDOW_PX = 1.5  # standard deviation (Wang et al. 2004)
 C1, C2 = 0.01**2, 0.03**2

@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 from enfilade.reports.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
 
-__all__ = ["plot_validation"]
-
 DPI = 100
 PANEL_IN = (4.6, 3.4)
 MODE_STYLES = (  # first the published metric, then the modern one

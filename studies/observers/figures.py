@@ -13,8 +13,6 @@ from studies.observers.modelfest import Thresholds
 from studies.observers.moving_texture import SCREENS, TEXTURES, Losses
 from studies.observers.sensitivity import Sensitivities, rms_db
 
-__all__ = ["TARGETS", "Figure", "ModeResults", "Target"]
-
 DARK = frozenset({"grass"})  # its mean luminance is a thirtieth of that of the others
 DIM = frozenset({"headset"})
 

@@ -21,8 +21,6 @@ from studies.observers import foley, modelfest
 from studies.observers.mode import MODERN, Mode
 from studies.progress import counted
 
-__all__ = ["APERTURES_DEG", "TRANSDUCERS", "Fit", "fit", "measure"]
-
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 TRANSDUCERS = tuple((share, z) for share in (0.25, 0.5, 1.0) for z in (0.9, 1.1, 1.3, 1.5, 1.7))

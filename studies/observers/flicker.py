@@ -21,8 +21,6 @@ from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.progress import counted
 
-__all__ = ["EXAMPLES", "Pair", "measure", "sequences"]
-
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 

@@ -21,8 +21,6 @@ from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
 
-__all__ = ["ANGLES_DEG", "UNMASKED_DB", "Masking", "gabor", "measure", "sine"]
-
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 ANGLES_DEG = (0, 45, 90)  # between the bars of mask and target

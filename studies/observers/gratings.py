@@ -20,8 +20,6 @@ import numpy.typing as npt
 from enfilade.viewing import Viewing
 from studies.observers.screen import screen
 
-__all__ = ["STIMULI", "Grating", "Stimulus"]
-
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 FPS = 120.0  # of the display: 3.75 frames in a period of the fastest flicker, 32 Hz

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from enfilade.metric import Aqm
 from enfilade.viewing import Viewing
 
-__all__ = ["MODERN", "PAPER", "Mode"]
-
 
 @dataclass(frozen=True)
 class Mode:

@@ -21,8 +21,6 @@ from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
 
-__all__ = ["PIXELS_PER_DEGREE", "SIZE_PX", "Thresholds", "measure", "target"]
-
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 PIXELS_PER_DEGREE = 120.0

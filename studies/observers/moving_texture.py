@@ -29,18 +29,6 @@ from studies.observers.screen import screen
 from studies.observers.tables import read_columns, read_textures
 from studies.progress import counted
 
-__all__ = [
-    "DISPLAYS",
-    "SCREENS",
-    "TEXTURES",
-    "Condition",
-    "Losses",
-    "conditions",
-    "measure",
-    "score",
-    "shade",
-]
-
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 

@@ -22,8 +22,6 @@ from studies.observers.tables import read_columns
 from studies.observers.threshold import sequence_threshold
 from studies.progress import counted
 
-__all__ = ["Sensitivities", "gratings", "measure", "rms_db"]
-
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 LOWEST_CPD, HIGHEST_CPD = 0.5, 12.0  # range of the metric's bands

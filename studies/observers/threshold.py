@@ -15,8 +15,6 @@ import numpy.typing as npt
 
 from enfilade.metric import Aqm, SequenceAqm
 
-__all__ = ["response_jnd", "sequence_threshold", "threshold_contrast"]
-
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 Float64Array: TypeAlias = npt.NDArray[np.float64]
 

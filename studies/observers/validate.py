@@ -12,8 +12,6 @@ from studies.observers.fits import Fit
 from studies.observers.gratings import STIMULI
 from studies.observers.mode import MODERN, PAPER, Mode
 
-__all__ = ["Validation", "measure", "validate"]
-
 
 @dataclass(frozen=True, eq=False)
 class Validation:

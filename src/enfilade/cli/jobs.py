@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from enfilade.runs.job import Job
     from enfilade.scene.blender.imported import ImportedScene
 
-__all__ = ["job_of"]
-
 
 def job_of(
     ctx: click.Context,

@@ -24,8 +24,6 @@ from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
 
-__all__ = ["CompareOptions", "ComparedFrame", "Show", "compare"]
-
 
 @dataclass(frozen=True, eq=False)
 class ComparedFrame:

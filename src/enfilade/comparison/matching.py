@@ -10,17 +10,6 @@ from enfilade.errors import ImageError
 from enfilade.files import read_json
 from enfilade.images import Sequence
 
-__all__ = [
-    "Side",
-    "check_alike",
-    "common_exposure_ev",
-    "common_fps",
-    "is_exr",
-    "note_on_numbers",
-    "note_on_paths",
-    "note_on_seeds",
-]
-
 DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
 SEED = ("settings", "trace", "seed")  # in the identity of a run
 FPS_TOLERANCE = 2e-3  # relative: 30 and 29.97 are shown as the same

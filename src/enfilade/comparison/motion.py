@@ -18,8 +18,6 @@ from enfilade.kernels.tone import srgb_encode
 from enfilade.metric.transient import moved
 from enfilade.records import F32, U8, Flow
 
-__all__ = ["FlowChoice", "Motion", "Moved", "flow_of_layers", "open_motion"]
-
 Layers = Mapping[str, npt.NDArray[Any]]
 
 CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1: a cut, where backward motion is not known

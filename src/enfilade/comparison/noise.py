@@ -9,8 +9,6 @@ from typing import Any, Literal
 from enfilade.comparison.measures.psnr import psnr_db
 from enfilade.metric import sequence_score
 
-__all__ = ["NoiseEstimate", "NoiseFloor"]
-
 MARGIN = 1.0 / 3.0  # of the floor: a score less than that apart from it is undecided
 NOTABLE_SHARE = 1.0 / 3.0  # of the score
 NOTABLE_JND = 0.25  # least score of noise that is mentioned: "next to none" ends there

@@ -27,8 +27,6 @@ from enfilade.metric.transient import moved
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
-__all__ = ["NoiseEstimator"]
-
 MASK = (
     np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0]).astype(np.float32) / 6.0
 )  # Immerkaer 1996; keeps deviations

@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from enfilade.records import F32, U32
 
-__all__ = ["ImagePair", "ObjectDifference", "compare_objects"]
-
 F64 = npt.NDArray[np.float64]
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))  # Rec. ITU-R BT.709-6
 LEAST_PIXELS = 48  # of an object: the statistics of fewer say little

@@ -17,8 +17,6 @@ from enfilade.errors import InputError
 from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32, U8, Flow
 
-__all__ = ["FlowEstimator"]
-
 WIDEST_PX = 1024  # larger images are halved before the search: 0.1 s a flow at most
 LEAST_PX = 32  # the search's patches are 8 pixels, over three levels; smaller images are enlarged
 SMOOTH_PX = 1.0  # sigma of a blur before the search: pixel noise is no motion

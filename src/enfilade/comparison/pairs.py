@@ -29,8 +29,6 @@ from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
-__all__ = ["Pair", "Pairs", "open_pairs"]
-
 
 @dataclass(frozen=True, eq=False)
 class Pair:

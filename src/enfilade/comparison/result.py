@@ -12,8 +12,6 @@ from enfilade.comparison.noise import NoiseEstimate, NoiseFloor
 from enfilade.metric import Part, sequence_score
 from enfilade.viewing import Viewing
 
-__all__ = ["FrameDifference", "SequenceDifference", "short_name"]
-
 IDENTICAL = "identical"
 INVISIBLE = "not identical, but without a visible difference in luminance"
 INVISIBLE_JND = 0.005  # below, a score of two decimals is 0.00

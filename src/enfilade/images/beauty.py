@@ -11,8 +11,6 @@ from enfilade.errors import ImageError
 from enfilade.images.exr import color_layers
 from enfilade.records import F32
 
-__all__ = ["beauty", "choose_layer"]
-
 BEAUTY_NAMES = {
     "rgb": 0,
     "rgba": 1,

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from enfilade.errors import SettingsError
 
-__all__ = ["CODECS", "Codec", "codec_named", "odd_size_note", "video_suffix"]
-
 
 @dataclass(frozen=True)
 class Codec:

@@ -12,8 +12,6 @@ import av
 from enfilade.errors import ImageError, RunFolderError
 from enfilade.files import is_full, unwritable, whole_file
 
-__all__ = ["DEMUXERS", "open_container", "reading", "written_container"]
-
 # The demuxer is chosen by suffix: FFmpeg would otherwise detect it, and a playlist opens other files.
 DEMUXERS = {
     ".mp4": "mov", ".m4v": "mov", ".mov": "mov", ".mkv": "matroska", ".webm": "matroska", ".avi": "avi",

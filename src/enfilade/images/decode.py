@@ -15,8 +15,6 @@ from enfilade.images.ycbcr import BT601, BT709, FULL_RANGE, MATRICES, Plane, pla
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import F32
 
-__all__ = ["VideoFile"]
-
 # ITU-T H.273, tables 2, 3 and 4
 REC709_LIKE = frozenset({1, 2, 5, 6, 7})  # primaries: BT.709, unknown, and the similar ones of BT.601
 LINEAR = 8

@@ -19,8 +19,6 @@ from enfilade.images.ycbcr import FULL_RANGE, LIMITED_RANGE, Plane, frame_of, pl
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
 
-__all__ = ["check_encodable", "encode_video", "exact_fps"]
-
 BT709 = 1  # primaries and matrix, ITU-T H.273, tables 2 and 4
 IDENTITY_MATRIX = 0  # R'G'B', ITU-T H.273, table 4
 NTSC = Fraction(1000, 1001)

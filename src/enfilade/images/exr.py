@@ -25,8 +25,6 @@ import OpenEXR
 from enfilade.errors import ImageError
 from enfilade.files import whole_file
 
-__all__ = ["Array", "color_layers", "exr_pixels", "is_exr", "read_attributes", "read_exr", "write_exr"]
-
 Array = npt.NDArray[Any]
 
 MAX_THREADS = 8  # that compress pixels

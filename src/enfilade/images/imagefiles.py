@@ -15,8 +15,6 @@ from enfilade.images.exr import read_attributes, read_exr
 from enfilade.images.stills import STILL_SUFFIXES, read_image
 from enfilade.records import F32
 
-__all__ = ["SUFFIXES", "ImageFiles"]
-
 SUFFIXES = STILL_SUFFIXES | {".exr"}
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709-6, item 1.3-1.4: R G B white
 CHROMATICITY_TOLERANCE = 0.005

@@ -11,8 +11,6 @@ from enfilade.errors import ImageError
 from enfilade.images.container import open_container, reading, written_container
 from enfilade.images.encode import exact_fps
 
-__all__ = ["join_videos"]
-
 REMEDY = "delete it to make it again"
 
 

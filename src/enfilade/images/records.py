@@ -16,8 +16,6 @@ from enfilade.errors import ImageError
 from enfilade.files import whole_file
 from enfilade.images.exr import read_attributes, read_exr, write_exr
 
-__all__ = ["read_record", "write_record"]
-
 Array = npt.NDArray[Any]
 R = TypeVar("R")
 

@@ -14,8 +14,6 @@ from enfilade.images.container import DEMUXERS
 from enfilade.images.decode import VideoFile
 from enfilade.images.imagefiles import SUFFIXES, ImageFiles
 
-__all__ = ["Sequence", "files_of", "open_sequence"]
-
 RUN_FILE, JOB_FILE = "run.json", "job.json"
 NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
 NUMBER = re.compile(r"(^-?[0-9]+|[0-9]+)")  # in a name; one at the beginning may be negative

@@ -26,8 +26,6 @@ from enfilade.images.exr import MAGIC, exr_pixels
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import F32, U8
 
-__all__ = ["MITSUBA_SUFFIXES", "STILL_SUFFIXES", "encode_webp", "image_pixels", "read_image", "resized"]
-
 STILL_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"})
 FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "WEBP", "BMP")  # Pillow's names
 MITSUBA_SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".pfm", ".ppm", ".hdr", ".rgbe")

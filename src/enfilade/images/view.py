@@ -14,8 +14,6 @@ from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
 
-__all__ = ["BT709_TRANSFER", "SRGB_TRANSFER", "View", "files_of_view", "open_view", "view_identity"]
-
 BT709_TRANSFER = 1  # ITU-T H.273, table 3
 SRGB_TRANSFER = 13  # ITU-T H.273, table 3: IEC 61966-2-1
 LINEAR_REC709 = (

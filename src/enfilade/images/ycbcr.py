@@ -15,11 +15,6 @@ import numpy.typing as npt
 
 from enfilade.records import F32
 
-__all__ = [
-    "BT601", "BT709", "DITHER", "FULL_RANGE", "LIMITED_RANGE", "MATRICES", "Plane", "frame_of",
-    "planes_from_rgb", "planes_of", "quantized", "rgb_from_planes",
-]  # fmt: skip
-
 Plane = npt.NDArray[Any]
 
 BT709 = (0.2126, 0.0722)  # K_R, K_B, ITU-R BT.709-6, item 3.2

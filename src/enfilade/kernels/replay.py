@@ -13,8 +13,6 @@ import drjit as dr
 
 from enfilade.arrays import UInt, opaque
 
-__all__ = ["padded", "recorded"]
-
 # Numbers of lanes are rounded up to a multiple of this. A number that happens to be the size of an array of
 # the scene would be another signature, and record the kernel again.
 STEP = 1021

@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from enfilade.errors import InputError
 
-__all__ = ["display_luminance", "luminance", "srgb_decode", "srgb_encode"]
-
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)  # ITU-R BT.709-6, item 3.2; R, G, B

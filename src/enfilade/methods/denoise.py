@@ -11,8 +11,6 @@ import numpy as np
 from enfilade.errors import SettingsError
 from enfilade.records import F32
 
-__all__ = ["denoise", "denoise_displayed", "denoiser_name", "why_no_denoiser"]
-
 
 def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F32:
     """Denoise an HDR image on the CPU, with noise-free guides.

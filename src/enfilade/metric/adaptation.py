@@ -10,8 +10,6 @@ import scipy.ndimage
 from enfilade.metric.pyramid import double, halve, halved_shape
 from enfilade.records import F32
 
-__all__ = ["DARKEST_CD_M2", "adapting_luminance"]
-
 ADAPTATION_SIGMA_DEG = 0.5  # our choice: about the radius of the fovea
 DARKEST_CD_M2 = 1e-3  # darker luminances adapt the eye as this one does
 COARSEST_SIGMA = 2.0  # samples: the blur runs at reduced size, with this standard deviation at least

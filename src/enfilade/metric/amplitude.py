@@ -6,8 +6,6 @@ import numpy as np
 
 from enfilade.records import F32
 
-__all__ = ["contrast_gain", "response"]
-
 RESPONSE_MAX = 100.0  # no unit: the response to infinite luminance; cancels in contrasts
 SEMI_SATURATION = 12.6  # (cd/m2)^0.37 (Daly 1993)
 COMPRESSION = 1.0 - 0.63  # no unit (Daly 1993)

@@ -10,8 +10,6 @@ import scipy.ndimage
 from enfilade.metric.pyramid import double, halved_shape
 from enfilade.records import F32
 
-__all__ = ["APERTURE_SIGMA_DEG", "REFERENCE_AREA_DEG2", "Aperture", "patch_gain"]
-
 # Standard deviation, degrees. Models of detection have 0.25 to 0.6 (Watson and Ahumada 2005, J. Vis. 5(9):
 # 0.6); `studies/observers/fits.py` shows that ModelFest hardly tells these apart. A small one leaves a
 # sharper map.

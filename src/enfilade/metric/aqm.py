@@ -17,8 +17,6 @@ from enfilade.metric.sensitivity import coarse_velocity
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["Aqm"]
-
 
 class Aqm:
     """The animation quality metric for one viewing condition and image size (§3.4), in one of two modes.

@@ -14,8 +14,6 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["castlecsf_sensitivity", "transient_sensitivity"]
-
 F64: TypeAlias = npt.NDArray[np.float64]
 
 SUSTAINED_EXPONENT = 1.3314  # no unit: fall of the sustained channel with temporal frequency

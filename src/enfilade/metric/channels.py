@@ -16,8 +16,6 @@ from enfilade.metric.pyramid import halved_shape
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["Channel", "ChannelBank", "uniform_part"]
-
 
 @dataclass(frozen=True, eq=False)
 class Channel:

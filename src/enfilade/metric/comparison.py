@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from enfilade.records import F32, Mask
 
-__all__ = ["Comparison", "Part"]
-
 
 @dataclass(frozen=True)
 class Part:

@@ -18,8 +18,6 @@ import scipy.fft
 from enfilade.errors import InputError
 from enfilade.records import F32
 
-__all__ = ["FAN_HALF_WIDTH_DEG", "ORIENTATIONS_DEG", "OVERSAMPLING", "Band", "CortexTransform", "bands"]
-
 Complex64: TypeAlias = npt.NDArray[np.complex64]
 Spectrum = TypeVar("Spectrum", F32, Complex64)
 Tilt: TypeAlias = Callable[[F32, "Band", "Band"], F32]

@@ -8,8 +8,6 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["spatiovelocity_sensitivity"]
-
 Quantity = TypeVar("Quantity", float, npt.NDArray[np.float32], npt.NDArray[np.float64])
 
 C0 = 1.14  # no unit: scales sensitivity to displays of 100 cd/m2 (Daly 1998)

@@ -16,8 +16,6 @@ from enfilade.metric.pyramid import halved_shape
 from enfilade.metric.sensitivity import FINEST_REDUCTION, ChannelSensitivity
 from enfilade.records import F32
 
-__all__ = ["MotionDirection", "channel_directions"]
-
 FAINTEST = 1e-30  # keeps ratios finite where there is no contrast
 
 

@@ -13,8 +13,6 @@ import numpy as np
 
 from enfilade.records import F32
 
-__all__ = ["Pursuit", "channel_speed", "held_smear", "retinal_speed", "retinal_velocity", "smeared_contrast"]
-
 EYE_DRIFT_DEG_S = 0.15  # §3.3, v_Min: drift of the eye that fixates
 PURSUIT_MAX_DEG_S = 80.0  # §3.3, v_Max: fastest smooth pursuit
 PURSUIT_EFFICIENCY = 0.82  # §3.3, no unit: gain of smooth pursuit

@@ -33,8 +33,6 @@ from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable, co
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["HalvesAqm", "LuminanceHalves"]
-
 # dB, on all sensitivities. The one fitted number: the mean of ModelFest's 41 targets, and no other data
 # (`tests/studies/test_modelfest.py` fits it again). Eq. 4 alone has errors of 3.9 dB RMS with it.
 GAIN_DB = 2.36

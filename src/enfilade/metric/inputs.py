@@ -10,8 +10,6 @@ import numpy.typing as npt
 from enfilade.errors import InputError
 from enfilade.records import F32, Mask
 
-__all__ = ["Pair", "check_map", "check_pair", "fill_undefined"]
-
 
 @dataclass(frozen=True, eq=False)
 class Pair:

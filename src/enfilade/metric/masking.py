@@ -6,8 +6,6 @@ import numpy as np
 
 from enfilade.records import F32
 
-__all__ = ["MASK_SLOPE", "threshold_elevation"]
-
 MASK_SLOPE = 0.7  # s, no unit; Daly 1993 for low frequencies and coherent masks
 MASK_SHARPNESS = 4.0  # b, no unit (Daly 1993)
 LEARNING = 0.7  # Q, no unit: the slope for which k1 and k2 are chosen (Daly 1993)

@@ -25,8 +25,6 @@ from enfilade.metric.transient import FlickerWeight
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
-__all__ = ["ModernMetric"]
-
 F64: TypeAlias = npt.NDArray[np.float64]
 
 CHANNEL_EXPONENT = 1.0  # no unit, of energies: contrasts add with exponent 2, without ripple between channels

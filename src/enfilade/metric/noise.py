@@ -35,8 +35,6 @@ from enfilade.metric.cortex import Band, Complex64, CortexTransform
 from enfilade.metric.pyramid import halve_periodic
 from enfilade.records import F32
 
-__all__ = ["NOISE_SIGMAS", "ChannelNoise", "NoiseFilters", "response_variance"]
-
 NOISE_SIGMAS = 4.0  # no unit: our choice, see above
 LEAST_DEVIATION_CD_M2 = 1e-4  # keeps the slope finite where there is no noise
 BLUR_SIGMAS = 3.0  # the Gaussian filter ends after so many standard deviations to either side ...

@@ -25,8 +25,6 @@ from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["Adaptation", "PaperMetric", "adapt"]
-
 F64: TypeAlias = npt.NDArray[np.float64]
 
 

@@ -8,8 +8,6 @@ from enfilade.metric.comparison import Comparison, Part
 from enfilade.metric.pyramid import Pyramid, double, halved_shape
 from enfilade.records import F32, Mask
 
-__all__ = ["POOLING_EXPONENT", "Pool", "detection_probability", "percent_visible", "raised"]
-
 POOLING_EXPONENT = 3.5  # b, no unit: slope of the psychometric function (Daly 1993)
 MISS_AT_ONE_JND = 0.25  # §6: 1 JND is seen in 75 % of cases
 DETECTION_JND = 1.0  # §6: the paper counts a difference above this as visible

@@ -6,8 +6,6 @@ import numpy as np
 
 from enfilade.records import F32
 
-__all__ = ["Pyramid", "double", "halve", "halve_periodic", "halved_shape"]
-
 
 def halved_shape(shape: tuple[int, int], reduction: int) -> tuple[int, int]:
     """Height and width in samples at every `reduction`-th pixel, the last at or beyond the last pixel."""

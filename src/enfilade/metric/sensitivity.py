@@ -21,8 +21,6 @@ from enfilade.metric.eye import (
 from enfilade.metric.pyramid import Pyramid, double, halve, halved_shape
 from enfilade.records import F32, Mask
 
-__all__ = ["FINEST_REDUCTION", "ChannelSensitivity", "SensitivityTable", "coarse_velocity"]
-
 F64: TypeAlias = npt.NDArray[np.float64]
 Indices: TypeAlias = npt.NDArray[np.int32]
 

@@ -14,8 +14,6 @@ from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.metric.transient import Error, error_change
 from enfilade.records import F32, Mask
 
-__all__ = ["SequenceAqm", "sequence_score"]
-
 
 class SequenceAqm:
     """The metric for sequences: takes their frames in order and keeps the last error.

@@ -25,8 +25,6 @@ import numpy as np
 
 from enfilade.records import F32
 
-__all__ = ["Transducer", "energy_difference"]
-
 # Contrast enters squared and is inhibited with the power 1.6: the difference 0.4 is that of Legge and
 # Foley 1980, J. Opt. Soc. Am. 70, whose exponents are 2.4 and 2.
 INHIBITION_EXPONENT = 0.8  # no unit, of energy

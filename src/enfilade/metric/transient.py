@@ -22,8 +22,6 @@ from enfilade.metric.cortex import Band
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
-__all__ = ["FlickerWeight", "error_change", "flicker_sensitivity", "moved"]
-
 F64: TypeAlias = npt.NDArray[np.float64]
 Error: TypeAlias = tuple[F32, Mask]  # test - reference, cd/m2, 0 where not valid; valid pixels
 

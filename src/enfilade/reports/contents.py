@@ -18,8 +18,6 @@ from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.notes import TITLES, NoteGroup, grouped
 from enfilade.settings import SECTIONS, Section
 
-__all__ = ["contents"]
-
 SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "square": "□", "circle": "●"}  # of series
 VERDICTS = {  # of the noise floor
     "above": "above it",

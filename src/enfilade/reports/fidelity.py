@@ -21,8 +21,6 @@ from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.notes import TITLES, grouped
 from enfilade.settings import Settings, VideoSettings, ViewingSettings
 
-__all__ = ["CHECK_PAGE", "differences_of", "write_check"]
-
 CHECK_PAGE = "check.html"  # in an imported scene folder
 LISTED = 40  # objects
 WEBP_QUALITY = 92

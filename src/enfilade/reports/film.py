@@ -20,8 +20,6 @@ from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
 from enfilade.reports.run import ReportedRun
 from enfilade.viewing import Viewing
 
-__all__ = ["Film"]
-
 WIDEST_PX = 1280  # of a picture
 LEAST_WIDTH_PX = 480  # frames are left out before pictures become narrower
 CAUTION = 0.8  # of the bytes, since other frames may be larger than the one from which they are estimated

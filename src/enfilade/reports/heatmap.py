@@ -18,8 +18,6 @@ from enfilade.reports.charts import Figure, pixels, save_picture
 from enfilade.reports.scales import VISIBLE
 from enfilade.settings import VideoSettings
 
-__all__ = ["VIDEO_CODECS", "HeatmapPainter", "overlay", "write_heatmap_images", "write_heatmap_video"]
-
 VIDEO_CODECS = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}  # by suffix
 FAINT_JND, SOLID_JND = 0.25, 1.0  # where colour begins, and hides most of the grey
 OPACITY = 0.9  # largest

@@ -17,8 +17,6 @@ from enfilade.reports.run import DeliveredFrame
 from enfilade.reports.scales import DIFFERENCE, VELOCITY, VISIBLE, Scale
 from enfilade.viewing import Viewing
 
-__all__ = ["LAYERS", "Layer", "painted", "painted_difference"]
-
 QUALITY = 92  # of WebP
 LEGEND_STEPS = 33  # colours
 

@@ -21,8 +21,6 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.identity import RUN_FILE
 from enfilade.runs.statistics import statistics
 
-__all__ = ["LEAST_MB", "PAGE", "write_page", "write_report"]
-
 PAGE = "report.html"  # in a run folder
 MB = 1_000_000
 LEAST_MB = 1.0

@@ -10,8 +10,6 @@ from enfilade.reports.charts import BLUE, GREEN, PALETTE, PROVENANCE_COLORS, VER
 from enfilade.reports.tables import spoken
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 
-__all__ = ["plan_panels", "quality_panel", "run_panels", "time_panel"]
-
 DELIVERY = frozenset({ANALYSIS.name, CLIPS.name, VIDEO.name})  # passes whose tasks cover many frames
 
 

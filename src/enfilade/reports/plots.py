@@ -11,8 +11,6 @@ from enfilade.reports.panels import plan_panels, run_panels
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.statistics import statistics
 
-__all__ = ["plot_plan", "plot_run", "split_percent_of", "walkthrough_figure"]
-
 
 def plot_run(folder: Path) -> list[Path]:
     """Draw the charts of a run, as far as it is finished, into its folder ``plots``.

@@ -25,8 +25,6 @@ from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.process import RESULT_FILE
 from enfilade.settings import VideoSettings, ViewingSettings
 
-__all__ = ["DeliveredFrame", "ReportedRun"]
-
 
 @dataclass(frozen=True, eq=False)
 class DeliveredFrame:

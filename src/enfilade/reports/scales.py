@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from enfilade.records import F32, U8
 
-__all__ = ["DIFFERENCE", "VELOCITY", "VISIBLE", "Scale"]
-
 STEPS = 1024
 
 

@@ -9,17 +9,6 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-__all__ = [
-    "TRACED_COLUMNS",
-    "comparison_table",
-    "percent",
-    "psnr_text",
-    "result_line",
-    "run_tables",
-    "seconds",
-    "spoken",
-]
-
 TRACED_COLUMNS = {  # titles of the columns of Table 1, by key of the summary
     "slow": "slow",
     "specular": "specular",

@@ -10,8 +10,6 @@ import numpy as np
 
 from enfilade.reports import charts
 
-__all__ = ["plot_comparison", "time_figure"]
-
 LEAST_TOP_JND = 1.25  # of the axis: the line at 1 JND is always on it
 LEAST_TOP_PERCENT = 1.0
 PARTS = (  # key, name in the legend, colour, mark

@@ -27,8 +27,6 @@ from enfilade.scene.blender.source import Choices
 from enfilade.scene.opener import Scene
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
-__all__ = ["CheckedFrame", "Cost", "ImportCheck", "check_import", "checked_numbers"]
-
 T = TypeVar("T")
 WIDEST_PX = 480  # of a checked frame
 HALVES = (0, 1)  # seeds of two images with independent noise

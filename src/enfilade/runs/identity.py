@@ -14,8 +14,6 @@ from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import LOCK_FILE
 from enfilade.scene.blender.process import RESULT_FILE as IMPORT_FILE
 
-__all__ = ["FORMAT", "RUN_FILE", "SCENE_FOLDER", "check_place", "check_same", "digest_of", "identity_of"]
-
 FORMAT = 4  # of the folder; another number is refused
 RUN_FILE = "run.json"
 SCENE_FOLDER = "scene"  # of a run, if its scene was imported by Blender

@@ -18,8 +18,6 @@ from typing import Any
 from enfilade.errors import RunFolderError
 from enfilade.files import unwritable
 
-__all__ = ["LEDGER_FILE", "Key", "Ledger", "digest_line", "plain"]
-
 LEDGER_FILE = "ledger.jsonl"  # in a run folder
 
 Key = tuple[str, int]  # pass and number of the frame

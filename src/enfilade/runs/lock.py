@@ -14,8 +14,6 @@ from typing import Any
 from enfilade.errors import RunFolderError
 from enfilade.files import unwritable
 
-__all__ = ["LOCK_FILE", "Lock", "holder_of"]
-
 LOCK_FILE = "run.lock"
 
 

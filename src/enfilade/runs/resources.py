@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from itertools import takewhile
 from pathlib import Path
 
-__all__ = ["cores", "gpus", "oom_kills"]
-
 OWN = Path("/proc/self/cgroup")
 TREE = Path("/sys/fs/cgroup")
 DEVICES = Path("/dev")

@@ -15,8 +15,6 @@ from enfilade.scene.blender.notes import NoteKind, grouped
 from enfilade.scene.blender.source import SOURCE_FILE, Choices, Source, check_source
 from enfilade.settings import BlenderSettings, LimitSettings
 
-__all__ = ["choices_of", "imported_into"]
-
 
 def choices_of(
     settings: BlenderSettings,

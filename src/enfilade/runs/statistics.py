@@ -9,8 +9,6 @@ from enfilade.methods.base import FRAMES
 from enfilade.runs.delivery import ANALYSIS, VIDEO
 from enfilade.runs.folder import RunFolder
 
-__all__ = ["add_costs", "speeds_deg_s", "statistics"]
-
 TRACED_PROVENANCE = {
     "slow": "slow",
     "specular": "specular",

@@ -20,8 +20,6 @@ from enfilade.renderer import Renderer
 from enfilade.scene.blender.source import SUFFIXES
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
-__all__ = ["Scene"]
-
 ADVICE = {
     ".json": "a camera path is given by --path",
     **dict.fromkeys(SUFFIXES, "import it by `enfilade import`, and give the scene.xml that it writes"),

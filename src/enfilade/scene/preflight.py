@@ -13,8 +13,6 @@ from enfilade.errors import SceneError
 from enfilade.resource_limits import die_with, limit_memory
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
-__all__ = ["preflight"]
-
 
 def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> str:
     """Check a Mitsuba scene, and load it, in a child process, which ends with this one.

@@ -8,8 +8,6 @@ from typing import Protocol
 
 from enfilade.comparison.measures.displayed import DisplayedPair
 
-__all__ = ["Measure", "Scale"]
-
 
 @dataclass(frozen=True)
 class Scale:

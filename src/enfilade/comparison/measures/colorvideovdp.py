@@ -13,8 +13,6 @@ from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
-__all__ = ["ColorVideoVdp"]
-
 PERFECT_JOD = 10.0
 BLACK_LEAST_CD_M2 = 1e-4  # the display model takes a contrast ratio
 

@@ -11,8 +11,6 @@ from enfilade.kernels.tone import display_luminance, srgb_encode
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
-__all__ = ["DisplayedPair", "display_pair"]
-
 
 @dataclass(frozen=True, eq=False)
 class DisplayedPair:

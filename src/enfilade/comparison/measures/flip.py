@@ -11,8 +11,6 @@ from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
-__all__ = ["Flip"]
-
 
 class Flip:
     """Mean of the LDR-FLIP map, 0 (identical) to 1, at the pixels per degree of the viewing conditions.

@@ -10,8 +10,6 @@ import numpy as np
 from enfilade.comparison.measures.base import Scale
 from enfilade.comparison.measures.displayed import DisplayedPair
 
-__all__ = ["Psnr", "psnr_db"]
-
 
 def psnr_db(squared_error: float) -> float:
     """Peak signal-to-noise ratio of values in 0..1: -10 log10 of the mean squared error; infinite at 0."""

@@ -11,8 +11,6 @@ from pathlib import Path
 
 from enfilade.errors import SceneError
 
-__all__ = ["LEAST_VERSION", "SCRIPT", "Blender", "clean_environment", "environment_folder", "find_blender"]
-
 PACKAGES = Path(__file__).resolve().parents[3]  # `src` of a checkout, or site-packages
 SCRIPT = PACKAGES / "enfilade_blender" / "__main__.py"
 LEAST_VERSION = (4, 2)

@@ -13,8 +13,6 @@ from enfilade.scene.blender.notes import TITLES, Note, NoteKind
 from enfilade.scene.blender.process import RESULT_FILE, printable
 from enfilade.settings import read_tables
 
-__all__ = ["PATH_FILE", "SCENE_FILE", "SETTINGS_FILE", "ImportedScene", "SourceView"]
-
 FORMAT, VERSION = "enfilade-import", 1
 SCENE_FILE, PATH_FILE, SETTINGS_FILE = "scene.xml", "camera_path.json", "settings.toml"
 

@@ -23,8 +23,6 @@ from enfilade.scene.blender.process import RESULT_FILE, cpu_of_children_s, run_j
 from enfilade.scene.blender.source import Choices, Source, check_source
 from enfilade.settings import LimitSettings, VideoSettings
 
-__all__ = ["check_strict", "import_file", "job_table"]
-
 COLORS = "colormanagement"  # folder of the configuration of OpenColorIO, in Blender and in the scene folder
 CONFIG = "config.ocio"
 SHOWN = 8  # parts that are not carried over, in the message of --strict

@@ -11,8 +11,6 @@ from pathlib import Path
 from enfilade.errors import EnfiladeError
 from enfilade.scene.blender.find import Blender, environment_folder, find_blender
 
-__all__ = ["install"]
-
 RECIPES = {  # packages by the version of Python, of which each bpy has wheels for one alone
     "3.11": ("bpy==4.5.*", "numpy<2"),
     "3.13": ("bpy==5.2.*",),

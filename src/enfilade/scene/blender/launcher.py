@@ -8,8 +8,6 @@ import sys
 from enfilade.resource_limits import die_with, limit_memory
 from enfilade.scene.blender.find import clean_environment
 
-__all__: list[str] = []
-
 
 def _main(parent: int, megabytes: int, home: str, line: list[str]) -> None:
     die_with(parent)

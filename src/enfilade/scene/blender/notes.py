@@ -9,8 +9,6 @@ from typing import Any
 
 from enfilade.scene.blender.process import printable
 
-__all__ = ["TITLES", "Note", "NoteGroup", "NoteKind", "grouped"]
-
 LISTED = 4  # objects of a group
 
 

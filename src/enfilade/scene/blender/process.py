@@ -24,8 +24,6 @@ from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import SCRIPT, Blender
 from enfilade.settings import LimitSettings
 
-__all__ = ["CYCLES_FILE", "ERROR_FILE", "RESULT_FILE", "printable", "run_job"]
-
 RESULT_FILE, CYCLES_FILE = (
     "import.json",
     "cycles.json",

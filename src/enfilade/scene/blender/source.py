@@ -10,8 +10,6 @@ from typing import Any
 from enfilade.errors import RunFolderError, SceneError
 from enfilade.files import read_json, write_json
 
-__all__ = ["SOURCE_FILE", "SUFFIXES", "Choices", "Source", "check_source", "is_importable"]
-
 SOURCE_FILE = "source.json"  # in an imported scene folder
 SUFFIXES = frozenset(
     {".blend", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz", ".fbx", ".obj"}

@@ -21,8 +21,6 @@ import mitsuba as mi
 from enfilade.errors import SceneError
 from enfilade.settings import LimitSettings
 
-__all__ = ["check_scene", "fingerprint", "reason"]
-
 PARSER_VARIANT = "scalar_rgb"  # required by the parser, which is the same for all variants
 PLUGINS = Path(mi.__file__).resolve().parent / "plugins"
 BLENDER = "blender"  # its meshes are addresses in the memory of a process

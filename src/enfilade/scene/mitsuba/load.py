@@ -12,8 +12,6 @@ import mitsuba as mi
 from enfilade.errors import SceneError
 from enfilade.scene.mitsuba.files import fingerprint, reason
 
-__all__ = ["load_scene"]
-
 OUT_OF_MEMORY = ("out of memory", "bad_alloc")  # in errors of Dr.Jit and C++
 
 

@@ -16,8 +16,6 @@ import numpy as np
 
 from enfilade.records import U32
 
-__all__ = ["MergedScene", "merge_meshes"]
-
 
 @dataclass(frozen=True, eq=False)
 class MergedScene:

@@ -13,8 +13,6 @@ from enfilade.arrays import Bool, UInt
 from enfilade.records import SurfaceClass
 from enfilade.scene.mitsuba.merge import MergedScene
 
-__all__ = ["Shapes", "bsdf_table", "has_lobe", "surface_class"]
-
 NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has one, too, but is visible
 
 

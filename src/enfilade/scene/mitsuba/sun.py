@@ -16,8 +16,6 @@ from enfilade.kernels.random import Discrete
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import F32
 
-__all__ = ["Sun", "find_sun"]
-
 SEARCH_WIDTH = 1024  # of the latitude-longitude map in which the sun is searched: texels of 0.35 degrees
 MAX_RADIUS = math.radians(2.5)  # the disc seen from the Earth has 0.27 degrees; many photographs blur it
 MIN_SHARE = 0.05  # of the sky's flux
