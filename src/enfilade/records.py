@@ -16,6 +16,7 @@ import numpy.typing as npt
 from enfilade.camera.pinhole import Camera
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 U32 = npt.NDArray[np.uint32]
 U8 = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]

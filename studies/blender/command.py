@@ -10,7 +10,8 @@ from pathlib import Path
 import click
 import numpy as np
 
-from studies.blender.measures import F32, Fidelity, compare, displayed
+from enfilade.records import F32
+from studies.blender.measures import Fidelity, compare, displayed
 
 ROOT = Path(__file__).resolve().parents[2]
 EXPORTER, CORPUS = ROOT / "src" / "enfilade_blender", ROOT / "tests" / "blender" / "corpus"

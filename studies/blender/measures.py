@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import gaussian_filter
 
-F32 = npt.NDArray[np.float32]
+from enfilade.records import F32
+
 WINDOW_PX = 1.5  # standard deviation (Wang et al. 2004)
 C1, C2 = 0.01**2, 0.03**2
 

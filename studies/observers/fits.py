@@ -8,20 +8,18 @@ that fits another data set best.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric import Aqm, ModernMetric, Transducer
 from enfilade.metric.aperture import APERTURE_SIGMA_DEG
 from enfilade.monitor import Monitor, Silence
+from enfilade.records import F64
 from enfilade.viewing import Viewing
 from studies.observers import foley, modelfest
 from studies.observers.mode import MODERN, Mode
 from studies.progress import counted
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 TRANSDUCERS = tuple((share, z) for share in (0.25, 0.5, 1.0) for z in (0.9, 1.1, 1.3, 1.5, 1.7))
 APERTURES_DEG = (0.2, 0.3, 0.45, 0.6)
@@ -65,7 +63,7 @@ def fit(
     data: str,
     candidates: tuple[tuple[float, ...], ...],
     chosen: tuple[float, ...],
-    errors_db: Float64Array,
+    errors_db: F64,
     *,
     has_gain: bool = False,
 ) -> Fit:
@@ -103,11 +101,11 @@ def fit(
     )
 
 
-def _rms(errors: Float64Array) -> Float64Array:
+def _rms(errors: F64) -> F64:
     return np.asarray(np.sqrt(np.mean(np.square(errors), axis=-1)))
 
 
-def _fit_across(name: str, data: str, chosen: float, errors_db: Float64Array, others_db: Float64Array) -> Fit:
+def _fit_across(name: str, data: str, chosen: float, errors_db: F64, others_db: F64) -> Fit:
     """Evaluate a data set with the aperture that fits another data set best."""
     best = int(np.argmin(others_db))
     selected = (APERTURES_DEG[best],)

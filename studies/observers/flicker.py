@@ -12,17 +12,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 import scipy.ndimage
 
 from enfilade.metric import SequenceAqm, sequence_score
 from enfilade.monitor import Monitor
+from enfilade.records import F32, F64
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.progress import counted
-
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 SIZE_PX = 256
 PIXELS_PER_DEGREE = 28.0
@@ -53,44 +50,44 @@ class Pair:
         return self.flicker_jnd / self.blur_jnd
 
 
-def _scene() -> Float64Array:
+def _scene() -> F64:
     """Cloudy texture with sharp-edged discs, cd/m2, periodic."""
     random = np.random.default_rng(20)
     fx, fy = np.fft.rfftfreq(SIZE_PX), np.fft.fftfreq(SIZE_PX)[:, None]
     spectrum = np.fft.rfft2(random.standard_normal((SIZE_PX, SIZE_PX)))
     cloud = np.fft.irfft2(spectrum / np.maximum(np.hypot(fx, fy), 1.0 / SIZE_PX), s=(SIZE_PX, SIZE_PX))
-    scene: Float64Array = MEAN_CD_M2 * (1.0 + 0.2 * cloud / cloud.std())
+    scene: F64 = MEAN_CD_M2 * (1.0 + 0.2 * cloud / cloud.std())
     y, x = np.mgrid[:SIZE_PX, :SIZE_PX]
     for centre_x, centre_y, level in ((70, 80, 1.5), (170, 110, 0.6), (120, 190, 1.3)):
         scene = np.where(np.hypot(x - centre_x, y - centre_y) < 28.0, level * scene, scene)
-    bright: Float64Array = np.maximum(scene, 1.0)
+    bright: F64 = np.maximum(scene, 1.0)
     return bright
 
 
-def _blurred(scene: Float64Array) -> Float64Array:
-    blurred: Float64Array = scipy.ndimage.gaussian_filter(scene, BLUR_PX, mode="wrap")
+def _blurred(scene: F64) -> F64:
+    blurred: F64 = scipy.ndimage.gaussian_filter(scene, BLUR_PX, mode="wrap")
     return blurred
 
 
-def _shimmer(frame: int, scene: Float64Array) -> Float64Array:
+def _shimmer(frame: int, scene: F64) -> F64:
     """Edges that alternate between two positions a fraction of a pixel apart."""
     sign = 1.0 if frame % 2 else -1.0
     return sign * (np.roll(scene, 1, axis=1) - np.roll(scene, -1, axis=1))
 
 
-def _boil(frame: int, scene: Float64Array) -> Float64Array:
+def _boil(frame: int, scene: F64) -> F64:
     """Noise of the scene's contrast, independent in each frame."""
     noise = np.random.default_rng(frame).standard_normal(scene.shape)
     return scene * scipy.ndimage.gaussian_filter(noise, 1.0, mode="wrap")
 
 
-def _pump(frame: int, scene: Float64Array) -> Float64Array:
+def _pump(frame: int, scene: F64) -> F64:
     """Patches that are brightened and darkened in alternate frames."""
     y, x = np.mgrid[:SIZE_PX, :SIZE_PX] // 32
     return np.where((x + y + frame) % 2 == 0, scene, -scene)
 
 
-Error: TypeAlias = Callable[[int, Float64Array], Float64Array]
+Error: TypeAlias = Callable[[int, F64], F64]
 EXAMPLES: dict[str, tuple[Error, int]] = {  # error of a frame, pan in pixels a frame
     "shimmering edges": (_shimmer, 0),
     "flashing patches": (_pump, 0),
@@ -98,7 +95,7 @@ EXAMPLES: dict[str, tuple[Error, int]] = {  # error of a frame, pan in pixels a 
 }
 
 
-def sequences(example: str) -> list[tuple[Float32Array, Float32Array, Float32Array]]:
+def sequences(example: str) -> list[tuple[F32, F32, F32]]:
     """Frames of an example: the reference, the one with a flickering error, and the blurred one.
 
     Parameters

@@ -9,19 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.monitor import Monitor
+from enfilade.records import F64
 from studies.observers.mode import Mode
 from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 ANGLES_DEG = (0, 45, 90)  # between the bars of mask and target
 UNMASKED_DB = -31.67  # unmasked threshold of the observers, 20 log10 contrast
@@ -48,13 +45,13 @@ class Masking:
         Unmasked threshold of the observers less that of the metric.
     """
 
-    mask_db: Float64Array
-    observers_db: Float64Array
-    metric_db: Float64Array
+    mask_db: F64
+    observers_db: F64
+    metric_db: F64
     gain_db: float
 
     @property
-    def error_db(self) -> Float64Array:
+    def error_db(self) -> F64:
         """Error of each mask; positive where the metric masks too much."""
         return self.metric_db - self.observers_db
 
@@ -64,14 +61,14 @@ class Masking:
         return float(np.sqrt(np.mean(self.error_db**2)))
 
 
-def sine(angle_deg: float = 0.0) -> Float64Array:
+def sine(angle_deg: float = 0.0) -> F64:
     """Mask at contrast 1, (240, 240) float64: in phase with the target, upright bars turned by an angle."""
     x, y = plane(SIZE_PX, PIXELS_PER_DEGREE)
     theta = math.radians(angle_deg)
     return np.cos(2.0 * np.pi * FREQUENCY_CPD * (x * math.cos(theta) + y * math.sin(theta)))
 
 
-def gabor() -> Float64Array:
+def gabor() -> F64:
     """Target at contrast 1, (240, 240) float64: upright bars."""
     x, y = plane(SIZE_PX, PIXELS_PER_DEGREE)
     return sine() * np.exp(-0.5 * (x**2 + y**2) / SIGMA_DEG**2)

@@ -12,15 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from enfilade.records import F64
 from enfilade.viewing import Viewing
 from studies.observers.screen import screen
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 FPS = 120.0  # of the display: 3.75 frames in a period of the fastest flicker, 32 Hz
 PIXELS_PER_DEGREE = 40.0  # of the gratings that flicker or drift
@@ -68,7 +65,7 @@ class Stimulus:
     """
 
     viewing: Viewing
-    patterns: tuple[Float64Array, ...]
+    patterns: tuple[F64, ...]
     step_px: float = 0.0
 
 
@@ -111,13 +108,13 @@ STIMULI: dict[str, Callable[[Grating], Stimulus]] = {
 }
 
 
-def _plane(size_px: int, pixels_per_degree: float) -> tuple[Float64Array, Float64Array]:
+def _plane(size_px: int, pixels_per_degree: float) -> tuple[F64, F64]:
     """Degrees from the centre: x to the right, y down."""
     steps = (np.arange(size_px) - 0.5 * (size_px - 1)) / pixels_per_degree
     x, y = np.meshgrid(steps, steps)
     return x, y
 
 
-def _square(x: Float64Array, y: Float64Array, area_deg2: float) -> Float64Array:
+def _square(x: F64, y: F64, area_deg2: float) -> F64:
     """1 in a square field, 0 around it."""
     return np.where(np.maximum(np.abs(x), np.abs(y)) <= 0.5 * math.sqrt(area_deg2), 1.0, 0.0)

@@ -8,20 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import scipy.special
 
 from enfilade.monitor import Monitor
+from enfilade.records import F64
 from studies.observers.mode import Mode
 from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
 from studies.observers.threshold import threshold_contrast
 from studies.progress import counted
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 PIXELS_PER_DEGREE = 120.0
 SIZE_PX = 256
@@ -62,9 +60,9 @@ class Thresholds:
     """
 
     number: npt.NDArray[np.int64]
-    observers_db: Float64Array
-    metric_db: Float64Array
-    spread_db: Float64Array
+    observers_db: F64
+    metric_db: F64
+    spread_db: F64
 
     @property
     def gain_db(self) -> float:
@@ -72,7 +70,7 @@ class Thresholds:
         return float(np.mean(self.observers_db - self.metric_db))
 
     @property
-    def error_db(self) -> Float64Array:
+    def error_db(self) -> F64:
         """Error of each target after the gain; positive where the metric is too sensitive."""
         return self.metric_db + self.gain_db - self.observers_db
 
@@ -95,16 +93,16 @@ class Thresholds:
         return float(np.sqrt(np.mean(errors_db**2)))
 
 
-def _gauss(x: Float64Array, y: Float64Array, sigma_x: float, sigma_y: float) -> Float64Array:
+def _gauss(x: F64, y: F64, sigma_x: float, sigma_y: float) -> F64:
     return np.exp(-0.5 * ((x / sigma_x) ** 2 + (y / sigma_y) ** 2))
 
 
-def _wave(x: Float64Array, y: Float64Array, cpd: float, normal_deg: float = 90.0) -> Float64Array:
+def _wave(x: F64, y: F64, cpd: float, normal_deg: float = 90.0) -> F64:
     theta = math.radians(normal_deg)
     return np.cos(2.0 * np.pi * cpd * (x * math.cos(theta) + y * math.sin(theta)))
 
 
-def _collinear(x: Float64Array, y: Float64Array, sign: float) -> Float64Array:
+def _collinear(x: F64, y: F64, sign: float) -> F64:
     sigma, spacing = 0.07, 5.0 * 0.07
     total = np.zeros_like(x)
     for index in range(-2, 3):
@@ -113,36 +111,36 @@ def _collinear(x: Float64Array, y: Float64Array, sign: float) -> Float64Array:
     return total
 
 
-def _row(y: Float64Array, row: int) -> Float64Array:
+def _row(y: F64, row: int) -> F64:
     """1 on one row of pixels, counted down from the centre."""
     return np.where(np.round(y * PIXELS_PER_DEGREE) == row, 1.0, 0.0)
 
 
-def _disc(x: Float64Array, y: Float64Array) -> Float64Array:
+def _disc(x: F64, y: F64) -> F64:
     return np.where(np.hypot(x, y) <= 0.125, 1.0, 0.0)
 
 
-def _checks(x: Float64Array, y: Float64Array) -> Float64Array:
+def _checks(x: F64, y: F64) -> F64:
     across, down = (_wave(x, y, 4.0 / math.sqrt(2.0), normal) for normal in (0.0, 90.0))
     return np.where(across * down >= 0.0, 1.0, -1.0)
 
 
 # Profiles under the wide Gaussian window, and targets without a window.
-WINDOWED: dict[int, Callable[[Float64Array, Float64Array], Float64Array]] = {
+WINDOWED: dict[int, Callable[[F64, F64], F64]] = {
     30: lambda _, y: np.where(y >= 0.0, 1.0, -1.0),
     31: lambda _, y: _row(y, 0),
     32: lambda _, y: _row(y, 0) - _row(y, 1),
     41: lambda x, y: scipy.special.j0(2.0 * np.pi * 4.0 * np.hypot(x, y)),
     42: _checks,
 }
-WHOLE: dict[int, Callable[[Float64Array, Float64Array], Float64Array]] = {
+WHOLE: dict[int, Callable[[F64, F64], F64]] = {
     33: lambda x, y: _collinear(x, y, 1.0),
     34: lambda x, y: _collinear(x, y, -1.0),
     40: _disc,
 }
 
 
-def target(number: int) -> Float64Array:
+def target(number: int) -> F64:
     """One target at contrast 1.
 
     Parameters

@@ -15,22 +15,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 import scipy.stats
 
 from enfilade.metric import SequenceAqm, sequence_score
 from enfilade.monitor import Monitor
+from enfilade.records import F32, F64
 from enfilade.viewing import Viewing
 from studies.observers.mode import Mode
 from studies.observers.screen import screen
 from studies.observers.tables import read_columns, read_textures
 from studies.progress import counted
-
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 ROWS = slice(192, 320)  # a quarter of the texture: rows are alike
 FRAMES = 4  # the first has no previous frame
@@ -98,10 +94,10 @@ class Losses:
     """
 
     conditions: tuple[Condition, ...]
-    observers_jnd: Float64Array
-    low_jnd: Float64Array
-    high_jnd: Float64Array
-    metric_jnd: Float64Array
+    observers_jnd: F64
+    low_jnd: F64
+    high_jnd: F64
+    metric_jnd: F64
 
     def spearman(self, *, textures: frozenset[str] = TEXTURES, displays: frozenset[str] = SCREENS) -> float:
         """Rank correlation between observers and metric.
@@ -116,7 +112,7 @@ class Losses:
         return float(found.statistic)
 
 
-def shade(texture: Float32Array, shift_px: float, columns_per_sample: int) -> Float32Array:
+def shade(texture: F32, shift_px: float, columns_per_sample: int) -> F32:
     """Shade a texture that is shifted to the right, as graphics hardware does.
 
     A sample for n columns interpolates in the mipmap level of n by n texels at the centre of the columns
@@ -145,14 +141,14 @@ def shade(texture: Float32Array, shift_px: float, columns_per_sample: int) -> Fl
     return np.repeat(samples, size, axis=1)
 
 
-def _interpolated(texels: Float32Array, positions: Float64Array, axis: int) -> Float32Array:
+def _interpolated(texels: F32, positions: F64, axis: int) -> F32:
     """Periodic texels, the centre of the first at 0.5, linearly interpolated along an axis."""
     first = np.floor(positions - 0.5)
     weight = (positions - 0.5 - first).astype(np.float32)
     weight = weight[None, :] if axis == 1 else weight[:, None]
     near = texels.take(first.astype(np.int64), axis=axis, mode="wrap")
     far = texels.take(first.astype(np.int64) + 1, axis=axis, mode="wrap")
-    mixed: Float32Array = near + weight * (far - near)
+    mixed: F32 = near + weight * (far - near)
     return mixed
 
 
@@ -166,7 +162,7 @@ def conditions() -> tuple[Condition, ...]:
     )
 
 
-def frames(condition: Condition, texture: Float32Array) -> Iterator[tuple[Float32Array, Float32Array]]:
+def frames(condition: Condition, texture: F32) -> Iterator[tuple[F32, F32]]:
     """Coarsely and fully shaded version of each frame, cd/m2.
 
     Parameters
@@ -191,7 +187,7 @@ def step_px(condition: Condition) -> float:
     return speed_deg_s * display.pixels_per_degree / display.fps
 
 
-def score(condition: Condition, texture: Float32Array, mode: Mode) -> float:
+def score(condition: Condition, texture: F32, mode: Mode) -> float:
     """Score of one condition's sequence, JND.
 
     Parameters

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from enfilade.records import F64
 from enfilade.viewing import Viewing
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 DISTANCE_M = 1.0  # arbitrary: only the angle of a pixel matters
 
@@ -48,7 +45,7 @@ def screen(
     )
 
 
-def plane(size_px: int, pixels_per_degree: float) -> tuple[Float64Array, Float64Array]:
+def plane(size_px: int, pixels_per_degree: float) -> tuple[F64, F64]:
     """Degrees from the centre of an image, which is a pixel: x to the right, y down."""
     steps = (np.arange(size_px) - size_px // 2) / pixels_per_degree
     x, y = np.meshgrid(steps, steps)

@@ -8,21 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric import Aqm, Pursuit
 from enfilade.monitor import Monitor
+from enfilade.records import F64
 from enfilade.viewing import Viewing
 from studies.observers.gratings import STIMULI, Grating
 from studies.observers.mode import Mode
 from studies.observers.tables import read_columns
 from studies.observers.threshold import sequence_threshold
 from studies.progress import counted
-
-Float64Array: TypeAlias = npt.NDArray[np.float64]
 
 LOWEST_CPD, HIGHEST_CPD = 0.5, 12.0  # range of the metric's bands
 
@@ -39,20 +36,20 @@ class Sensitivities:
         1 / contrast at threshold.
     """
 
-    frequency_cpd: Float64Array
-    temporal_hz: Float64Array
-    area_deg2: Float64Array
-    observers: Float64Array
-    metric: Float64Array
+    frequency_cpd: F64
+    temporal_hz: F64
+    area_deg2: F64
+    observers: F64
+    metric: F64
 
     @property
-    def error_db(self) -> Float64Array:
+    def error_db(self) -> F64:
         """Error of each grating; positive where the metric is too sensitive."""
-        error: Float64Array = 20.0 * np.log10(self.metric / self.observers)
+        error: F64 = 20.0 * np.log10(self.metric / self.observers)
         return error
 
 
-def rms_db(errors_db: Float64Array) -> float:
+def rms_db(errors_db: F64) -> float:
     """Root of the mean square of errors, dB."""
     return float(np.sqrt(np.mean(errors_db**2)))
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import csv
 from importlib.resources import files
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-Float64Array: TypeAlias = npt.NDArray[np.float64]
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+from enfilade.records import F32, F64
 
 DATA = files("studies.observers") / "data"
 WHITE = 65535.0  # of a 16-bit texture
 
 
-def read_columns(name: str, *numbers: str) -> tuple[list[dict[str, str]], dict[str, Float64Array]]:
+def read_columns(name: str, *numbers: str) -> tuple[list[dict[str, str]], dict[str, F64]]:
     """Read a table: all rows as text, and the named columns as numbers.
 
     Parameters
@@ -37,7 +34,7 @@ def read_columns(name: str, *numbers: str) -> tuple[list[dict[str, str]], dict[s
     return rows, {n: np.array([float(row[n]) for row in rows]) for n in numbers}
 
 
-def read_textures() -> dict[str, Float32Array]:
+def read_textures() -> dict[str, F32]:
     """Textures of the moving-texture experiment, (512, 512) float32 by name, linear, 1 is white."""
     with (DATA / "textures.npz").open("rb") as file, np.load(file) as archive:
         return {name: archive[name].astype(np.float32) / np.float32(WHITE) for name in archive.files}

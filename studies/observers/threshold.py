@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric import Aqm, SequenceAqm
-
-Float32Array: TypeAlias = npt.NDArray[np.float32]
-Float64Array: TypeAlias = npt.NDArray[np.float64]
+from enfilade.records import F32, F64
 
 CLOSE_DB = 0.05  # accuracy of a threshold
 MOST_STEPS = 12
@@ -24,7 +20,7 @@ MOST_DECREMENT = 0.98  # a target removes at most this share of the luminance
 FAINTEST_JND = 1e-12  # keeps the logarithm finite where nothing is visible
 
 
-def response_jnd(observer: Aqm, test: Float32Array, background: Float32Array) -> float:
+def response_jnd(observer: Aqm, test: F32, background: F32) -> float:
     """Response of the metric to an image: the maximum of the map, JND.
 
     Parameters
@@ -39,10 +35,10 @@ def response_jnd(observer: Aqm, test: Float32Array, background: Float32Array) ->
 
 def threshold_contrast(
     observer: Aqm,
-    pattern: Float64Array,
+    pattern: F64,
     mean_cd_m2: float,
     *,
-    mask: Float64Array | float = 0.0,
+    mask: F64 | float = 0.0,
     guess: float = 0.01,
 ) -> float:
     """Contrast of a target in an image at threshold.
@@ -78,7 +74,7 @@ def threshold_contrast(
 
 def sequence_threshold(
     observer: Aqm,
-    patterns: Sequence[Float64Array],
+    patterns: Sequence[F64],
     mean_cd_m2: float,
     *,
     step_px: float = 0.0,
@@ -121,7 +117,7 @@ def sequence_threshold(
     return _contrast_at_1_jnd(response, MOST_DECREMENT / _depth(patterns), guess)
 
 
-def _depth(patterns: Sequence[Float64Array]) -> float:
+def _depth(patterns: Sequence[F64]) -> float:
     """Largest decrement of a target at contrast 1."""
     return max(-min(float(pattern.min()) for pattern in patterns), 1e-9)
 

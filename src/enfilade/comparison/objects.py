@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.records import F32, U32
+from enfilade.records import F32, F64, U32
 
-F64 = npt.NDArray[np.float64]
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))  # Rec. ITU-R BT.709-6
 LEAST_PIXELS = 48  # of an object: the statistics of fewer say little
 HIGHLIGHT_SHARE = 0.02  # brightest pixels of an object

@@ -7,14 +7,10 @@ videos with a view of an OpenColorIO configuration, which may compress highlight
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.errors import InputError
-
-Float32Array: TypeAlias = npt.NDArray[np.float32]
+from enfilade.records import F32
 
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)  # ITU-R BT.709-6, item 3.2; R, G, B
 
@@ -25,7 +21,7 @@ SRGB_OFFSET = 0.055  # IEC 61966-2-1
 SRGB_GAMMA = 2.4  # IEC 61966-2-1
 
 
-def srgb_encode(linear: Float32Array) -> Float32Array:
+def srgb_encode(linear: F32) -> F32:
     """Encode linear values for an sRGB video or image (OETF), without clipping.
 
     Parameters
@@ -44,11 +40,11 @@ def srgb_encode(linear: Float32Array) -> Float32Array:
     """
     power = np.maximum(linear, SRGB_LINEAR_LIMIT) ** np.float32(1.0 / SRGB_GAMMA)
     curved = (1.0 + SRGB_OFFSET) * power - SRGB_OFFSET
-    encoded: Float32Array = np.where(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
+    encoded: F32 = np.where(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
     return encoded
 
 
-def srgb_decode(encoded: Float32Array) -> Float32Array:
+def srgb_decode(encoded: F32) -> F32:
     """Linear light of encoded values on an sRGB display (EOTF), without clipping.
 
     Parameters
@@ -67,11 +63,11 @@ def srgb_decode(encoded: Float32Array) -> Float32Array:
     """
     shifted = (np.maximum(encoded, SRGB_ENCODED_LIMIT) + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)
     curved = shifted ** np.float32(SRGB_GAMMA)
-    linear: Float32Array = np.where(encoded <= SRGB_ENCODED_LIMIT, encoded / SRGB_SLOPE, curved)
+    linear: F32 = np.where(encoded <= SRGB_ENCODED_LIMIT, encoded / SRGB_SLOPE, curved)
     return linear
 
 
-def luminance(linear_rgb: Float32Array) -> Float32Array:
+def luminance(linear_rgb: F32) -> F32:
     """Relative luminance of linear Rec.709 colours (ITU-R BT.709-6).
 
     Parameters
@@ -96,9 +92,7 @@ def luminance(linear_rgb: Float32Array) -> Float32Array:
     return np.asarray(linear_rgb @ weights, dtype=np.float32)
 
 
-def display_luminance(
-    linear_rgb: Float32Array, *, exposure_ev: float, peak_cd_m2: float, black_cd_m2: float
-) -> Float32Array:
+def display_luminance(linear_rgb: F32, *, exposure_ev: float, peak_cd_m2: float, black_cd_m2: float) -> F32:
     """Luminance of a linear image on the display.
 
     Exposure, sRGB encoding, clipping to the encodable range, decoding by the display, peak and black.

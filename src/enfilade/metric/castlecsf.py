@@ -9,12 +9,11 @@ luminance contrast at the fovea.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-F64: TypeAlias = npt.NDArray[np.float64]
+from enfilade.records import F64
 
 SUSTAINED_EXPONENT = 1.3314  # no unit: fall of the sustained channel with temporal frequency
 SUSTAINED_SCALE = 10.5795  # Hz^1.3314

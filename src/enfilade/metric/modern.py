@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric.adaptation import adapting_luminance
 from enfilade.metric.aperture import APERTURE_SIGMA_DEG, REFERENCE_AREA_DEG2, Aperture, patch_gain
@@ -22,10 +20,8 @@ from enfilade.metric.pyramid import Pyramid
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.metric.transducer import Transducer, energy_difference
 from enfilade.metric.transient import FlickerWeight
-from enfilade.records import F32
+from enfilade.records import F32, F64
 from enfilade.viewing import Viewing
-
-F64: TypeAlias = npt.NDArray[np.float64]
 
 CHANNEL_EXPONENT = 1.0  # no unit, of energies: contrasts add with exponent 2, without ripple between channels
 MIDDLE_GREY = 0.18  # of the screen's peak: luminance at which the CSF within bands is taken

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.errors import InputError
 from enfilade.metric.adaptation import DARKEST_CD_M2
@@ -22,10 +20,8 @@ from enfilade.metric.noise import response_variance
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.pyramid import Pyramid
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
-from enfilade.records import F32, Mask
+from enfilade.records import F32, F64, Mask
 from enfilade.viewing import Viewing
-
-F64: TypeAlias = npt.NDArray[np.float64]
 
 
 class PaperMetric:

@@ -19,9 +19,8 @@ from enfilade.metric.eye import (
     smeared_contrast,
 )
 from enfilade.metric.pyramid import Pyramid, double, halve, halved_shape
-from enfilade.records import F32, Mask
+from enfilade.records import F32, F64, Mask
 
-F64: TypeAlias = npt.NDArray[np.float64]
 Indices: TypeAlias = npt.NDArray[np.int32]
 
 FASTEST_DEG_S = 2000.0  # faster retinal motion is clipped to this: nothing is seen any more

@@ -14,15 +14,13 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from enfilade.metric.aperture import REFERENCE_AREA_DEG2
 from enfilade.metric.castlecsf import transient_sensitivity
 from enfilade.metric.cortex import Band
-from enfilade.records import F32, Mask
+from enfilade.records import F32, F64, Mask
 from enfilade.viewing import Viewing
 
-F64: TypeAlias = npt.NDArray[np.float64]
 Error: TypeAlias = tuple[F32, Mask]  # test - reference, cd/m2, 0 where not valid; valid pixels
 
 WHOLE = 1.0 - 1e-3  # part of a bilinear sample that must be valid, but for rounding
