@@ -98,9 +98,7 @@ class Bakery:
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
             with self._stage().square(value.uv_map) as canvas:
                 pixels, _ = canvas.bake(value.output, material, size)
-            self._of_uv[key] = self._stored(
-                pixels, None, value, material.name, value.uv_map, "the unit square of UV"
-            )
+            self._of_uv[key] = self._stored(pixels, None, value, material.name, value.uv_map)
         return self._of_uv[key]
 
     def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
@@ -113,9 +111,9 @@ class Bakery:
         if is_normal:
             pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
             file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
-            self._note(value.output, material.name, placed.name, size)
+            self._note(value.output, f"{material.name}, {placed.name}", size)
             return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
-        return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV, placed.name)
+        return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV)
 
     def _with_baked_normals(self, shader: Shader) -> Shader:
         """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map."""
@@ -140,7 +138,7 @@ class Bakery:
                     self._notes.add("approximated", material.name, found.node.name, what, effect)
 
     def _stored(
-        self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str, where: str
+        self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str
     ) -> Value:
         """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
         output = value.output
@@ -156,18 +154,12 @@ class Bakery:
             pixels = np.where(covered[..., None], pixels, mean)
         is_data = output.socket.type != "RGBA" or pixels.max() > 1.0
         file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
-        self._note(output, name, where, len(pixels))
+        self._note(output, name, len(pixels))
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
 
-    def _note(self, output: Output, name: str, where: str, size: int) -> None:
-        what = f"baked to {size}x{size} pixels over {where}"
-        self._notes.add(
-            "baked",
-            name,
-            f"{output.node.name}: {output.socket.name}",
-            what,
-            "detail is limited to its pixels",
-        )
+    def _note(self, output: Output, name: str, size: int) -> None:
+        node, what = f"{output.node.name}: {output.socket.name}", f"baked to {size}x{size} pixels"
+        self._notes.add("baked", name, node, what, "detail is limited to its pixels")
 
     def _resolution(self, placed: Placed, mesh: Mesh) -> int:
         """A power of two, by the object's largest size in the views of the path."""
