@@ -140,6 +140,19 @@ def write_ply(file: Path, mesh: Mesh, uv: str | None = None, colour: str | None 
         stream.write(faces.tobytes())
 
 
+def map_uv(file: Path, scale: tuple[float, float], offset: tuple[float, float]) -> None:
+    """Scale and move the texture coordinates in a file of :func:`write_ply`."""
+    data = bytearray(file.read_bytes())
+    begin = data.index(b"end_header\n") + len(b"end_header\n")
+    header = data[:begin].decode().splitlines()
+    count = next(int(line.split()[2]) for line in header if line.startswith("element vertex"))
+    names = [line.split()[2] for line in header if line.startswith("property float")]
+    vertices = np.frombuffer(data, "<f4", count * len(names), begin).reshape(count, len(names))
+    at = names.index("u")
+    vertices[:, at : at + 2] = vertices[:, at : at + 2] * np.float32(scale) + np.float32(offset)
+    file.write_bytes(data)
+
+
 def _distinct_rows(rows: F32) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Places of distinct rows of 32-bit numbers, and for each row the number of its equal among them.
 

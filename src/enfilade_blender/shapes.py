@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from enfilade_blender.job import Job
+from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context
 from enfilade_blender.materials.graph import Graph
@@ -72,6 +73,7 @@ class Shapes:
         self._shaders: dict[Any, Shader] = {}
         self._shared: dict[str, tuple[str, Surface]] = {}  # by names of materials
         self._bsdfs: list[Element] = []
+        self._baked: list[str] = []  # ids of the BSDFs of one object
         self.has_glass = False
         (job.out / "meshes").mkdir(exist_ok=True)
 
@@ -94,6 +96,7 @@ class Shapes:
                 total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
             )
             shapes += self._object(item, is_instanced=is_instanced)
+        self._bsdfs = share_bsdfs(self._bsdfs, shapes, self._baked, self.textures, self._out)
         return [*self._bsdfs, *shapes]
 
     def _object(self, placed: Placed, *, is_instanced: bool) -> list[Element]:
@@ -179,7 +182,9 @@ class Shapes:
         )
         self._bsdfs.append(named(element, identifier))
         self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
-        if not is_own:
+        if is_own:
+            self._baked.append(identifier)
+        else:
             self._shared[key] = identifier, surface
         return identifier, surface, uv, attribute
 

@@ -117,7 +117,7 @@ INPUTS = (
     (
         "Everything else: noise, ramps, Object and Generated coordinates",
         "baked",
-        "a bitmap of each mesh, on UVs of its own",
+        "a bitmap of each mesh, on UVs of its own; those of a material share an atlas",
     ),
     (
         "Fresnel, Layer Weight below Glossy in a Mix Shader",

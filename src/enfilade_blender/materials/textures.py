@@ -105,14 +105,26 @@ class Textures:
     def pixels(self, value: ImageValue | Texture) -> F32:
         """Linear values of a texture (H, W, 3), the first row on top."""
         if isinstance(value, Texture):
-            import bpy
-
-            image = bpy.data.images.load(str(self._folder / value.file), check_existing=True)
-            image.colorspace_settings.name = "Non-Color" if value.raw else "sRGB"
-            return linear_pixels(image)[..., :3]
+            return self.stored(value.file, raw=value.raw)
         if value.output.socket.name == "Alpha":
             return np.repeat(linear_pixels(value.image)[..., 3:], 3, axis=-1)
         return image_colours(value.output.node)
+
+    def stored(self, file: str, *, raw: bool) -> F32:
+        """Linear values of a file of the scene, (H, W, 3), the first row on top."""
+        image = self._image(file)
+        image.colorspace_settings.name = "Non-Color" if raw else "sRGB"
+        return linear_pixels(image)[..., :3]
+
+    def size(self, file: str) -> tuple[int, int]:
+        """Width and height of a file of the scene."""
+        width, height = self._image(file).size
+        return width, height
+
+    def _image(self, file: str) -> Any:
+        import bpy
+
+        return bpy.data.images.load(str(self._folder / file), check_existing=True)
 
     def has_pixels(self, value: Value) -> TypeGuard[ImageValue | Texture]:
         """Whether numbers can be computed of a value's; that a mid grey is in their place is noted."""
