@@ -171,7 +171,7 @@ def target(number: int) -> F64:
     return WHOLE[number](x, y)
 
 
-def measure(mode: Mode, monitor: Monitor, *, every: int = 1) -> Thresholds:
+def measure(mode: Mode, monitor: Monitor) -> Thresholds:
     """Thresholds of the metric for the 41 targets, beside those of the observers.
 
     Parameters
@@ -180,8 +180,6 @@ def measure(mode: Mode, monitor: Monitor, *, every: int = 1) -> Thresholds:
         The metric.
     monitor : Monitor
         Shows the progress over the targets.
-    every : int
-        2: only every second target, and so on.
 
     Returns
     -------
@@ -191,7 +189,7 @@ def measure(mode: Mode, monitor: Monitor, *, every: int = 1) -> Thresholds:
     observer = mode.aqm(screen(SIZE_PX, PIXELS_PER_DEGREE))
     _, observers = read_columns("modelfest.csv", "target", "sensitivity_db", "spread_db")
     numbers = observers["target"].astype(np.int64)
-    chosen = np.flatnonzero(~np.isin(numbers, IMAGES))[::every]
+    chosen = ~np.isin(numbers, IMAGES)
     numbers, observers_db = numbers[chosen], observers["sensitivity_db"][chosen]
     sensitivities_db = []
     targets = list(zip(numbers, observers_db, strict=True))

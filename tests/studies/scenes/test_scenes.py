@@ -69,7 +69,7 @@ def test_references_resolve_within_the_folder(name: str, small: dict[str, SceneF
 
 @pytest.mark.parametrize("name", SCENES)
 def test_loads_and_renders_with_sensible_exposure(name: str, loaded: Callable[[str], Any]) -> None:
-    image = np.array(mi.render(loaded(name), spp=4, seed=1))[..., :3]
+    image = np.array(mi.render(loaded(name), spp=8, seed=1))[..., :3]
     assert image.shape == (240, 320, 3)
     assert np.isfinite(image).all()
     shown = np.clip(image, 0.0, 1.0) ** (1 / 2.2)
