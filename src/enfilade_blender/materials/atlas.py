@@ -47,23 +47,26 @@ def share_bsdfs(
     users: dict[str, list[Element]] = {}
     for shape in (found for element in shapes for found in element.iter("shape")):
         if (reference := shape.find("ref")) is not None:
-            users.setdefault(reference.get("id") or "", []).append(shape)
+            users.setdefault(_id(reference), []).append(shape)
     glowing = {name for name, of in users.items() if any(s.find("emitter//texture") is not None for s in of)}
     packable = set(baked) - glowing
-    groups: dict[str, list[Element]] = {}
+    groups: dict[tuple[bool, str], list[Element]] = {}
     for bsdf in bsdfs:
-        groups.setdefault(_text_of(bsdf, with_files=bsdf.get("id") not in packable), []).append(bsdf)
+        is_baked = _id(bsdf) in packable and bool(_files(bsdf))
+        groups.setdefault((is_baked, _text_of(bsdf, with_files=not is_baked)), []).append(bsdf)
     kept: list[Element] = []
-    for first, *others in groups.values():
-        members = [first, *others]
-        sheets = [members]
-        if others and first.get("id") in packable and _files(first):
-            sheets = _packed(members, users, textures, folder)
-        for sheet in sheets:
+    for (is_baked, _), members in groups.items():
+        is_packed = is_baked and len(members) > 1
+        for sheet in _packed(members, users, textures, folder) if is_packed else [members]:
             kept.append(sheet[0])
-            for shape in (shape for one in sheet for shape in users.get(one.get("id") or "", ())):
-                shape.find("ref").set("id", sheet[0].get("id") or "")  # type: ignore[union-attr]
+            for shape in (shape for one in sheet for shape in users.get(_id(one), ())):
+                for reference in shape.findall("ref"):
+                    reference.set("id", _id(sheet[0]))
     return kept
+
+
+def _id(element: Element) -> str:
+    return element.get("id") or ""
 
 
 def _text_of(bsdf: Element, *, with_files: bool) -> str:
@@ -73,19 +76,23 @@ def _text_of(bsdf: Element, *, with_files: bool) -> str:
     if not with_files:
         for file in _files(anonymous):
             file.set("value", "")
-    return ET.tostring(anonymous, encoding="unicode") + (" as it is" if with_files else "")
+    return ET.tostring(anonymous, encoding="unicode")
 
 
-def _files(bsdf: Element) -> list[Element]:
-    """Names of the texture files of a BSDF, in its order."""
-    return [file for file in bsdf.iter("string") if file.get("name") == "filename"]
+def _files(element: Element) -> list[Element]:
+    """Names of the files of an element, in its order: textures of a BSDF, the mesh of a shape."""
+    return [file for file in element.iter("string") if file.get("name") == "filename"]
+
+
+def _name(file: Element) -> str:
+    return file.get("value") or ""
 
 
 def _packed(
     members: list[Element], users: dict[str, list[Element]], textures: Textures, folder: Path
 ) -> list[list[Element]]:
     """Pack the textures of BSDFs into atlases; the BSDFs that share each, of which the first one has it."""
-    sizes = [{textures.size(file.get("value") or "") for file in _files(bsdf)} for bsdf in members]
+    sizes = [{textures.size(_name(file)) for file in _files(bsdf)} for bsdf in members]
     sheets = [[bsdf] for bsdf, found in zip(members, sizes, strict=True) if len(found) > 1]
     members = [bsdf for bsdf, found in zip(members, sizes, strict=True) if len(found) == 1]
     sides = [side for found in sizes if len(found) == 1 for side, _ in found]
@@ -95,16 +102,15 @@ def _packed(
         sheet = [members[number] for number in numbers]
         for files in zip(*map(_files, sheet), strict=True):  # of one texture of the BSDF
             raw = _is_raw(sheet[0], files[0])
-            images = [textures.stored(file.get("value") or "", raw=raw) for file in files]
-            stem = Path(files[0].get("value") or "").stem
+            images = [textures.stored(_name(file), raw=raw) for file in files]
+            stem = Path(_name(files[0])).stem
             files[0].set("value", textures.write(f"{stem} atlas", _atlas(images, corners, size), raw=raw))
         for number, (row, column) in zip(numbers, corners, strict=True):
             side, (height, width) = sides[number], size
             scale = side / width, side / height
             low = (column + GUTTER_PX) / width, 1.0 - (row + GUTTER_PX + side) / height  # v points up
-            for shape in users.get(members[number].get("id") or "", ()):
-                file = next(s for s in shape.findall("string") if s.get("name") == "filename")
-                map_uv(folder / (file.get("value") or ""), scale, low)
+            for shape in users.get(_id(members[number]), ()):
+                map_uv(folder / _name(_files(shape)[0]), scale, low)
         sheets.append(sheet)
     return sheets
 
