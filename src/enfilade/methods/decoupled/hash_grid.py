@@ -175,6 +175,10 @@ class Entries:
         )
         return Entries._summed(keys[is_finite], light, squares, np.ones(len(light), np.int64))
 
+    def repeated(self, times: int) -> Entries:
+        """The entries as if each estimate had been made several times."""
+        return Entries(self.keys, self.sums * times, self.squares * times, self.counts * times)
+
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""

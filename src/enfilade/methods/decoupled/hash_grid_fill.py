@@ -8,8 +8,11 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.virtual_images import SHARP
+from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
@@ -24,20 +27,27 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.prepass_geometry(frame)
     chunk = walk.settings[LimitSettings].paths_in_flight
 
-    # Follow specular lobes from all pixels of the frame.
-    specular = Estimate(
-        camera,
-        np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng, qmc_point: shot.integrator.specular_radiance(
-            cache, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
-        ),
-        chunk=chunk,
-        pixel_filter=PixelFilter.BOX,
-        random=walk.random(frame, Purpose.HASH_GRID),
-        layers=SPECULAR_AOVS,
-        is_stratified=True,
-    )
-    specular.add(SPECULAR_SPP)
+    # Gather at the surfaces that mirrors and panes show.
+    virtual, paths = gather_virtual_images(shot, frame, parts.append)
+
+    # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
+    is_clear = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
+    with_virtual = IrradianceCache(cache.images, cache.weights, virtual.upload())
+    for pixels, known in ((~is_clear, cache), (is_clear, with_virtual)):
+        specular = Estimate(
+            camera,
+            np.flatnonzero(pixels).astype(np.uint32),
+            lambda rays, rng, qmc_point, known=known: shot.integrator.specular_radiance(
+                known, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
+            ),
+            chunk=chunk,
+            pixel_filter=PixelFilter.BOX,
+            random=walk.random(frame, Purpose.HASH_GRID),
+            layers=SPECULAR_AOVS,
+            is_stratified=True,
+        )
+        specular.add(SPECULAR_SPP)
+        paths += specular.paths
 
     # Gather at the diffuse pixels of the prepass image.
     gathered = Estimate(
@@ -54,7 +64,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     )
     gathered.add(GATHER_SPP)
 
-    # Sum up their estimates by entry.
-    entries = Entries.joined(parts)
-    rays = specular.paths + gathered.paths
+    # Sum up the estimates by entry.
+    entries = Entries.joined([*parts, virtual])
+    rays = gathered.paths + paths
     return Output({frame: entries}, {"rays": {"prepass": rays}, "entries": len(entries.keys)})

@@ -243,7 +243,53 @@ class Integrator:
             other.
         """
         dr.eval(qmc_point)  # see `spawn`
-        direct, vertex = self._kernels.gather(cache, spawn(rays, rng, ENTRY_PX * pixel_angle), qmc_point)
+        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
+        direct, vertex = self._kernels.gather(cache, path, qmc_point, True)
+        return self._gathered(cache, path, direct, vertex, on_miss)
+
+    def final_gather_of(
+        self, cache: IrradianceCache, path: Path, qmc_point: Any, on_miss: OnMiss, count: int
+    ) -> Samples:
+        """The same at the next surfaces of paths, with all emitters.
+
+        Parameters
+        ----------
+        cache, on_miss
+            As of :meth:`specular_radiance`.
+        path
+            On their way to the surfaces; at most one a lane.
+        qmc_point : Array4f
+            As of :meth:`final_gather`, by lane.
+        count
+            Number of lanes.
+        """
+        qmc_point = dr.gather(Array4f, qmc_point, path.lane)
+        lane, path = path.lane, replace(path, lane=dr.arange(UInt, dr.width(path.lane)))
+        dr.eval(qmc_point, path)
+        direct, vertex = self._kernels.gather(cache, path, qmc_point, False)
+        found = self._gathered(cache, path, direct, vertex, on_miss)
+        layers = tuple(dr.zeros(Array3f, count) for _ in found.layers)
+        for target, layer in zip(layers, found.layers, strict=True):
+            scatter_add(target, layer, lane)
+        return Samples(layers)
+
+    def entries_of(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any]:
+        """Keys of the hash grid's entries at the next surfaces of paths, and which of them lack irradiance.
+
+        Returns
+        -------
+        keys : tuple of UInt64
+            One a level.
+        is_missing : Bool
+            Whether a surface is diffuse, and not in the images of the cache.
+        """
+        found: tuple[tuple[Any, ...], Any] = self._kernels.find_entries(cache, path)
+        return found
+
+    def _gathered(
+        self, cache: IrradianceCache, path: Path, direct: Any, vertex: Vertex, on_miss: OnMiss | None
+    ) -> Samples:
+        """Both layers of a final gather, whose paths have made a bounce."""
         light, deferred = Contributions(), _Deferred()
         if cache.images:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
             light.add(vertex.radiance, vertex.path.lane)
@@ -251,7 +297,7 @@ class Integrator:
         onward = compact(vertex.path, dr.compress(vertex.has_specular))
         self._trace_specular(light, cache, onward, deferred)
         self._finish(light, cache, deferred, on_miss)
-        return Samples((direct, light.summed(dr.width(rng.state))))
+        return Samples((direct, light.summed(dr.width(path.lane))))
 
     def _trace_specular(
         self,

@@ -74,6 +74,8 @@ class PathKernels:
         A bounce off specular lobes.
     gather
         A bounce off the diffuse lobe.
+    find_entries
+        Keys in the hash grid.
     query_further
         The rest of the cache.
     estimate
@@ -93,6 +95,7 @@ class PathKernels:
         self.query_further = recorded(query_further, lambda: None)
         self.extend = recorded(self._extend, state)
         self.gather = recorded(self._gather, state)
+        self.find_entries = recorded(self._find_entries, state)
         self.estimate = recorded(self._estimate, state)
         self.terminate = recorded(self._terminate, state)
 
@@ -184,13 +187,18 @@ class PathKernels:
         is_end = extended.bounces >= MAX_BOUNCES
         return Array3f(path.throughput * sample.direct), Bool(is_split), Bool(is_end), vertex
 
-    def _gather(self, cache: IrradianceCache, path: Path, qmc_point: Any) -> tuple[Any, Vertex]:
-        """Scatter off the diffuse lobe of the visible surface, and intersect the next one."""
+    def _gather(
+        self, cache: IrradianceCache, path: Path, qmc_point: Any, is_visible: bool
+    ) -> tuple[Any, Vertex]:
+        """Scatter off the diffuse lobe of the next surface, and intersect the one after.
+
+        A visible surface is that of the G-buffer, and emitters with sharp shadows are left out.
+        """
         rng = PCG32(path.rng)
 
         # Intersect, and sample the diffuse lobe.
-        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
-        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng), soft_only=True)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=is_visible)
+        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng), soft_only=is_visible)
 
         # Extend the path.
         extended = Path(
@@ -206,8 +214,16 @@ class PathKernels:
         )
 
         # Query the cache at the next vertex.
-        emitted, vertex = self._intersect(cache, extended, soft_only=True)
+        emitted, vertex = self._intersect(cache, extended, soft_only=is_visible)
         return Array3f(sample.direct + emitted), vertex
+
+    def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any]:
+        """Keys of the next surface in the hash grid; whether it is diffuse and not in the images."""
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
+        at = point.position, point.surfaces.normal, point.surfaces.shape_index
+        _, is_known = cache.lookup(*at)
+        is_diffuse = point.surfaces.is_hit & (dr.max(point.surfaces.albedo) > MIN_DIFFUSE_ALBEDO)
+        return _keys(point, path), Bool(path.is_active & is_diffuse & ~is_known)
 
     def _estimate(self, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
@@ -218,12 +234,9 @@ class PathKernels:
         rng = PCG32(path.rng)
         rng.state ^= ESTIMATE_SALT
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        width = path.width_at(point)
         direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
         irradiance = Array3f(direct + indirect)
-        at = point.position, point.surfaces.normal, point.surfaces.shape_index, width
-        keys = tuple(entry_key(*at, level) for level in range(LEVELS))
-        return Array3f(path.throughput * point.surfaces.albedo), irradiance, keys
+        return Array3f(path.throughput * point.surfaces.albedo), irradiance, _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
@@ -231,6 +244,12 @@ class PathKernels:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
+
+
+def _keys(point: ShadingPoint, path: Path) -> tuple[Any, ...]:
+    """Keys of the entries of a point, one a level."""
+    at = point.position, point.surfaces.normal, point.surfaces.shape_index, path.width_at(point)
+    return tuple(entry_key(*at, level) for level in range(LEVELS))
 
 
 def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_at: Any) -> Any:

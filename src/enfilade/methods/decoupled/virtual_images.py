@@ -16,7 +16,7 @@ from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, lanes, rows
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.replay import recorded
-from enfilade.methods.decoupled.paths import Path, compact, spawn
+from enfilade.methods.decoupled.paths import Path, compact, merged, spawn
 from enfilade.records import Geometry, SurfaceClass
 from enfilade.renderer import LobeRenderer
 
@@ -26,7 +26,7 @@ IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mi
 CLEAR = SurfaceClass.TRANSPARENT
 SHARP = (SurfaceClass.MIRROR, CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
-REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the reflecting or transmitting lobe
+CHOICES = REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the lobe: one an image
 MAX_INTERFACES = 8  # mirrors and panes along a path
 
 
@@ -99,6 +99,32 @@ class VirtualImages:
             for lengths, indices, normals in images
         ]
 
+    def seen_along(self, path: Path, choice: float) -> Path:
+        """Paths on their way to the surfaces that camera paths show by mirrors and panes.
+
+        Parameters
+        ----------
+        path
+            From the camera.
+        choice
+            Of :data:`CHOICES`, at the first interface.
+
+        Returns
+        -------
+        Path
+            In another order, without those that end at the sky or meet too many interfaces.
+        """
+        ends: list[Path] = []
+        for number in range(MAX_INTERFACES):
+            chosen = dr.full(Float, choice if number == 0 else TRANSMIT, dr.width(path.lane))
+            dr.eval(chosen)
+            path, shape_index, *_, is_image, is_sharp = self._extend(path, chosen)
+            ends.append(compact(path, dr.compress(is_image & ~is_sharp & (shape_index > 0))))
+            path = compact(path, dr.compress(is_sharp))
+            if not dr.width(path.lane):
+                break
+        return merged(ends)
+
     def _extend_kernel(self, path: Path, choice: Any) -> tuple[Path, Any, Any, Any, Any, Any]:
         """Reflect or transmit paths at the next surface, and intersect the following one.
 
@@ -116,7 +142,7 @@ class VirtualImages:
         rng = PCG32(path.rng)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
         sample = self._renderer.sample_specular(point, rng, choice)
-        ahead = replace(path, rays=sample.rays, bounce=sample.bounce, rng=rng)
+        ahead = replace(path, rays=sample.rays, bounce=sample.bounce, width=path.width_at(point), rng=rng)
 
         # Intersect.
         surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces

@@ -1,0 +1,106 @@
+"""Irradiance of the surfaces that mirrors and panes show: gathered, denoised as they are seen.
+
+Light on surfaces is smooth as seen in a plane mirror, as it is when seen directly. What paths estimate there
+one by one stays noisy in the hash grid, whose entries are too small for many of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from enfilade.arrays import PCG32, lanes
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
+from enfilade.methods.decoupled.integrator import OnMiss
+from enfilade.methods.decoupled.irradiance import NOISE_SHARE, OUTLIER
+from enfilade.methods.decoupled.path_kernels import ENTRY_PX
+from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
+from enfilade.records import Geometry
+from enfilade.renderer import PixelFilter, Purpose, Rays
+from enfilade.settings import LimitSettings
+
+SPP = 8  # final gather rays of a pixel
+
+
+def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, int]:
+    """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
+
+    Parameters
+    ----------
+    shot
+    frame
+    on_miss
+        Receives the irradiance of surfaces that light these, and are not cached.
+
+    Returns
+    -------
+    entries : Entries
+    paths : int
+    """
+    images = shot.virtual_images.find(shot.light_geometry(frame))
+    gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
+    return Entries.joined([one for entries, _ in gathered for one in entries]), sum(n for _, n in gathered)
+
+
+def _gather(
+    shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
+) -> tuple[list[Entries], int]:
+    """Entries of a virtual image, one list a level, and the number of paths."""
+    cache, camera, walk = shot.prepass_cache(frame), virtual.camera, shot.walk
+
+    def seen_along(rays: Rays, rng: Any) -> Path:
+        return shot.virtual_images.seen_along(spawn(rays, rng, ENTRY_PX * camera.pixel_angle), choice)
+
+    # Find the surfaces, and their entries.
+    pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
+    if not len(pixels):
+        return [], 0
+    path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), PCG32(len(pixels)))
+    if not dr.width(path.lane):
+        return [], 0
+    keys, is_missing = shot.integrator.entries_of(cache, path)
+    chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
+    if not len(chosen):
+        return [], 0
+    chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
+    pixels = pixels[lane[chosen]]
+
+    # Gather their irradiance.
+    def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
+        path = seen_along(rays, rng)
+        return shot.integrator.final_gather_of(cache, path, qmc_point, on_miss, dr.width(rng.state))
+
+    estimate = Estimate(
+        camera,
+        pixels,
+        radiance,
+        chunk=walk.settings[LimitSettings].paths_in_flight,
+        pixel_filter=PixelFilter.CENTRE,
+        random=walk.random(frame, Purpose.VIRTUAL_IMAGES),
+        layers=2,
+        is_stratified=True,
+    )
+    estimate.add(SPP)
+
+    # Denoise it; a denoised pixel is as reliable as many samples.
+    where = np.zeros(virtual.shape_index.shape, np.bool_)
+    where.flat[pixels] = True
+    light = [layer.to_image(where) for layer in estimate.shadings]
+    light = [replace(layer, variance=np.float32(NOISE_SHARE) * layer.variance) for layer in light]
+    colors, times = [layer.color for layer in light], SPP
+    if (denoiser := shot.settings.denoiser) != "none":
+        # Virtual images do not lie in the planes that their depths and normals describe.
+        guide = replace(virtual, depth=np.zeros_like(virtual.depth))
+        colors = [denoise_light(guide, layer, where, quality=denoiser, outlier=OUTLIER) for layer in light]
+        times = RELIABLE_SAMPLES
+    direct, indirect = (color[where] for color in colors)
+    irradiance = direct + indirect
+    return [Entries.of(np.array(key)[chosen], irradiance).repeated(times) for key in keys], estimate.paths
