@@ -33,8 +33,8 @@ from studies.bench.suite import (
 from studies.bench.tables import ratio_text
 
 HERE = Path(__file__).resolve().parent
-QUICK_FRAMES, FRAMES, LARGE_FRAMES = 16, 40, 8
-REFERENCE_SPP = "512"
+FRAMES, LARGE_FRAMES = 16, 8
+REFERENCE_SPP, LARGE_REFERENCE_SPP = "512", "128"  # a window of a large image has 13 times as many pixels
 
 
 def main() -> int:
@@ -53,8 +53,6 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
-    if not any(option.startswith("--reference-spp") for option in options):
-        options += ["--reference-spp", REFERENCE_SPP]
     names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
     benches: list[dict[str, Any]] = []
     failed = []
@@ -68,14 +66,13 @@ def main() -> int:
         except EnfiladeError as error:
             parser.error(str(error))
         is_large = is_large_size(size)
-        frames = arguments.frames or (
-            QUICK_FRAMES if arguments.quick else LARGE_FRAMES if is_large else FRAMES
-        )
+        frames = arguments.frames or (LARGE_FRAMES if is_large else FRAMES)
+        spp = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
         is_chosen = any(option.startswith("--only") for option in options)
         only = () if is_chosen else only_for(size, is_quick=arguments.quick)
         for case in cases:
             try:
-                benches.append(run_case(case, size, frames, only, arguments.out, options))
+                benches.append(run_case(case, size, frames, only, arguments.out, [*spp, *options]))
             except EnfiladeError as error:
                 failed.append(str(error))
     if benches:

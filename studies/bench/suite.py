@@ -25,7 +25,7 @@ SMALL = (
     "paper-16", "decoupled-60", "decoupled-15",
 )  # fmt: skip
 LARGE = (
-    *(f"denoised-{name}" for name in ("2-fast", "4", "8", "16", "4-accumulated-after")),
+    *(f"denoised-{name}" for name in ("4", "8", "16", "4-accumulated-after")),
     "decoupled-60", "decoupled-15",
 )  # fmt: skip
 QUICK = ("denoised-2", "denoised-4", "denoised-8", "decoupled-60", "decoupled-15")
