@@ -22,9 +22,9 @@ RIGHT = np.arange(WIDTH) > WIDTH // 2
 WHERE = np.broadcast_to(RIGHT, (HEIGHT, WIDTH))
 
 
-def changed(values, exposure_ev=0.0):
+def changed(values, exposure_ev=0.0, noise=NOISE):
     """The change of the first of seven frames, of which the right half is refined."""
-    deviation = np.where(WHERE, np.float32(NOISE / 2.0**exposure_ev), np.float32(0))
+    deviation = np.where(WHERE, np.float32(noise / 2.0**exposure_ev), np.float32(0))
     shown = [
         upload_displayed(
             [g, g], color, deviation, WHERE if k == 0 else np.ones_like(WHERE), exposure_ev=exposure_ev
@@ -62,6 +62,13 @@ def test_dark_bars_before_a_bright_sky_stay_dark():
     made = frames(np.where(np.broadcast_to(bars, (HEIGHT, WIDTH, 1)), 0.05, SKY))
     change = changed(made)
     assert np.abs(change[made[0] < 1.0]).max() < 4.0 * NOISE
+
+
+def test_noise_above_white_does_not_brighten_dark_bars():
+    is_bar = np.broadcast_to((np.arange(WIDTH) // 4 % 2 == 0)[None, :], WHERE.shape)
+    made = [np.where(is_bar[..., None], np.float32(0.05), np.float32(SKY)).repeat(3, axis=2)] * 7
+    change = changed(made, noise=np.where(is_bar, 0.01, 5.0))
+    assert np.abs(change[is_bar]).max() < 0.02
 
 
 def test_frames_that_differ_by_more_than_their_noise_do_not_count():

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from enfilade.arrays import image, to_half
+from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.specular import accumulate_temporally, upload_aov
@@ -48,7 +49,10 @@ def upload_displayed(
         shape_index=np.where(is_pane, transmitted.shape_index, reflected.shape_index),
     )
     scale = np.float32(2.0**exposure_ev)
-    noise = np.minimum(NOISE_SHARE * deviation * scale, np.float32(1.0))
+    # Above white there is no noise: bright pixels beside a dark line are not averaged with it.
+    mean, error = luminance(color) * scale, deviation * scale
+    low, high = (np.clip(value, 0.0, 1.0) for value in (mean - error, mean + error))
+    noise = np.float32(0.5 * NOISE_SHARE) * (high - low)
     displayed = to_half(np.clip(color * scale, 0.0, 1.0)), to_half(noise)
     return upload_aov(shown, SpecularAov(*displayed), where)
 
