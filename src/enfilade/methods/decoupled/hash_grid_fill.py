@@ -32,6 +32,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     is_clear = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
+    random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     with_virtual = IrradianceCache(cache.images, cache.weights, virtual.upload())
     for pixels, known in ((~is_clear, cache), (is_clear, with_virtual)):
         specular = Estimate(
@@ -42,7 +43,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             ),
             chunk=chunk,
             pixel_filter=PixelFilter.BOX,
-            random=walk.random(frame, Purpose.HASH_GRID),
+            random=random,
             layers=SPECULAR_AOVS,
             is_stratified=True,
         )
