@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -111,13 +112,17 @@ class Command:
         last: deque[str] = deque(maxlen=TAIL)
         started: list[subprocess.Popen[str]] = []
 
-        def start() -> None:
-            started.append(
-                subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace")  # noqa: S603
-            )
-
         # submitit ends the job by an exception from a signal handler. Handlers run in the main thread: in
-        # another one the process is started and noted, or neither.
+        # another one the process is started and noted, or neither, and none is started after the end.
+        lock, ended = threading.Lock(), threading.Event()
+
+        def start() -> None:
+            with lock:
+                if not ended.is_set():
+                    started.append(
+                        subprocess.Popen(self.line, stderr=subprocess.PIPE, text=True, errors="replace")  # noqa: S603
+                    )
+
         with ThreadPoolExecutor(1) as starter:
             try:
                 starter.submit(start).result()
@@ -125,7 +130,8 @@ class Command:
                     sys.stderr.write(text)
                     last.append(text)
             except BaseException:
-                starter.shutdown()
+                with lock:
+                    ended.set()
                 for process in started:
                     process.kill()
                 raise
