@@ -5,6 +5,7 @@ Reprojecting them gives motion vectors of reflections and transmissions (Zimmer 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -64,27 +65,14 @@ class VirtualImages:
         choice = Float(dr.select(dr.gather(UInt, lanes(lane), path.lane) < count, REFLECT, TRANSMIT))
         length = np.ones(2 * count, np.float32)  # of the path, in distances of the first surface
         first = np.tile(geometry.depth.ravel() * _lengths(geometry.camera), 2)
-        paths = len(lane)  # without the padding at the end
-        for _ in range(MAX_INTERFACES):
-            dr.eval(choice)
-            path, next_shape, next_normal, distance, is_image, is_sharp = self._extend(path, choice)
-
+        for ahead, next_shape, next_normal, distance, is_image, _ in self._interfaces(path, choice):
             # Replace the surface by the next one where the interface forms an image; rough glass forms none.
-            shown = np.array(is_image)[:paths]
-            at = lane[np.array(path.lane)[:paths][shown]]
-            shape_index[at] = np.array(next_shape)[:paths][shown] + IN_VIRTUAL_IMAGE
-            normal[at] = rows(next_normal)[:paths][shown]
-            added = np.array(distance)[:paths][shown] / first[at]
+            shown = np.flatnonzero(np.array(is_image))
+            at = lane[np.array(ahead.lane)[shown]]
+            shape_index[at] = np.array(next_shape)[shown] + IN_VIRTUAL_IMAGE
+            normal[at] = rows(next_normal)[shown]
+            added = np.array(distance)[shown] / first[at]
             length[at] = np.minimum(length[at] + added, SKY_DISTANCE)
-
-            # Keep the paths whose next surface is another interface.
-            onward: Any = dr.compress(is_sharp)
-            paths = dr.width(onward)
-            if not paths:
-                break
-            path = compact(path, onward)
-            # A pane seen in a mirror shows the surface behind it.
-            choice = dr.full(Float, TRANSMIT, dr.width(path.lane))
         size = geometry.shape_index.shape
         images = zip(
             length.reshape(2, *size), shape_index.reshape(2, *size), normal.reshape(2, *size, 3), strict=True
@@ -115,15 +103,26 @@ class VirtualImages:
             In another order, without those that end at the sky or meet too many interfaces.
         """
         ends: list[Path] = []
-        for number in range(MAX_INTERFACES):
-            chosen = dr.full(Float, choice if number == 0 else TRANSMIT, dr.width(path.lane))
-            dr.eval(chosen)
-            path, shape_index, *_, is_image, is_sharp = self._extend(path, chosen)
-            ends.append(compact(path, dr.compress(is_image & ~is_sharp & (shape_index > 0))))
-            path = compact(path, dr.compress(is_sharp))
+        chosen = dr.full(Float, choice, dr.width(path.lane))
+        for ahead, shape_index, *_, is_image, is_sharp in self._interfaces(path, chosen):
+            ends.append(compact(ahead, dr.compress(is_image & ~is_sharp & (shape_index > 0))))
+        return merged(ends)
+
+    def _interfaces(self, path: Path, choice: Any) -> Iterator[tuple[Path, Any, Any, Any, Any, Any]]:
+        """Follow paths from interface to interface, and yield what :meth:`_extend_kernel` returns at each.
+
+        Padding lanes form no image.
+        """
+        for _ in range(MAX_INTERFACES):
+            dr.eval(choice)
+            found = self._extend(path, choice)
+            yield found
+            ahead, *_, is_sharp = found
+            path = compact(ahead, dr.compress(is_sharp))
             if not dr.width(path.lane):
                 break
-        return merged(ends)
+            # A pane seen in a mirror shows the surface behind it.
+            choice = dr.full(Float, TRANSMIT, dr.width(path.lane))
 
     def _extend_kernel(self, path: Path, choice: Any) -> tuple[Path, Any, Any, Any, Any, Any]:
         """Reflect or transmit paths at the next surface, and intersect the following one.
