@@ -29,11 +29,10 @@ class Purpose(IntEnum):
     DIFFUSE = 4
     SPECULAR = 5
     HASH_GRID = 6
-    PILOT = 7
+    PREVIEW = 7
     GUIDE = 8
     PREPASS = 9
     PREPASS_HASH_GRID = 10
-    SECOND_PILOT = 11
     SPECULAR_EDGES = 12
     SPECULAR_CENTRE = 13
     KEYFRAME_SECOND_HALF = 14

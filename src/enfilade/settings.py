@@ -273,7 +273,10 @@ class DecoupledSettings(Section):
     table = "decoupled"
 
     quality: float = option(
-        10.0, "Noise that may remain, in JND as compare reports it; lower costs more.", least=0.5, most=100.0
+        10.0,
+        "Noise that may remain, on a scale of its own; lower is better and costs more.",
+        least=0.5,
+        most=100.0,
     )
     irradiance_spp: int = option(
         0, "Paths a pixel of an irradiance image; 0: derived from the quality.", least=0, most=1_048_576

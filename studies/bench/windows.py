@@ -128,7 +128,7 @@ def _shadows(walk: Walkthrough, frame: int, geometry: Geometry) -> Map:
     """Change of irradiance between blocks of the same diffuse shape, by a preview."""
     shape = geometry.shape_index.shape
     traced = walk.trace(
-        frame, np.ones(shape, np.bool_), Purpose.PILOT, spp=PREVIEW_SPP, pixel_filter=PixelFilter.CENTRE
+        frame, np.ones(shape, np.bool_), Purpose.PREVIEW, spp=PREVIEW_SPP, pixel_filter=PixelFilter.CENTRE
     )
     color, albedo = (
         i.reshape(*shape, 3) @ np.array(REC709_LUMINANCE) for i in (traced.color, geometry.albedo)

@@ -14,7 +14,7 @@ PATH = room_path(7, (48, 32))
 TABLES = {
     "sampling": {"spp": 16},
     "keyframes": {"spacing": 3},
-    "decoupled": {"quality": 100.0},  # few paths: as many in the pilot as in the keyframes
+    "decoupled": {"quality": 100.0},
     "masks": {"split_percent": 20.0},
 }
 
@@ -41,7 +41,6 @@ def runs(tmp_path_factory):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_no_stream_of_random_numbers_is_used_twice(runs, name):
-    # In particular, the pilot's two images and the irradiance image of its keyframe are independent.
     keys = runs[name][0].keys
     assert len(set(keys)) == len(keys) >= len(PATH)
 

@@ -58,8 +58,8 @@ def test_a_fixed_cost_and_a_cost_of_each_pixel_are_extrapolated():
 
 
 def test_the_compilation_of_the_only_task_of_a_pass_does_not_count():
-    small, large = DryRun(100, line("pilot", 90.0), {}), DryRun(300, line("pilot", 4.0), {})
-    assert forecast(small, large, 500, {"pilot": 1}, {}) == (4.0, 8.0)
+    small, large = DryRun(100, line("irradiance", 90.0), {}), DryRun(300, line("irradiance", 4.0), {})
+    assert forecast(small, large, 500, {"irradiance": 1}, {}) == (4.0, 8.0)
 
 
 def test_rays_are_weighted_by_the_number_of_tasks():

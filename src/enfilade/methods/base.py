@@ -170,7 +170,12 @@ class Method(ABC):
         return []
 
     def cost_ratios(
-        self, settings: Settings, pixels: int, excerpt: Mapping[str, int], whole: Mapping[str, int]
+        self,
+        settings: Settings,
+        pixels: int,
+        excerpt: Mapping[str, int],
+        whole: Mapping[str, int],
+        shots: int,
     ) -> Mapping[str, float]:
         """Cost a pixel of a task in a walkthrough over that of one in a small excerpt, for forecasts.
 
@@ -181,13 +186,15 @@ class Method(ABC):
             Of a frame of the walkthrough.
         excerpt, whole
             Number of tasks of each pass.
+        shots
+            Of the walkthrough; an excerpt is of one.
 
         Returns
         -------
         mapping of str to float
             By pass; 1 where left out.
         """
-        del settings, pixels, excerpt, whole
+        del settings, pixels, excerpt, whole, shots
         return {}
 
     @abstractmethod

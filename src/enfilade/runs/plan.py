@@ -141,10 +141,11 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     tasks = [*analysis_tasks(len(path)), *method.tasks(analysis), *video_tasks(len(path))]
     counts = Counter(task.pass_name for task in tasks)
     excerpt = Counter(line["pass"] for line in large.lines)
-    ratios = method.cost_ratios(analysis.settings, path.width * path.height, excerpt, counts)
+    pixels, shots = path.width * path.height, len(path.shots())
+    ratios = method.cost_ratios(analysis.settings, pixels, excerpt, counts, shots)
     frames_each = len(path) / large.summary["frames"]  # the excerpt has one task of these passes
     weights = {**counts, ANALYSIS.name: frames_each, CLIPS.name: frames_each}
-    wall_s, cpu_s = forecast(small, large, path.width * path.height, weights, ratios)
+    wall_s, cpu_s = forecast(small, large, pixels, weights, ratios)
     return Plan(
         method=method.name,
         frames=path.numbers,

@@ -11,33 +11,36 @@ from enfilade.settings import DecoupledSettings, Settings
 
 
 @pytest.mark.parametrize(
-    ("jnd", "quality", "keyframes", "spp"),
+    ("quality", "keyframes", "spp"),
     [
-        (5.0, 1.0, 2, 100),  # 4 (5 / 1)^2
-        (10.0, 1.0, 20, 88),  # over 9 accumulated images, of which half are counted: 88.9, to the next 4
-        (10.0, 5.0, 2, 16),
-        (0.0, 1.0, 2, 8),  # the fewest
-        (100.0, 1.0, 2, 256),  # the most
+        (1.0, 2, 380),
+        (4.0, 2, 192),
+        (4.0, 4, 96),  # of four images that are averaged, half are counted
+        (1.0, 20, 84),  # of nine
+        (100.0, 20, 8),  # the fewest
+        (0.5, 1, 512),  # the most
     ],
 )
-def test_irradiance_spp_falls_with_the_square_of_the_quality(jnd, quality, keyframes, spp):
-    assert irradiance_spp(jnd, quality, keyframes) == pytest.approx(spp, abs=4)
+def test_irradiance_spp_follows_the_quality_and_the_averaged_images(quality, keyframes, spp):
+    assert irradiance_spp(DecoupledSettings(quality=quality), keyframes) == spp
 
 
 def test_specular_rays_follow_the_quality_or_the_settings():
     of = [DecoupledSettings(quality=float(q)) for q in (1, 4, 16, 64)]
-    assert [specular_spp(s) for s in of] == [17, 8, 4, 2]
+    assert [specular_spp(s) for s in of] == [34, 17, 8, 4]
     assert specular_spp(DecoupledSettings(specular_spp=3)) == 3
 
 
 def test_tasks_of_long_shots_cost_less_than_those_of_an_excerpt():
-    excerpt, whole = {"irradiance": 2, "pilot": 1}, {"irradiance": 60, "pilot": 2}
-    ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole)
-    expected = irradiance_spp(56.0, 10.0, 30) / irradiance_spp(56.0, 10.0, 2)
-    same = dict.fromkeys(("prepass", "hash_grid", "pilot"), 1.0)
-    assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected}, rel=0.05)
+    excerpt, whole = {"irradiance": 2}, {"irradiance": 60}
+    ratios = Decoupled().cost_ratios(Settings(), 320 * 180, excerpt, whole, shots=2)
+    settings = DecoupledSettings()
+    expected = irradiance_spp(settings, 30) / irradiance_spp(settings, 2)
+    same = dict.fromkeys(("prepass", "hash_grid"), 1.0)
+    assert expected < 0.3
+    assert ratios == pytest.approx(same | {"irradiance": expected, "disocclusion": expected})
     fixed = Settings().replace(DecoupledSettings, irradiance_spp=16)
-    assert set(Decoupled().cost_ratios(fixed, 320 * 180, excerpt, whole).values()) == {1.0}
+    assert set(Decoupled().cost_ratios(fixed, 320 * 180, excerpt, whole, shots=2).values()) == {1.0}
 
 
 def test_light_of_large_frames_has_fewer_pixels():
@@ -48,6 +51,6 @@ def test_light_of_large_frames_has_fewer_pixels():
     assert size(320, 180) == (320, 180)
     assert size(1280, 720) == size(1920, 1080) == size(3840, 2160) == (640, 360)
     assert size(2, 1_000_000) == (1, 333_333)  # never without pixels
-    excerpt = {"irradiance": 2, "pilot": 1}
-    ratios = Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt)
+    excerpt = {"irradiance": 2}
+    ratios = Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt, shots=1)
     assert set(ratios.values()) == {1.0 / 36.0}

@@ -34,7 +34,6 @@ from enfilade.methods.decoupled.paths import (
 from enfilade.renderer import Branch, LobeRenderer, Rays
 
 SPECULAR_AOVS = 2  # reflection, transmission
-MIN_SURVIVAL = 0.05  # least probability of survival
 JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
 
 OnMiss = Callable[[Entries], None]
@@ -350,24 +349,24 @@ class Integrator:
             Paths at clear interfaces, whose other branch is left to follow.
         """
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
-        # The first bounce off the visible surface always survives; Russian roulette begins with the second.
-        jitter, survival = (0.0, MIN_SURVIVAL) if qmc_point is None else (JITTER, 1.0)
+        jitter = 0.0 if qmc_point is None else JITTER
         dr.eval(qmc_point)
 
         # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-        direct, is_split, is_end, vertex = self._kernels.extend(
-            cache, path, opaque(survival), qmc_point, opaque(transmitted_at)
+        direct, is_split, is_end, vertex, throughput = self._kernels.extend(
+            cache, path, qmc_point, opaque(transmitted_at)
         )
         light.add(direct, path.lane)
         light.add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex, jitter)
 
         # Divide the paths that go on.
-        is_onward = vertex.has_specular & vertex.path.is_active
-        ends = compact(vertex.path, dr.compress(is_onward & is_end))
+        survivors = replace(vertex.path, throughput=throughput)
+        is_onward = vertex.has_specular & survivors.is_active
+        ends = compact(survivors, dr.compress(is_onward & is_end))
         if dr.width(ends.lane):
             deferred.ends.append(ends)
-        onward = compact(vertex.path, dr.compress(is_onward & ~is_end))
+        onward = compact(survivors, dr.compress(is_onward & ~is_end))
         other = compact(path, dr.compress(is_split))
         return onward.on_branch(Branch.REFLECTED), other.on_branch(Branch.TRANSMITTED)
 

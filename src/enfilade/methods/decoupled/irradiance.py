@@ -14,6 +14,7 @@ from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
 from enfilade.records import Geometry, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose
@@ -24,9 +25,7 @@ OUTLIER = 64.0  # times the denoised value: brighter estimates are limited where
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
-def gather(
-    shot: ShotContext, frame: int, where: Mask, spp: int, purpose: Purpose
-) -> tuple[IrradianceImage, int]:
+def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, int]:
     """Gather the irradiance of some pixels of a frame, at their centres and at the resolution of light.
 
     Parameters
@@ -34,10 +33,6 @@ def gather(
     shot
     frame
     where : (H, W) bool
-    spp
-        Paths a pixel.
-    purpose
-        Of the random numbers.
 
     Returns
     -------
@@ -55,20 +50,20 @@ def gather(
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
-        random=walk.random(frame, purpose),
+        random=walk.random(frame, Purpose.IRRADIANCE),
         layers=2,
         is_stratified=True,
     )
-    estimate.add(spp)
+    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     layers = [shading.to_image(where) for shading in estimate.shadings]
     direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in layers)
     return IrradianceImage(direct, indirect, where), estimate.paths
 
 
-def gather_keyframe(shot: ShotContext, frame: int, spp: int) -> Output:
+def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
     geometry = shot.light_geometry(frame)
-    image, paths = gather(shot, frame, geometry.has_diffuse, spp, Purpose.IRRADIANCE)
+    image, paths = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
         image = _denoised(geometry, image, shot.settings.denoiser)
     return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
@@ -87,7 +82,7 @@ def _denoised(geometry: Geometry, image: IrradianceImage, quality: str) -> Irrad
     return IrradianceImage(direct, indirect, image.is_known)
 
 
-def fill_disocclusions(shot: ShotContext, segment: Segment, spp: int) -> Output:
+def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
     """Disocclusion images: irradiance of surfaces between two keyframes that no keyframe shows.
 
     These images are too sparse for a denoiser: the wavelet filter smooths them.
@@ -110,7 +105,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment, spp: int) -> Output:
             continue
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
-        image, count = gather(shot, middle, shot.uncovered(middle, {}), spp, Purpose.IRRADIANCE)
+        image, count = _gather(shot, middle, shot.uncovered(middle, {}))
         images[middle], uploaded[middle] = image, upload(shot.light_geometry(middle), image)
         paths += count
         pending += [(middle, last), (first, middle)]

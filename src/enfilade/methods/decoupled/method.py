@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_key
 from enfilade.methods.decoupled.light_camera import light_reduction
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
-from enfilade.methods.decoupled.sample_counts import averaged_images, run_pilot
+from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.denoise import why_no_denoiser
@@ -37,20 +37,14 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 9
+    revision = 10
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
         Pass("prepass", IrradianceImage),
         Pass("hash_grid", Entries, reads=("prepass",), is_barrier=True),
-        Pass("pilot", reads=("prepass", "hash_grid"), is_barrier=True, is_shared=False),
-        Pass("irradiance", IrradianceImage, reads=("prepass", "hash_grid", "pilot"), is_barrier=True),
-        Pass(
-            "disocclusion",
-            IrradianceImage,
-            reads=("prepass", "hash_grid", "pilot", "irradiance"),
-            is_barrier=True,
-        ),
+        Pass("irradiance", IrradianceImage, reads=("prepass", "hash_grid"), is_barrier=True),
+        Pass("disocclusion", IrradianceImage, reads=("prepass", "hash_grid", "irradiance"), is_barrier=True),
         Pass("shading", ShadedFrame, reads=("hash_grid", "irradiance", "disocclusion"), is_barrier=True),
         Pass(FRAMES, Frame, reads=("shading",)),
     )
@@ -75,28 +69,31 @@ class Decoupled(Method):
         return [frame for segments in analysis.segments(SPACING) for frame in keyframes_of(segments)]
 
     def cost_ratios(
-        self, settings: Settings, pixels: int, excerpt: Mapping[str, int], whole: Mapping[str, int]
+        self,
+        settings: Settings,
+        pixels: int,
+        excerpt: Mapping[str, int],
+        whole: Mapping[str, int],
+        shots: int,
     ) -> Mapping[str, float]:
         """Light of large frames has fewer pixels; that of shots with few keyframes needs more paths."""
         share = 1.0 / light_reduction(pixels) ** 2
-        ratios = dict.fromkeys(("prepass", "hash_grid", "pilot", "irradiance", "disocclusion"), share)
-        if not settings[DecoupledSettings].irradiance_spp:
-            keyframes = whole["irradiance"] / whole["pilot"]
-            more = averaged_images(excerpt["irradiance"]) / averaged_images(keyframes)
-            ratios |= dict.fromkeys(("irradiance", "disocclusion"), share * more)
-        return ratios
+        ratios = dict.fromkeys(("prepass", "hash_grid", "irradiance", "disocclusion"), share)
+        spp, in_excerpt = (
+            irradiance_spp(settings[DecoupledSettings], keyframes)
+            for keyframes in (whole["irradiance"] / shots, excerpt["irradiance"])
+        )
+        return ratios | dict.fromkeys(("irradiance", "disocclusion"), share * spp / in_excerpt)
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""
-        path, settings = analysis.path, analysis.settings[DecoupledSettings]
+        path = analysis.path
         shots = zip(path.shots(), analysis.segments(SPACING), strict=True)
         for number, (shot, segments) in enumerate(shots):
             keyframes = keyframes_of(segments)
             for pass_name in ("prepass", "hash_grid", "irradiance"):
                 for frame in keyframes:
                     yield Task(pass_name, frame, number)
-            if not settings.irradiance_spp:
-                yield Task("pilot", keyframes[0], number)
             for segment in segments:
                 yield Task("disocclusion", segment.first, number)
             for frame in shot:
@@ -113,23 +110,15 @@ class Decoupled(Method):
                 return trace_prepass(walk, shot.renderer, frame)
             case "hash_grid":
                 return fill_hash_grid(shot, frame)
-            case "pilot":
-                return run_pilot(shot)
             case "irradiance":
-                return gather_keyframe(shot, frame, self._spp(shot))
+                return gather_keyframe(shot, frame)
             case "disocclusion":
                 segment = next(s for s in shot.segments if s.first == frame)
-                return fill_disocclusions(shot, segment, self._spp(shot))
+                return fill_disocclusions(shot, segment)
             case "shading":
                 return self._frames.shade(shot, frame)
             case _:
                 return self._frames.finish(shot, frame)
-
-    @staticmethod
-    def _spp(shot: ShotContext) -> int:
-        """Paths a pixel of irradiance images: as set, or as the pilot has chosen."""
-        chosen = shot.settings.irradiance_spp
-        return chosen or int(shot.inputs.facts("pilot", shot.keyframes[0])["spp"])
 
     def _context_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> ShotContext:
         """The context of a task, which is kept until the next one begins."""

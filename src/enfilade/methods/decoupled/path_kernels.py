@@ -22,6 +22,7 @@ __all__ = ["ENTRY_PX", "PathKernels", "Vertex"]
 
 MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
 ROULETTE_GAIN = 4.0  # Russian roulette: a path survives with this times its throughput, if that is below one
+MIN_SURVIVAL = 0.05  # least probability of survival
 # Width of a hash grid entry: in pixels where a surface is seen sharply; as a part of the lobe's width where
 # it is seen through a lobe; as a part of the distance where it lights a diffuse surface.
 ENTRY_PX = 2.0
@@ -143,14 +144,13 @@ class PathKernels:
         self,
         cache: IrradianceCache,
         path: Path,
-        min_survival: Any,
         qmc_point: Any,
         transmitted_at: Any,
-    ) -> tuple[Any, Any, Any, Vertex]:
+    ) -> tuple[Any, Any, Any, Vertex, Any]:
         """Scatter off a specular lobe at the next surface, and intersect the one after.
 
-        Returns the radiance of next-event estimates, whether the path has another branch, and whether it has
-        as many bounces as are followed.
+        Returns the radiance of next-event estimates, whether the path has another branch, whether it has as
+        many bounces as are followed, the vertex, and the throughput with which the path goes on from there.
         """
         rng = PCG32(path.rng)
         rng.state ^= BRANCH_SALT * UInt64(path.branch)
@@ -161,10 +161,10 @@ class PathKernels:
             point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=path.branch
         )
 
-        # Play Russian roulette.
-        throughput = path.throughput * sample.throughput
-        survival = dr.clip(ROULETTE_GAIN * dr.max(dr.abs(throughput)), min_survival, 1.0)
-        is_alive = sample.is_alive & (rng.next_float32() < survival)
+        # Play Russian roulette for the bounce after this one, before its surface is known.
+        throughput = Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0))
+        survival = dr.clip(ROULETTE_GAIN * dr.max(dr.abs(throughput)), MIN_SURVIVAL, 1.0)
+        onward = dr.select(rng.next_float32() < survival, throughput / survival, 0.0)
 
         # Extend the path; a broad lobe widens it.
         lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
@@ -172,7 +172,7 @@ class PathKernels:
             lane=_aov_lane(path, point, sample, transmitted_at),
             rays=sample.rays,
             bounce=sample.bounce,
-            throughput=Array3f(dr.select(is_alive, throughput / survival, 0.0)),
+            throughput=throughput,
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
             rng=rng,
@@ -185,7 +185,8 @@ class PathKernels:
         vertex = replace(vertex, radiance=emitted + vertex.radiance)
         is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
         is_end = extended.bounces >= MAX_BOUNCES
-        return Array3f(path.throughput * sample.direct), Bool(is_split), Bool(is_end), vertex
+        direct = Array3f(path.throughput * sample.direct)
+        return direct, Bool(is_split), Bool(is_end), vertex, Array3f(onward)
 
     def _gather(
         self, cache: IrradianceCache, path: Path, qmc_point: Any, is_visible: bool

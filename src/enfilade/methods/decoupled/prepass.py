@@ -44,9 +44,5 @@ def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Outp
     )
     estimate.add(SPP)
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
-    facts = {
-        "rays": {"prepass": estimate.paths},
-        "diffuse_pixels": int(where.sum()),
-        "dropped": direct.dropped,
-    }
+    facts = {"rays": {"prepass": estimate.paths}, "dropped": direct.dropped}
     return Output({frame: IrradianceImage(direct, indirect, where)}, facts)
