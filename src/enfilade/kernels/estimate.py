@@ -124,6 +124,11 @@ class Estimate:
         return self._traced
 
     @property
+    def dropped(self) -> int:
+        """Paths that were not finite, of all pixels together."""
+        return self._traced - round(dr.sum(self._sums[0])[0])
+
+    @property
     def shading(self) -> Shading:
         """Mean colour of each pixel over its finite samples, and the variance of its mean luminance, (N,)."""
         return self.shadings[0]
@@ -132,7 +137,6 @@ class Estimate:
     def shadings(self) -> list[Shading]:
         """The same of every layer."""
         count = dr.maximum(self._sums[0], 1.0)
-        dropped = self._traced - round(dr.sum(self._sums[0])[0])
         found = []
         for first in range(2, len(self._sums), 4):
             *mean, mean_square = (total / count for total in self._sums[first : first + 4])
@@ -141,7 +145,7 @@ class Estimate:
             variance = dr.select(count > 1.0, sample_variance / dr.maximum(count - 1.0, 1.0), 0.0)
             found.append((Array3f(*map(Float, mean)), Float(variance)))
         dr.eval(found)
-        n = len(self._pixels)
+        n, dropped = len(self._pixels), self.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
 
     @property

@@ -56,24 +56,26 @@ class Frames:
         reprojected, cache = shot.shading_caches(frame)
         diffuse, refined = _shade_diffuse(shot, frame, reprojected, cache)
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
-        color = diffuse.shading.color.reshape(*where.shape, 3)
+        camera_rays = diffuse.shading.to_image(np.ones_like(where))
+        color = camera_rays.color
         virtual = self._virtual_geometry(shot, frame) if where.any() else []
-        aovs, specular, refined_aovs = shade_specular(shot, frame, cache, where, virtual, luminance(color))
+        specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
 
         # Denoise what is left of the noise at edges.
-        variance = diffuse.shading.variance.reshape(where.shape) + refined_aovs.variance
-        variance = np.where(refined | refined_aovs.is_refined, variance, np.float32(0))
+        variance = camera_rays.variance + specular.variance
+        variance = np.where(refined | specular.is_refined, variance, np.float32(0))
         if shot.settings.denoiser != "none":
-            total = color + sum(to_float(aov.color) for aov in aovs)
+            total = color + sum(to_float(aov.color) for aov in specular.aovs)
             color += filter_edges(total, variance, exposure_ev=_exposure_ev(shot))
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
         provenance = _provenance(geometry, reprojected, diffuse.is_marked, is_keyframe=is_keyframe)
-        transmission = aovs[1] if len(aovs) > 1 else None
-        shaded = ShadedFrame(to_half(color), aovs[0], transmission, to_half(np.sqrt(variance)), provenance)
-        rays = {"camera": diffuse.paths, "specular": sum(one.paths for one in specular)}
-        dropped = diffuse.shading.dropped + sum(one.shading.dropped for one in specular)
+        reflection, *others = specular.aovs
+        transmission = others[0] if others else None
+        shaded = ShadedFrame(to_half(color), reflection, transmission, to_half(np.sqrt(variance)), provenance)
+        rays = {"camera": diffuse.paths, "specular": specular.paths}
+        dropped = camera_rays.dropped + specular.dropped
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
 
     def finish(self, shot: ShotContext, frame: int) -> Output:

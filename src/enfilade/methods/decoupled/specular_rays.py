@@ -36,8 +36,8 @@ def shade_specular(
     where: Mask,
     virtual: Sequence[Geometry],
     beneath: F32,
-) -> tuple[list[SpecularAov], list[Estimate], RefinedAovs]:
-    """Specular AOVs of a frame before temporal accumulation, and the estimates that were made for them.
+) -> SpecularShading:
+    """Specular AOVs of a frame before temporal accumulation.
 
     Parameters
     ----------
@@ -51,18 +51,11 @@ def shade_specular(
         G-buffers of the frame with the virtual images of its AOVs; empty where no pixel has specular lobes.
     beneath : (H, W) float32
         Luminance of emission and diffuse reflection, which is displayed together with the AOVs.
-
-    Returns
-    -------
-    aovs : list of SpecularAov
-        Reflection, and transmission if there is any.
-    estimates : list of Estimate
-    refined : RefinedAovs
     """
-    nowhere = RefinedAovs(np.zeros_like(where), np.zeros(where.shape, np.float32))
+    nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
     if not where.any():
         black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
-        return [black], [], nowhere
+        return SpecularShading([black], nowhere, no_variance, 0, 0)
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
 
@@ -73,9 +66,9 @@ def shade_specular(
         (where & ~is_centre, PixelFilter.GAUSSIAN, Purpose.SPECULAR),
         (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
     )
-    estimates = [frame_rays.traced(*part) for part in parts]
-    images = [[s.to_image(p) for s in e.shadings] for e, (p, *_) in zip(estimates, parts, strict=True)]
+    images, counts = zip(*(frame_rays.traced(*part) for part in parts), strict=True)
     traced = [Shading(a.color + b.color, a.variance + b.variance) for a, b in zip(*images, strict=True)]
+    paths, dropped = map(sum, zip(*counts, strict=True))
 
     # Filter the AOVs along the surfaces that are seen in them.
     count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
@@ -89,7 +82,7 @@ def shade_specular(
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
     if not edges.any():
-        return aovs, estimates, nowhere
+        return SpecularShading(aovs, nowhere, no_variance, paths, dropped)
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
     uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
@@ -98,23 +91,31 @@ def shade_specular(
     refined = rays.refine(fine, within, edges, within, 0)
     layers = [of.to_image(within) for of in fine.shadings[: len(aovs)]]
     aovs = [with_edges(aov, layer, refined) for aov, layer in zip(aovs, layers, strict=True)]
-    variance = np.where(refined, sum(layer.variance for layer in layers), np.float32(0))
-    return aovs, [*estimates, fine], RefinedAovs(refined, variance)
+    variance = np.where(refined, sum(layer.variance for layer in layers), no_variance)
+    return SpecularShading(aovs, refined, variance, paths + fine.paths, dropped + fine.dropped)
 
 
 @dataclass(frozen=True, eq=False)
-class RefinedAovs:
-    """Pixels whose specular AOVs have rays of their own.
+class SpecularShading:
+    """Specular AOVs of a frame.
 
     Attributes
     ----------
+    aovs : list of SpecularAov
+        Reflection, and transmission if there is any.
     is_refined : (H, W) bool
+        Pixels at edges, which have rays of their own.
     variance : (H, W) float32
-        Of the luminance of the AOVs' sum; 0 elsewhere.
+        Of the luminance of the AOVs' sum in these pixels; 0 elsewhere.
+    paths, dropped : int
+        Number of rays, and of those that were not finite.
     """
 
+    aovs: list[SpecularAov]
     is_refined: Mask
     variance: F32
+    paths: int
+    dropped: int
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,13 @@ class _FrameRays:
         """G-buffer of the frame."""
         return self.shot.walk.view(self.frame).geometry
 
-    def traced(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose) -> Estimate:
-        """Trace as many rays in each of some pixels, (H, W), as the quality asks for."""
+    def traced(
+        self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose
+    ) -> tuple[list[Shading], tuple[int, int]]:
+        """Trace as many rays in each of some pixels, (H, W), as the quality asks for.
+
+        Returns images of both AOVs, and the numbers of rays and of those that were not finite.
+        """
 
         def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
             return self.shot.integrator.specular_radiance(
@@ -146,7 +152,7 @@ class _FrameRays:
 
         found = self._estimate(pixels, pixel_filter, purpose, radiance)
         found.add(specular_spp(self.shot.settings))
-        return found
+        return [layer.to_image(pixels) for layer in found.shadings], (found.paths, found.dropped)
 
     def looked_up(self, pixels: Mask, aovs: Any) -> Estimate:
         """An estimate of pixels, (H, W), by lookups of uploaded AOVs, without rays yet."""
