@@ -103,7 +103,9 @@ class References:
         }
         self._identity |= {} if seed == SEED else {"seed": seed}
         self._job, self._windows, self._seed = job, windows, seed
-        self.folder = store / f"{job.scene.file.resolve().parent.name}-{_digest(self._identity)}"
+        digest = _digest(self._identity)
+        held = sorted(store.glob(f"*-{digest}"))  # of a copy of the scene in another folder
+        self.folder = held[0] if held else store / f"{job.scene.file.resolve().parent.name}-{digest}"
 
     def missing(self, spp: int) -> list[int]:
         """Frames whose references have fewer paths a pixel."""

@@ -102,8 +102,11 @@ def test_references_grow_are_shared_and_are_the_same_however_they_grew(job, held
     np.testing.assert_array_equal(
         grown.read(1).halves[SampleFilter.BOX], direct.read(1).halves[SampleFilter.BOX]
     )
-    # Another method shares them; other windows or other seeds do not.
+    # Another method and a copy of the scene share them; other windows or other seeds do not.
     assert References(tmp_path, replace(job, method="paper"), WINDOWS).missing(1) == []
+    (tmp_path / "copy").mkdir()
+    copy = room_job(tmp_path / "copy", 2, method="reference")
+    assert References(tmp_path, copy, WINDOWS).missing(1) == []
     assert References(tmp_path, job, WINDOWS[:1]).missing(1) == [0, 1]
     assert References(tmp_path, job, WINDOWS, seed=5).missing(1) == [0, 1]
 
