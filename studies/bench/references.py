@@ -49,6 +49,7 @@ from studies.bench.windows import Window
 
 SUBPIXELS = 4  # along each axis
 BATCH = 256  # paths a pixel of a half that are traced together, with random numbers of their own
+LARGE_WINDOW_PX, LARGE_BATCH = 128, 64  # windows with a longer side have smaller batches
 SEED = 0x9E3779B9  # of the first batch; the next ones follow
 REACH = int(GAUSSIAN_RADIUS_PX * SUBPIXELS) - SUBPIXELS // 2  # subpixels of the filter beyond the pixel
 FILTERS = (SampleFilter.BOX, SampleFilter.GAUSSIAN)
@@ -94,11 +95,12 @@ class References:
     def __init__(self, store: Path, job: Job, windows: Sequence[Window], *, seed: int = SEED) -> None:
         scene = {key: value for key, value in job.scene.identity().items() if key != "variant"}
         depth = job.settings[TraceSettings].max_depth
+        self._batch = LARGE_BATCH if max(of.side for of in windows) > LARGE_WINDOW_PX else BATCH
         self._identity: dict[str, Any] = {
             "scene": scene,
             "max_depth": depth,
             "subpixels": SUBPIXELS,
-            "batch": BATCH,
+            "batch": self._batch,
             "denoiser": denoiser_name(),
         }
         self._identity |= {} if seed == SEED else {"seed": seed}
@@ -122,21 +124,21 @@ class References:
     def grow(self, spp: int, monitor: Monitor) -> None:
         """Trace until every frame has so many paths a pixel, in both halves together.
 
-        Paths are added to those of earlier calls, in batches of :data:`BATCH` a half.
+        Paths are added to those of earlier calls, in batches of :data:`BATCH` or :data:`LARGE_BATCH` a half.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         write_json(self.folder / "identity.json", self._identity)
         walk = Walkthrough(self._job.path, self._job.settings, self._job.open_renderer())
-        missing = self.missing(spp)
+        missing, both = self.missing(spp), 2 * self._batch
         for done, frame in enumerate(missing):
             monitor.progress("references", done, len(missing))
             fine, before = self._fine(frame)
-            batches = range(before // (2 * BATCH), math.ceil(spp / (2 * BATCH)))
+            batches = range(before // both, math.ceil(spp / both))
             for batch in batches:
                 fresh = np.stack([self._traced(walk, frame, 2 * batch + half) for half in (0, 1)])
                 fine = to_half(to_float(fine) + (fresh - to_float(fine)) / np.float32(batch + 1))
-            if self.spp(frame) < 2 * BATCH * batches.stop:  # another bench may have grown it further
-                self._write(walk, frame, 2 * BATCH * batches.stop, fine)
+            if self.spp(frame) < both * batches.stop:  # another bench may have grown it further
+                self._write(walk, frame, both * batches.stop, fine)
         monitor.progress("references", len(missing), len(missing))
 
     def read(self, frame: int) -> ReferenceFrame:
@@ -187,7 +189,7 @@ class References:
         """One batch of the subpixels of a frame's windows, (K, F, F, 3)."""
         camera, pixels = self._subpixels(walk.path.cameras[frame])
         key = RandomKey((self._seed + batch) % 2**32, walk.path.numbers[frame], Purpose.REFERENCE)
-        spp = BATCH // SUBPIXELS**2
+        spp = self._batch // SUBPIXELS**2
         traced = walk.renderer.trace(camera, pixels.ravel(), key, spp=spp, pixel_filter=PixelFilter.BOX)
         return traced.color.reshape(*pixels.shape, 3)
 

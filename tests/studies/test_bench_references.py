@@ -10,8 +10,9 @@ from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Silence
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.settings import SampleFilter
-from studies.bench.references import BATCH, FILTERS, References
+from studies.bench.references import BATCH, FILTERS, LARGE_BATCH, References
 from studies.bench.windows import KINDS, MARGIN_PX, Window, content, draw_windows, windows_of
+from support.example_scenes import room_walk
 from support.study_runs import room_job
 
 WINDOWS = [Window("edges", 5, 5, 16), Window("flat", 25, 12, 16)]
@@ -109,6 +110,13 @@ def test_references_grow_are_shared_and_are_the_same_however_they_grew(job, held
     assert References(tmp_path, copy, WINDOWS).missing(1) == []
     assert References(tmp_path, job, WINDOWS[:1]).missing(1) == [0, 1]
     assert References(tmp_path, job, WINDOWS, seed=5).missing(1) == [0, 1]
+
+
+def test_references_of_large_windows_have_smaller_batches(job, tmp_path):
+    job = replace(job, path=room_walk(1, size=(150, 140)))
+    references = References(tmp_path, job, [Window("flat", 2, 2, 136)])
+    references.grow(1, Silence())
+    assert references.spp(0) == 2 * LARGE_BATCH
 
 
 def test_a_damaged_reference_is_named(job, tmp_path):
