@@ -55,7 +55,7 @@ def query_further(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: A
     """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
     reflected, is_miss = query_images(cache, query)
     if cache.hash_grid:
-        # Jitter the position by up to half an entry, so that many lookups interpolate.
+        # Jitter the position, so that many lookups interpolate.
         rng = PCG32(rng)
         rng.state ^= STREAM_SALT
         offset = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())

@@ -11,7 +11,7 @@ import scipy.ndimage
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance, srgb_encode
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.records import F32, U32, Geometry, Mask, Shading
 from enfilade.renderer import Emitters
 from enfilade.settings import DecoupledSettings, ViewingSettings
 
@@ -57,7 +57,7 @@ class EdgeRays:
         found: Mask = displayed_deviation_of(low, high, self.beneath, self.exposure_ev) > self.tolerance
         return found
 
-    def uncertain(self, estimate: Estimate, sampled: Mask, spp: int | None = None) -> Mask:
+    def uncertain(self, estimate: Estimate, sampled: Mask, spp: int | U32 | None = None) -> Mask:
         """Pixels whose displayed value is uncertain, (H, W); see :func:`displayed_deviation`."""
         layers = [shading.to_image(sampled) for shading in estimate.shadings]
         color, variance = (sum(getattr(of, name) for of in layers) for name in ("color", "variance"))
@@ -83,12 +83,14 @@ class EdgeRays:
             Pixels that have more rays now.
         """
         refined = np.zeros_like(edges)
+        counts = np.full(edges.shape, spp, np.uint32)
         while spp < self.most and edges.any():
             more = min(max(spp, EDGE_SPP - spp), self.most - spp)
             estimate.add(more, edges[sampled])
             spp += more
+            counts[edges] += more
             refined |= edges
-            edges = within & dilated(edges & self.uncertain(estimate, sampled, spp))
+            edges = within & dilated(edges & self.uncertain(estimate, sampled, counts))
         return refined
 
 
@@ -98,7 +100,7 @@ def displayed_tolerance(quality: float) -> float:
 
 
 def displayed_deviation(
-    shading: Shading, exposure_ev: float, spp: int | None = None, beneath: F32 | float = 0.0
+    shading: Shading, exposure_ev: float, spp: int | U32 | None = None, beneath: F32 | float = 0.0
 ) -> F32:
     """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (H, W).
 
@@ -111,7 +113,7 @@ def displayed_deviation(
         Estimates of pixels, (H, W).
     exposure_ev
         In stops.
-    spp
+    spp : int or (H, W) uint32
         Rays of a pixel, which may all have missed what makes the brightest pixel beside it bright. Its share
         is taken to be 1 / (spp + 1), in the manner of the rule of succession. None: leave this out.
     beneath : (H, W) float32 or float
@@ -119,7 +121,7 @@ def displayed_deviation(
     """
     mean, deviation = luminance(shading.color), np.sqrt(shading.variance)
     if spp is not None:
-        unseen = (scipy.ndimage.maximum_filter(mean, 3) - mean) / np.float32(spp + 1)
+        unseen = (scipy.ndimage.maximum_filter(mean, 3) - mean) / (np.float32(1) + np.float32(spp))
         deviation = np.maximum(deviation, unseen)
     return displayed_deviation_of(mean - deviation, mean + deviation, beneath, exposure_ev)
 

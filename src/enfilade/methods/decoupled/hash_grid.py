@@ -1,4 +1,4 @@
-"""A world-space hash grid of irradiance, for surfaces that no keyframe shows.
+"""A world-space hash grid of irradiance, for surfaces that no prepass image shows.
 
 Paths from different pixels and frames end on the same such surfaces. Their estimates are summed in entries
 whose keys are hashes of the quantized position and normal (Binder et al. 2018) and of the width of the path

@@ -28,13 +28,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     chunk = walk.settings[LimitSettings].paths_in_flight
 
     # Gather at the surfaces that mirrors and panes show.
-    virtual, paths = gather_virtual_images(shot, frame, parts.append)
+    virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
-    is_clear = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
+    is_sharp = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     with_virtual = IrradianceCache(cache.images, cache.weights, virtual.upload())
-    for pixels, known in ((~is_clear, cache), (is_clear, with_virtual)):
+    for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):
         specular = Estimate(
             camera,
             np.flatnonzero(pixels).astype(np.uint32),
@@ -48,7 +48,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             is_stratified=True,
         )
         specular.add(SPECULAR_SPP)
-        paths += specular.paths
+        paths, dropped = paths + specular.paths, dropped + specular.dropped
 
     # Gather at the diffuse pixels of the prepass image.
     gathered = Estimate(
@@ -67,5 +67,5 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
-    rays = gathered.paths + paths
-    return Output({frame: entries}, {"rays": {"prepass": rays}, "entries": len(entries.keys)})
+    facts = {"rays": {"hash_grid": paths + gathered.paths}, "dropped": dropped + gathered.dropped}
+    return Output({frame: entries}, facts | {"entries": len(entries.keys)})

@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.wavelet import Guide, redistribute_fireflies, smooth
-from enfilade.records import F32, U32, Geometry, Mask
+from enfilade.records import U32, Geometry, Mask
 
 PLANE_TOLERANCE = 0.01  # of the depth
 MIN_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
@@ -85,7 +85,9 @@ class IrradianceCache:
 
 
 def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
-    """Upload an irradiance image in two layers, direct and indirect, whose fireflies are redistributed.
+    """Upload an irradiance image in two layers, direct and indirect.
+
+    Fireflies of indirect light are redistributed. A denoised image, whose variance is 0, has none.
 
     Parameters
     ----------
@@ -93,9 +95,10 @@ def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:
         G-buffer of the image.
     irradiance
     """
-    guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
     indirect = lanes(irradiance.indirect.color), lanes(irradiance.indirect.variance)
-    indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
+    if irradiance.indirect.variance.any():
+        guide = guide_of(geometry, np.where(irradiance.is_known, geometry.shape_index, np.uint32(0)))
+        indirect = redistribute_fireflies(*indirect, guide, times=FIREFLY, levels=FIREFLY_LEVELS)
     direct = lanes(irradiance.direct.color), lanes(irradiance.direct.variance)
     return upload_layers(geometry, lanes(irradiance.is_known), [direct, indirect])
 
@@ -168,9 +171,9 @@ def blank_image(layers: int) -> UploadedImage:
 def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImage]) -> UploadedImage:
     """Average an irradiance image with others, and smooth it along its surfaces.
 
-    Irradiance does not depend on the view, so that all images that show a point have independent estimates
-    of it. Images of coarser resolution weigh less. Direct light, which has sharp edges, and indirect light,
-    which has more noise, are smoothed separately.
+    Irradiance does not depend on the view: all images that show a point estimate it. Images of coarser
+    resolution weigh less. Direct light, which has sharp edges, and indirect light, which has more noise, are
+    smoothed separately.
 
     Parameters
     ----------
@@ -188,7 +191,9 @@ def accumulate(geometry: Geometry, is_known: Mask, images: Sequence[UploadedImag
     """
     layers, _ = _averaged(geometry, images, [1.0] * len(images))
     groups = np.where(is_known, geometry.shape_index, np.uint32(0))
-    smoothed = [smooth_along(geometry, groups, value, variance) for value, variance in layers]
+    smoothed = [
+        smooth_along(geometry, groups, *layer) if np.array(layer[1]).any() else layer for layer in layers
+    ]
     irradiance = sum((value for value, _ in smoothed), Array3f(0))
     variance = sum((variance for _, variance in smoothed), Float(0))
     return upload_layers(geometry, lanes(is_known), [(irradiance, variance)])
@@ -206,11 +211,6 @@ def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
     """Pixels of a view whose surfaces at least one image shows, (H, W)."""
     _, is_known = _averaged(geometry, images, [1.0] * len(images))
     return image(is_known, *geometry.shape_index.shape)
-
-
-def total_irradiance(uploaded: UploadedImage, height: int, width: int) -> F32:
-    """The sum of all layers, (H, W, 3); 0 where there is no irradiance."""
-    return image(sum(uploaded.values, Array3f(0)), height, width)
 
 
 def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> Layer:

@@ -7,10 +7,10 @@ import math
 from enfilade.methods.decoupled.shot import ACCUMULATED
 from enfilade.settings import DecoupledSettings
 
-# By the root of the quality; the fewest and the most.
+# At quality 1; divided by the square root of the quality.
 IRRADIANCE_PATHS = 380.0  # of a pixel, in all images together that are averaged
-IRRADIANCE_SPP = 8, 512  # of one image
-SPECULAR_SPP = 34.0, 2, 68  # of a pixel with specular lobes
+SPECULAR_RAYS = 34.0  # of a pixel with specular lobes
+IRRADIANCE_SPP = 8, 512  # of one image: fewest and most
 
 
 def irradiance_spp(settings: DecoupledSettings, keyframes: float) -> int:
@@ -42,5 +42,4 @@ def averaged_images(keyframes: float) -> float:
 
 def specular_spp(settings: DecoupledSettings) -> int:
     """Rays of a pixel with specular lobes."""
-    at_one, least, most = SPECULAR_SPP
-    return settings.specular_spp or min(max(round(at_one / math.sqrt(settings.quality)), least), most)
+    return settings.specular_spp or round(SPECULAR_RAYS / math.sqrt(settings.quality))

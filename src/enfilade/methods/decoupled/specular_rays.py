@@ -53,8 +53,8 @@ def shade_specular(
         Luminance of emission and diffuse reflection, which is displayed together with the AOVs.
     """
     nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
+    black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
     if not where.any():
-        black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
         return SpecularShading([black], nowhere, no_variance, 0, 0)
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
@@ -89,8 +89,10 @@ def shade_specular(
     within = edges | is_seen_in
     fine = frame_rays.looked_up(within, uploaded)
     refined = rays.refine(fine, within, edges, within, 0)
-    layers = [of.to_image(within) for of in fine.shadings[: len(aovs)]]
-    aovs = [with_edges(aov, layer, refined) for aov, layer in zip(aovs, layers, strict=True)]
+    layers = [of.to_image(within) for of in fine.shadings]
+    if any(layer.color.any() for layer in layers[len(aovs) :]):  # transmission that is seen at edges alone
+        aovs = [*aovs, *[black] * (SPECULAR_AOVS - len(aovs))]
+    aovs = [with_edges(aov, layer, refined) for aov, layer in zip(aovs, layers, strict=False)]
     variance = np.where(refined, sum(layer.variance for layer in layers), no_variance)
     return SpecularShading(aovs, refined, variance, paths + fine.paths, dropped + fine.dropped)
 

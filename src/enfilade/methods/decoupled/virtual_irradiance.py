@@ -30,7 +30,7 @@ from enfilade.settings import LimitSettings
 SPP = 8  # final gather rays of a pixel
 
 
-def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, int]:
+def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, int, int]:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
 
     Parameters
@@ -43,17 +43,19 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     Returns
     -------
     entries : Entries
-    paths : int
+    paths, dropped : int
+        Number of paths, and of those that were not finite.
     """
     images = shot.virtual_images.find(shot.light_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
-    return Entries.joined([one for entries, _ in gathered for one in entries]), sum(n for _, n in gathered)
+    entries = Entries.joined([one for found, *_ in gathered for one in found])
+    return entries, sum(paths for _, paths, _ in gathered), sum(dropped for *_, dropped in gathered)
 
 
 def _gather(
     shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
-) -> tuple[list[Entries], int]:
-    """Entries of a virtual image, one list a level, and the number of paths."""
+) -> tuple[list[Entries], int, int]:
+    """Entries of a virtual image, one list a level, the number of paths, and of those not finite."""
     cache, camera, walk = shot.prepass_cache(frame), virtual.camera, shot.walk
 
     def seen_along(rays: Rays, rng: Any) -> Path:
@@ -62,14 +64,14 @@ def _gather(
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
     if not len(pixels):
-        return [], 0
+        return [], 0, 0
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), PCG32(len(pixels)))
     if not dr.width(path.lane):
-        return [], 0
+        return [], 0, 0
     keys, is_missing = shot.integrator.entries_of(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
-        return [], 0
+        return [], 0, 0
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
     pixels = pixels[lane[chosen]]
 
@@ -95,7 +97,7 @@ def _gather(
     where.flat[pixels] = True
     light = [layer.to_image(where) for layer in estimate.shadings]
     light = [replace(layer, variance=np.float32(NOISE_SHARE) * layer.variance) for layer in light]
-    colors, times = [layer.color for layer in light], SPP
+    colors, times = [layer.color for layer in light], 1
     if (denoiser := shot.settings.denoiser) != "none":
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
@@ -103,4 +105,5 @@ def _gather(
         times = RELIABLE_SAMPLES
     direct, indirect = (color[where] for color in colors)
     irradiance = direct + indirect
-    return [Entries.of(np.array(key)[chosen], irradiance).repeated(times) for key in keys], estimate.paths
+    found = [Entries.of(np.array(key)[chosen], irradiance).repeated(times) for key in keys]
+    return found, estimate.paths, estimate.dropped
