@@ -56,6 +56,17 @@ def test_occluded_emitters_and_the_interior_of_large_ones_are_left_out():
     np.testing.assert_array_equal(found, outline)
 
 
+def test_the_unseen_share_follows_the_rays_of_each_pixel():
+    # A bright pixel beside two dark ones, of which the right one has fewer rays.
+    color = np.zeros((1, 3, 3), np.float32)
+    color[0, 1] = 0.2
+    counts = np.array([[31, 31, 7]], np.uint32)
+    found = displayed_deviation(Shading(color, np.zeros((1, 3), np.float32)), 0.0, counts)[0]
+    assert found[0] < found[2]
+    alone = displayed_deviation(Shading(color, np.zeros((1, 3), np.float32)), 0.0, 7)[0]
+    assert found[2] == alone[2]
+
+
 def test_outlines_are_pixels_beside_another_shape():
     index = np.ones((H, W), np.uint32)
     index[5, 7] = 2

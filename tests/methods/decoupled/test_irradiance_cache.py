@@ -1,0 +1,30 @@
+"""Irradiance images as they are uploaded: what is denoised stays as it is."""
+
+import numpy as np
+import pytest
+
+from enfilade.arrays import image
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.methods.decoupled.irradiance_cache import accumulate, upload
+from enfilade.methods.decoupled.records import IrradianceImage
+from enfilade.records import Geometry, Shading
+
+H, W = 16, 24
+SPOT = 8, 12  # row, column of a bright pixel
+
+
+@pytest.mark.parametrize(("deviation", "is_kept"), [(0.0, True), (1.0, False)])
+def test_a_bright_pixel_of_a_denoised_image_is_no_firefly(deviation, is_kept):
+    camera = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
+    normal = np.broadcast_to(np.float32((0, 0, 1)), (H, W, 3)).copy()
+    ones = np.ones((H, W))
+    geometry = Geometry(
+        camera, ones.astype(np.float32), normal, normal, ones.astype(np.uint32), np.zeros((H, W), np.uint8)
+    )
+    color = np.ones((H, W, 3), np.float32)
+    color[SPOT] = 20.0
+    dark = Shading(np.zeros((H, W, 3), np.float32), np.zeros((H, W), np.float32))
+    light = Shading(color, np.full((H, W), deviation, np.float32))
+    uploaded = upload(geometry, IrradianceImage(dark, light, ones.astype(bool)))
+    found = image(accumulate(geometry, ones.astype(bool), [uploaded]).values[0], H, W)
+    assert (found[SPOT][0] == pytest.approx(20.0, rel=0.01)) == is_kept
