@@ -128,6 +128,9 @@ class ShadingPoint:
         against next-event estimation at the ray's origin if the ray continues a path.
     has_specular : Bool
         Whether the BSDF has lobes other than the diffuse one.
+    specular_albedo : Float
+        Rough estimate of the share of light that these scatter towards the ray's origin. Russian roulette
+        weighs what goes on from here by it; it changes no mean.
     native : Any
         The renderer's own record of the hit.
     """
@@ -136,6 +139,7 @@ class ShadingPoint:
     position: Any
     emission: Any
     has_specular: Any
+    specular_albedo: Any
     native: Any
 
 

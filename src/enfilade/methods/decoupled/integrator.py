@@ -293,7 +293,8 @@ class Integrator:
         if cache.images:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
             light.add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex)
-        onward = compact(vertex.path, dr.compress(vertex.has_specular))
+        onward = replace(vertex.path, throughput=vertex.onward)
+        onward = compact(onward, dr.compress(onward.is_active))
         self._trace_specular(light, cache, onward, deferred)
         self._finish(light, cache, deferred, on_miss)
         return Samples((direct, light.summed(dr.width(path.lane))))
@@ -353,7 +354,7 @@ class Integrator:
         dr.eval(qmc_point)
 
         # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-        direct, is_split, is_end, vertex, throughput = self._kernels.extend(
+        direct, is_split, is_end, vertex = self._kernels.extend(
             cache, path, qmc_point, opaque(transmitted_at)
         )
         light.add(direct, path.lane)
@@ -361,8 +362,8 @@ class Integrator:
         deferred.add_missed(vertex, jitter)
 
         # Divide the paths that go on.
-        survivors = replace(vertex.path, throughput=throughput)
-        is_onward = vertex.has_specular & survivors.is_active
+        survivors = replace(vertex.path, throughput=vertex.onward)
+        is_onward = survivors.is_active
         ends = compact(survivors, dr.compress(is_onward & is_end))
         if dr.width(ends.lane):
             deferred.ends.append(ends)

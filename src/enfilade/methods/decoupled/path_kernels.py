@@ -21,7 +21,8 @@ from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, 
 __all__ = ["ENTRY_PX", "PathKernels", "Vertex"]
 
 MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
-ROULETTE_GAIN = 4.0  # Russian roulette: a path survives with this times its throughput, if that is below one
+# Russian roulette: a path survives with this times its throughput after the next bounce, if that is below one.
+ROULETTE_GAIN = 4.0
 MIN_SURVIVAL = 0.05  # least probability of survival
 # Width of a hash grid entry: in pixels where a surface is seen sharply; as a part of the lobe's width where
 # it is seen through a lobe; as a part of the distance where it lights a diffuse surface.
@@ -31,6 +32,7 @@ ENTRY_GATHER_WIDTH = 0.2
 AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
+ROULETTE_SALT = 0x9FB21C651E98DF25  # likewise Russian roulette
 ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
 
 
@@ -46,6 +48,8 @@ class Vertex:
         Where irradiance is needed and was not found.
     has_specular : Bool
         Where there are other lobes.
+    onward : Array3f
+        Throughput with which the path goes on from these; 0 where Russian roulette ends it.
     path : Path
         On its way to the vertex.
     query : CacheQuery
@@ -54,6 +58,7 @@ class Vertex:
     radiance: Any
     is_miss: Any
     has_specular: Any
+    onward: Any
     path: Path
     query: CacheQuery
 
@@ -135,7 +140,7 @@ class PathKernels:
             sharp=sharp,
         )
         reflected, is_miss = query_images(cache, query)
-        vertex = Vertex(reflected, is_miss, Bool(point.has_specular), path, query)
+        vertex = Vertex(reflected, is_miss, Bool(point.has_specular), _surviving(path, point), path, query)
         # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
         emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)
         return Array3f(emitted), vertex
@@ -146,11 +151,11 @@ class PathKernels:
         path: Path,
         qmc_point: Any,
         transmitted_at: Any,
-    ) -> tuple[Any, Any, Any, Vertex, Any]:
+    ) -> tuple[Any, Any, Any, Vertex]:
         """Scatter off a specular lobe at the next surface, and intersect the one after.
 
         Returns the radiance of next-event estimates, whether the path has another branch, whether it has as
-        many bounces as are followed, the vertex, and the throughput with which the path goes on from there.
+        many bounces as are followed, and the vertex.
         """
         rng = PCG32(path.rng)
         rng.state ^= BRANCH_SALT * UInt64(path.branch)
@@ -161,18 +166,13 @@ class PathKernels:
             point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=path.branch
         )
 
-        # Play Russian roulette for the bounce after this one, before its surface is known.
-        throughput = Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0))
-        survival = dr.clip(ROULETTE_GAIN * dr.max(dr.abs(throughput)), MIN_SURVIVAL, 1.0)
-        onward = dr.select(rng.next_float32() < survival, throughput / survival, 0.0)
-
         # Extend the path; a broad lobe widens it.
         lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
         extended = Path(
             lane=_aov_lane(path, point, sample, transmitted_at),
             rays=sample.rays,
             bounce=sample.bounce,
-            throughput=throughput,
+            throughput=Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
             rng=rng,
@@ -186,7 +186,7 @@ class PathKernels:
         is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
         is_end = extended.bounces >= MAX_BOUNCES
         direct = Array3f(path.throughput * sample.direct)
-        return direct, Bool(is_split), Bool(is_end), vertex, Array3f(onward)
+        return direct, Bool(is_split), Bool(is_end), vertex
 
     def _gather(
         self, cache: IrradianceCache, path: Path, qmc_point: Any, is_visible: bool
@@ -245,6 +245,16 @@ class PathKernels:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
+
+
+def _surviving(path: Path, point: ShadingPoint) -> Any:
+    """Throughput of the paths that go on from specular lobes at their next surface; Array3f."""
+    rng = PCG32(path.rng)
+    rng.state ^= ROULETTE_SALT
+    after = dr.max(dr.abs(path.throughput)) * point.specular_albedo
+    survival = dr.clip(ROULETTE_GAIN * after, MIN_SURVIVAL, 1.0)
+    is_onward = point.has_specular & (rng.next_float32() < survival)
+    return Array3f(dr.select(is_onward, path.throughput / survival, 0.0))
 
 
 def _keys(point: ShadingPoint, path: Path) -> tuple[Any, ...]:

@@ -16,8 +16,9 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from enfilade.arrays import Bool, UInt
+from enfilade.arrays import Bool, Float, UInt
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
@@ -27,6 +28,10 @@ LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: La
 
 CLEAR = {"SmoothDielectric", "ThinDielectric"}  # their sample chooses reflection first
 ALMOST_ONE = 1.0 - 2.0**-24
+
+ALBEDO_BINS = 8  # of a BSDF's specular albedo, by the cosine of the viewer's direction
+ALBEDO_SAMPLES, ALBEDO_SEED = 1 << 18, 1
+MIN_ALBEDO_SAMPLES = 16  # of a bin; with fewer its albedo is taken to be one
 
 
 class Lobes:
@@ -49,11 +54,12 @@ class Lobes:
         self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
+        self._specular_albedo = self._mean_specular_albedo(scene)
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._whole, self._lambertian, self._clear
+        return self._whole, self._lambertian, self._clear, self._specular_albedo
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -71,6 +77,11 @@ class Lobes:
         if not self._has_whole:
             return is_glossy
         return is_glossy | (_of(self._whole, si, bsdf) & ~_of(self._lambertian, si, bsdf))
+
+    def specular_albedo(self, si: Any, bsdf: Any) -> Any:
+        """Albedo of the specular lobes, averaged over the surfaces with a BSDF, by the viewer's angle; Float."""
+        entry = _albedo_entry(_number(bsdf), dr.abs(si.wi.z))
+        return dr.gather(Float, self._specular_albedo, entry, si.is_valid())
 
     def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1; Color3f."""
@@ -160,6 +171,28 @@ class Lobes:
         wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
         return wo, pdf, dr.select(is_whole, difference, weight), is_delta
 
+    def _mean_specular_albedo(self, scene: Any) -> Any:
+        """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
+        rng = mi.PCG32(ALBEDO_SAMPLES, ALBEDO_SEED)
+        box = scene.bbox()
+        start, end = (
+            box.min + mi.Vector3f(*(rng.next_float32() for _ in range(3))) * box.extents() for _ in range(2)
+        )
+        si = scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
+        bsdf = si.bsdf()
+        _, pdf, weight, _ = self.sample_specular(si, bsdf, rng)
+        value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)
+        entry = _albedo_entry(_number(bsdf), dr.abs(si.wi.z))
+        dr.eval(value, entry)
+
+        # NumPy adds in a fixed order.
+        valid = np.array(si.is_valid()) & np.isfinite(np.array(value))
+        entry, size = np.array(entry)[valid], len(self._whole) * ALBEDO_BINS
+        count = np.bincount(entry, minlength=size)
+        total = np.bincount(entry, np.array(value)[valid], minlength=size)
+        mean = np.where(count >= MIN_ALBEDO_SAMPLES, total / np.maximum(count, 1), 1.0)
+        return Float(mean.astype(np.float32))
+
     def _difference(self, si: Any, bsdf: Any, wo: Any, albedo: Any, active: Any) -> tuple[Any, Any]:
         """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""
         whole, whole_pdf = bsdf.eval_pdf(self._all, si, wo, active)
@@ -181,8 +214,18 @@ def _lambert(si: Any, wo: Any, albedo: Any) -> tuple[Any, Any]:
 
 def _of(table: Any, si: Any, bsdf: Any) -> Any:
     """Entries of a table of BSDFs; Bool."""
+    return dr.gather(Bool, table, _number(bsdf), si.is_valid())
+
+
+def _number(bsdf: Any) -> Any:
+    """Numbers of BSDFs in Dr.Jit's registry; UInt."""
     number: Any = dr.reinterpret_array(UInt, bsdf)
-    return dr.gather(Bool, table, number, si.is_valid())
+    return number
+
+
+def _albedo_entry(number: Any, cosine: Any) -> Any:
+    """Entries of the table of specular albedos; UInt."""
+    return number * ALBEDO_BINS + dr.minimum(UInt(cosine * ALBEDO_BINS), ALBEDO_BINS - 1)
 
 
 def _classes(bsdf: Any) -> set[str]:

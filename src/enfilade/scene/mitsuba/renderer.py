@@ -149,11 +149,13 @@ class MitsubaRenderer:
         """
         null_transmittance = None if bounce is not None else NULL_GBUFFER if opaque_only else NULL_PATH
         surfaces, si = self._intersect(rays, active, null_transmittance)
+        bsdf = si.bsdf()
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
             emission=self._transport.emission(si, bounce, soft_only=soft_only),
-            has_specular=self._lobes.has_specular(si, si.bsdf()),
+            has_specular=self._lobes.has_specular(si, bsdf),
+            specular_albedo=self._lobes.specular_albedo(si, bsdf),
             native=si,
         )
 
