@@ -68,16 +68,14 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     segments = inputs.analysis.segments(SPACING)[0]
     integrator = Integrator(renderer)
     shot = ShotContext(0, segments, inputs, walk, integrator, VirtualImages(renderer))
-    reprojected, cache = shot.shading_caches(frame)
+    cache = shot.shading_cache(frame)
     times: list[float] = []
 
     def radiance(rays, rng):
         dr.eval(rays, rng)
         dr.sync_thread()
         begin = time.perf_counter()
-        found = integrator.diffuse_radiance(
-            reprojected, cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle
-        )
+        found = integrator.diffuse_radiance(cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle)
         dr.eval(found)
         dr.sync_thread()
         times.append(time.perf_counter() - begin)

@@ -19,7 +19,7 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
 
     def radiance(rays, rng, qmc_point):
         at = {"pixel_angle": PIXEL_ANGLE}
-        diffuse = integrator.diffuse_radiance(irradiance, irradiance, rays, rng, **at).layers[0]
+        diffuse = integrator.diffuse_radiance(irradiance, rays, rng, **at).layers[0]
         specular = integrator.specular_radiance(irradiance, rays, rng, qmc_point, **at)
         return diffuse + sum(specular.layers)
 

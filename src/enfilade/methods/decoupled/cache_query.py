@@ -10,7 +10,7 @@ import drjit as dr
 from enfilade.arrays import PCG32, Array3f, Bool
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 
-__all__ = ["CacheQuery", "query_further", "query_images"]
+__all__ = ["CacheQuery", "query_further", "query_view"]
 
 STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
 
@@ -44,16 +44,14 @@ class CacheQuery:
         return dr.max(dr.abs(self.weight)) > 0.0
 
 
-def query_images(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
-    """Diffuse reflection of cached irradiance, and where the images of the cache miss."""
-    found, is_known = cache.lookup(query.position, query.normal, query.shape_index)
-    reflected = dr.select(is_known, query.weight * sum(query.sharp, found), 0.0)
-    return Array3f(reflected), Bool(~is_known & query.is_needed)
+def query_view(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
+    """Diffuse reflection of irradiance cached in the camera's view, and where that is missing."""
+    return _reflected(query, *cache.lookup_in_view(query.position, query.normal, query.shape_index))
 
 
 def query_further(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:
     """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
-    reflected, is_miss = query_images(cache, query)
+    reflected, is_miss = _reflected(query, *cache.lookup(query.position, query.normal, query.shape_index))
     if cache.hash_grid:
         # Jitter the position, so that many lookups interpolate.
         rng = PCG32(rng)
@@ -68,3 +66,8 @@ def query_further(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: A
         reflected = dr.select(is_miss & is_found, query.weight * irradiance, reflected)
         is_miss &= ~is_found
     return reflected, is_miss
+
+
+def _reflected(query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:
+    reflected = dr.select(is_known, query.weight * sum(query.sharp, irradiance), 0.0)
+    return Array3f(reflected), Bool(~is_known & query.is_needed)

@@ -53,8 +53,8 @@ class Frames:
         geometry = shot.walk.view(frame).geometry
 
         # Trace camera rays, then specular rays where they meet specular lobes.
-        reprojected, cache = shot.shading_caches(frame)
-        diffuse, refined = _shade_diffuse(shot, frame, reprojected, cache)
+        cache = shot.shading_cache(frame)
+        diffuse, refined = _shade_diffuse(shot, frame, cache)
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         camera_rays = diffuse.shading.to_image(np.ones_like(where))
         color = camera_rays.color
@@ -70,7 +70,7 @@ class Frames:
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
-        provenance = _provenance(geometry, reprojected, diffuse.is_marked, is_keyframe=is_keyframe)
+        provenance = _provenance(geometry, cache, diffuse.is_marked, is_keyframe=is_keyframe)
         reflection, *others = specular.aovs
         transmission = others[0] if others else None
         shaded = ShadedFrame(to_half(color), reflection, transmission, to_half(np.sqrt(variance)), provenance)
@@ -145,9 +145,7 @@ def _exposure_ev(shot: ShotContext) -> float:
     return shot.walk.settings[ViewingSettings].exposure_ev
 
 
-def _shade_diffuse(
-    shot: ShotContext, frame: int, reprojected: IrradianceCache, cache: IrradianceCache
-) -> tuple[Estimate, Mask]:
+def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tuple[Estimate, Mask]:
     """Emission and diffuse reflection, with more camera rays at edges and fine textures; where, (H, W)."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
@@ -155,7 +153,7 @@ def _shade_diffuse(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
         lambda rays, rng: shot.integrator.diffuse_radiance(
-            reprojected, cache, rays, rng, pixel_angle=light_camera(camera).pixel_angle
+            cache, rays, rng, pixel_angle=light_camera(camera).pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.GAUSSIAN,
@@ -172,10 +170,11 @@ def _shade_diffuse(
 
 
 def _provenance(
-    geometry: Geometry, reprojected: IrradianceCache, is_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
+    geometry: Geometry, cache: IrradianceCache, is_specular: npt.NDArray[np.bool_], *, is_keyframe: bool
 ) -> U8:
     """Provenance of the pixels of a shaded frame, (H, W)."""
-    is_known = np.array(reprojected.images[0].shape_indices) > 0
+    assert cache.view is not None  # noqa: S101  (`ShotContext.shading_cache`)
+    is_known = np.array(cache.view.shape_indices) > 0
     base = Provenance.KEYFRAME if is_keyframe else Provenance.REUSED
     provenance = np.full(is_specular.shape, base, np.uint8)
     provenance[geometry.has_diffuse.ravel() & ~is_known] = Provenance.DISOCCLUDED

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
-from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import SHARP
@@ -33,7 +34,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     is_sharp = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
-    with_virtual = IrradianceCache(cache.images, cache.weights, virtual.upload())
+    with_virtual = replace(cache, hash_grid=virtual.upload())
     for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):
         specular = Estimate(
             camera,

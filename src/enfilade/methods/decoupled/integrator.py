@@ -41,7 +41,7 @@ OnMiss = Callable[[Entries], None]
 
 @dataclass(frozen=True)
 class _Missed:
-    """Vertices whose irradiance the first lookup did not find, as lanes; padding needs none.
+    """Vertices without irradiance in the camera's view, as lanes; padding needs none.
 
     Attributes
     ----------
@@ -89,7 +89,6 @@ class Integrator:
 
     def diffuse_radiance(
         self,
-        reprojected: IrradianceCache,
         cache: IrradianceCache,
         rays: Rays,
         rng: Any,
@@ -100,10 +99,7 @@ class Integrator:
 
         Parameters
         ----------
-        reprojected
-            Queried first: irradiance reprojected to the view of these rays.
         cache
-            Queried where `reprojected` misses.
         rays
             From the camera, one a lane.
         rng : PCG32
@@ -116,7 +112,7 @@ class Integrator:
         Samples
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
-        vertex = self._kernels.see(reprojected, spawn(rays, rng, ENTRY_PX * pixel_angle))
+        vertex = self._kernels.see(cache, spawn(rays, rng, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
         for found, lane in self._missed_light(cache, deferred):
@@ -290,7 +286,7 @@ class Integrator:
     ) -> Samples:
         """Both layers of a final gather, whose paths have made a bounce."""
         light, deferred = Contributions(), _Deferred()
-        if cache.images:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
+        if cache.view:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
             light.add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex)
         onward = replace(vertex.path, throughput=vertex.onward)
@@ -374,8 +370,8 @@ class Integrator:
     def _finish(
         self, light: Contributions, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None
     ) -> None:
-        """Add what was deferred, after a lookup in the images of the cache."""
-        for found, lane in self._missed_light(IrradianceCache(hash_grid=cache.hash_grid), deferred, on_miss):
+        """Add what was deferred."""
+        for found, lane in self._missed_light(cache, deferred, on_miss):
             light.add(found, lane)
         if deferred.ends:
             ends = joined(deferred.ends)
@@ -385,14 +381,11 @@ class Integrator:
     def _missed_light(
         self, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
     ) -> list[tuple[Any, Any]]:
-        """Diffuse reflection where no irradiance was found: from the rest of the cache, or estimated.
+        """Diffuse reflection where the view has no irradiance: from the rest of the cache, or estimated.
 
         Parameters
         ----------
-        cache
-            What was not queried yet.
-        deferred
-        on_miss
+        cache, deferred, on_miss
 
         Returns
         -------

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Float, Int, UInt, image, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, matrix3, opaque, vector3
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
@@ -34,6 +34,9 @@ class IrradianceCache:
 
     Attributes
     ----------
+    view : UploadedImage or None
+        The mean of the images in the view of the camera, which is looked up first: most paths meet surfaces
+        that the camera sees, too.
     images : tuple of UploadedImage
     weights : tuple of Float
         One an image, for surfaces that several of them show.
@@ -42,6 +45,7 @@ class IrradianceCache:
         Whether the images are without direct light of emitters that cast sharp shadows.
     """
 
+    view: UploadedImage | None = None
     images: tuple[UploadedImage, ...] = ()
     weights: tuple[Any, ...] = ()
     hash_grid: HashGrid | None = None
@@ -53,11 +57,18 @@ class IrradianceCache:
         weights: Sequence[float],
         hash_grid: HashGrid | None = None,
         *,
+        view: UploadedImage | None = None,
         is_soft: bool = False,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(tuple(images), own, hash_grid, is_soft)
+        return IrradianceCache(view, tuple(images), own, hash_grid, is_soft)
+
+    def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
+        """The same as :meth:`lookup`, from the image in the view of the camera."""
+        if self.view is None:
+            return Array3f(0), Bool(False)
+        return _mean([(self.view, Float(1))], position, normal, shape_index)
 
     def lookup(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the images.
@@ -73,15 +84,22 @@ class IrradianceCache:
             0 where none is found.
         is_found : Bool
         """
-        total, weight = Array3f(0), Float(0)
-        valid = Float(0)
-        for one, own in zip(self.images, self.weights, strict=True):
-            found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
-            total += own * sum(found.totals, Array3f(0))
-            weight += own * found.weight
-            valid += dr.select(own > 0.0, found.weight, 0.0)
-        is_found = valid > MIN_WEIGHT
-        return dr.select(is_found, total / weight, 0.0), is_found
+        return _mean(zip(self.images, self.weights, strict=True), position, normal, shape_index)
+
+
+def _mean(
+    images: Iterable[tuple[UploadedImage, Any]], position: Any, normal: Any, shape_index: Any
+) -> tuple[Any, Any]:
+    """Weighted mean of images at points (Array3f), and whether any shows them (Bool)."""
+    total, weight = Array3f(0), Float(0)
+    valid = Float(0)
+    for one, own in images:
+        found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
+        total += own * sum(found.totals, Array3f(0))
+        weight += own * found.weight
+        valid += dr.select(own > 0.0, found.weight, 0.0)
+    is_found = valid > MIN_WEIGHT
+    return dr.select(is_found, total / weight, 0.0), is_found
 
 
 def upload(geometry: Geometry, irradiance: IrradianceImage) -> UploadedImage:

@@ -10,7 +10,7 @@ import drjit as dr
 from enfilade.arrays import PCG32, Array3f, Bool, UInt64
 from enfilade.kernels.random import PrefixedRng
 from enfilade.kernels.replay import recorded
-from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_images
+from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_view
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
 from enfilade.methods.decoupled.lookup import UploadedImage, lookup
@@ -73,7 +73,7 @@ class PathKernels:
     Attributes
     ----------
     see
-        Camera rays, and the irradiance cache.
+        Camera rays, and the irradiance in their view.
     see_aovs
         Camera rays, and filtered specular AOVs.
     extend
@@ -139,7 +139,7 @@ class PathKernels:
             weight=dr.select(is_diffuse, path.throughput * albedo, 0.0),
             sharp=sharp,
         )
-        reflected, is_miss = query_images(cache, query)
+        reflected, is_miss = query_view(cache, query)
         vertex = Vertex(reflected, is_miss, Bool(point.has_specular), _surviving(path, point), path, query)
         # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
         emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
@@ -94,12 +95,12 @@ class ShotContext:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
-        return IrradianceCache.of(*self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES))
+        filled_up = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
+        return IrradianceCache.of(*filled_up, view=images[0])
 
     def final_gather_cache(self, frame: int) -> IrradianceCache:
         """Prepass images and hash grid near a frame, for final gathering."""
-        cache = self.prepass_cache(frame)
-        return IrradianceCache(cache.images, cache.weights, self.hash_grid(frame))
+        return replace(self.prepass_cache(frame), hash_grid=self.hash_grid(frame))
 
     def hash_grid(self, frame: int) -> HashGrid | None:
         """The hash grid near a frame."""
@@ -109,8 +110,8 @@ class ShotContext:
             self._hash_grid = near, Entries.joined(parts).upload()
         return self._hash_grid[1]
 
-    def shading_caches(self, frame: int) -> tuple[IrradianceCache, IrradianceCache]:
-        """Caches for shading a frame: irradiance reprojected to its view, and the images near it.
+    def shading_cache(self, frame: int) -> IrradianceCache:
+        """The irradiance images near a frame, reprojected to its view, and the hash grid.
 
         The weights change continuously along the path.
         """
@@ -118,9 +119,9 @@ class ShotContext:
         images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
         filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
-        is_soft = self.renderer.has_sharp_light
-        images_near = IrradianceCache.of(*filled_up, self.hash_grid(frame), is_soft=is_soft)
-        return IrradianceCache.of([reprojected], [1.0], is_soft=is_soft), images_near
+        return IrradianceCache.of(
+            *filled_up, self.hash_grid(frame), view=reprojected, is_soft=self.renderer.has_sharp_light
+        )
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int
