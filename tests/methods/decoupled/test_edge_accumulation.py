@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, upload_displayed
+from enfilade.methods.decoupled.edge_accumulation import (
+    accumulate_refined,
+    redisplayed,
+    upload_displayed,
+)
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
 
@@ -26,13 +30,12 @@ def changed(values, exposure_ev=0.0, noise=NOISE):
     """The change of the first of seven frames, of which the right half is refined."""
     deviation = np.where(WHERE, np.float32(noise / 2.0**exposure_ev), np.float32(0))
     shown = [
-        upload_displayed(
-            [g, g], color, deviation, WHERE if k == 0 else np.ones_like(WHERE), exposure_ev=exposure_ev
-        )
-        for k, (g, color) in enumerate(zip(GEOMETRIES, values, strict=True))
+        upload_displayed([g, g], color, deviation, exposure_ev=exposure_ev)
+        for g, color in zip(GEOMETRIES, values, strict=True)
     ]
+    here = redisplayed(shown[0], values[0], deviation, WHERE, exposure_ev=exposure_ev)
     others = list(zip(shown[1:], WEIGHTS, strict=True))
-    found = accumulate_refined(GEOMETRIES[0], values[0], shown[0], others, exposure_ev=exposure_ev)
+    found = accumulate_refined(GEOMETRIES[0], values[0], here, others, exposure_ev=exposure_ev)
     return found - values[0]
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import drjit as dr
 import numpy as np
 
-from enfilade.arrays import image, to_half
+from enfilade.arrays import image, lanes, to_float, to_half
 from enfilade.kernels.tone import luminance
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import SpecularAov
@@ -24,7 +25,7 @@ NOISE_SHARE = 0.5
 
 
 def upload_displayed(
-    virtual: Sequence[Geometry], color: F32, deviation: F32, where: Mask, *, exposure_ev: float
+    virtual: Sequence[Geometry], color: F32, deviation: F32, *, exposure_ev: float
 ) -> UploadedImage:
     """Upload a frame as it is displayed, at the virtual images that its mirrors and panes show.
 
@@ -36,8 +37,6 @@ def upload_displayed(
         Linear radiance.
     deviation : (H, W) float32
         Standard deviation of the luminance.
-    where : (H, W) bool
-        Pixels that are uploaded.
     exposure_ev
         In stops.
     """
@@ -48,13 +47,31 @@ def upload_displayed(
         depth=np.where(is_pane, transmitted.depth, reflected.depth),
         shape_index=np.where(is_pane, transmitted.shape_index, reflected.shape_index),
     )
+    displayed = _displayed(color, deviation, exposure_ev)
+    return upload_aov(shown, displayed, np.ones(deviation.shape, np.bool_))
+
+
+def redisplayed(
+    image: UploadedImage, color: F32, deviation: F32, where: Mask, *, exposure_ev: float
+) -> UploadedImage:
+    """An image of :func:`upload_displayed` with other colours, in some pixels only, (H, W)."""
+    shown = _displayed(color, deviation, exposure_ev)
+    depths = dr.select(lanes(where), image.depths, 0.0)
+    values = (lanes(to_float(shown.color)),), (lanes(np.square(to_float(shown.deviation))),)
+    dr.eval(depths, values)
+    return replace(image, depths=depths, values=values[0], variances=values[1])
+
+
+def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
+    """Colours after exposure, 0..1, and their deviation.
+
+    Above white there is no noise: bright pixels beside a dark line are not averaged with it.
+    """
     scale = np.float32(2.0**exposure_ev)
-    # Above white there is no noise: bright pixels beside a dark line are not averaged with it.
     mean, error = luminance(color) * scale, deviation * scale
     low, high = (np.clip(value, 0.0, 1.0) for value in (mean - error, mean + error))
     noise = np.float32(0.5 * NOISE_SHARE) * (high - low)
-    displayed = to_half(np.clip(color * scale, 0.0, 1.0)), to_half(noise)
-    return upload_aov(shown, SpecularAov(*displayed), where)
+    return SpecularAov(to_half(np.clip(color * scale, 0.0, 1.0)), to_half(noise))
 
 
 def accumulate_refined(

@@ -11,7 +11,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
-from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, upload_displayed
+from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, redisplayed, upload_displayed
 from enfilade.methods.decoupled.edge_filter import filter_edges
 from enfilade.methods.decoupled.edges import (
     EdgeRays,
@@ -99,7 +99,9 @@ class Frames:
 
         # Average refined pixels.
         if shaded.deviation.any():
-            here = self._display(shot, frame, color, shaded.deviation > 0)
+            shown, where = self._displayed_image(shot, frame), shaded.deviation > 0
+            deviation = to_float(shaded.deviation)
+            here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
             neighbours = [(self._displayed_image(shot, f), weights[f]) for f in others]
             color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
 
@@ -110,15 +112,11 @@ class Frames:
         """A shaded frame as it is displayed, on the device."""
 
         def make() -> UploadedImage:
-            color = self._record(shot, frame).color
-            return self._display(shot, frame, color, np.ones(color.shape[:2], np.bool_))
+            shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
+            deviation = to_float(shaded.deviation)
+            return upload_displayed(virtual, shaded.color, deviation, exposure_ev=_exposure_ev(shot))
 
         return self._displayed.get(frame, make)
-
-    def _display(self, shot: ShotContext, frame: int, color: F32, where: Mask) -> UploadedImage:
-        deviation = to_float(self._record(shot, frame).deviation)
-        virtual = self._virtual_geometry(shot, frame)
-        return upload_displayed(virtual, color, deviation, where, exposure_ev=_exposure_ev(shot))
 
     def _aovs(self, shot: ShotContext, frame: int) -> list[UploadedImage]:
         """Specular AOVs of a shaded frame, on the device."""
