@@ -11,7 +11,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import upload
-from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.light_camera import hash_grid_camera, irradiance_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
@@ -41,12 +41,13 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     paths : int
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
-    camera = light_camera(walk.path.cameras[frame])
+    whole = walk.path.cameras[frame]
+    camera, pixel_angle = irradiance_camera(whole), hash_grid_camera(whole).pixel_angle
     estimate = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
         lambda rays, rng, qmc_point: shot.integrator.final_gather(
-            cache, rays, rng, qmc_point, pixel_angle=camera.pixel_angle
+            cache, rays, rng, qmc_point, pixel_angle=pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
@@ -54,7 +55,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
         layers=2,
         is_stratified=True,
     )
-    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
+    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes), whole.width * whole.height))
     layers = [shading.to_image(where) for shading in estimate.shadings]
     direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in layers)
     return IrradianceImage(direct, indirect, where), estimate.paths
@@ -62,7 +63,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
-    geometry = shot.light_geometry(frame)
+    geometry = shot.irradiance_geometry(frame)
     image, paths = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
         image = _denoised(geometry, image, shot.settings.denoiser)
@@ -106,7 +107,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
         image, count = _gather(shot, middle, shot.uncovered(middle, {}))
-        images[middle], uploaded[middle] = image, upload(shot.light_geometry(middle), image)
+        images[middle], uploaded[middle] = image, upload(shot.irradiance_geometry(middle), image)
         paths += count
         pending += [(middle, last), (first, middle)]
     numbers = [shot.walk.path.numbers[frame] for frame in sorted(images)]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
+from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
@@ -20,7 +21,7 @@ from enfilade.methods.decoupled.irradiance_cache import (
     reproject_to,
     upload,
 )
-from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.light_camera import hash_grid_camera, irradiance_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.prepass import prepass_geometry
 from enfilade.methods.decoupled.virtual_images import VirtualImages
@@ -74,7 +75,7 @@ class ShotContext:
         self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
         self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
-        self._light_geometry: LruCache[int, Geometry] = LruCache(2)
+        self._reduced: LruCache[tuple[int, int], Geometry] = LruCache(2)
         self._irradiance: LruCache[int, UploadedImage] = LruCache(2 * (2 * ACCUMULATED + 1))
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
@@ -137,7 +138,7 @@ class ShotContext:
 
         Of shape (H, W), at the resolution of light.
         """
-        geometry = self.light_geometry(frame)
+        geometry = self.irradiance_geometry(frame)
         near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)
         return geometry.has_diffuse & ~is_covered(geometry, [*map(self.image, near), *others.values()])
 
@@ -145,16 +146,22 @@ class ShotContext:
         """The irradiance image of a keyframe, or a disocclusion image."""
         pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
         return self._irradiance.get(
-            frame, lambda: upload(self.light_geometry(frame), self.inputs.record(pass_name, frame))
+            frame, lambda: upload(self.irradiance_geometry(frame), self.inputs.record(pass_name, frame))
         )
 
-    def light_geometry(self, frame: int) -> Geometry:
+    def irradiance_geometry(self, frame: int) -> Geometry:
         """G-buffer of an irradiance image."""
-        whole = self.walk.path.cameras[frame]
-        camera = light_camera(whole)
-        if camera is whole:
+        return self._geometry(frame, irradiance_camera(self.walk.path.cameras[frame]))
+
+    def hash_grid_geometry(self, frame: int) -> Geometry:
+        """G-buffer of the pixels from which paths fill the hash grid."""
+        return self._geometry(frame, hash_grid_camera(self.walk.path.cameras[frame]))
+
+    def _geometry(self, frame: int, camera: Camera) -> Geometry:
+        """G-buffer of a frame at a reduced size."""
+        if camera is self.walk.path.cameras[frame]:
             return self.walk.view(frame).geometry
-        return self._light_geometry.get(frame, lambda: find_geometry(self.renderer, camera))
+        return self._reduced.get((frame, camera.width), lambda: find_geometry(self.renderer, camera))
 
     def prepass_geometry(self, frame: int) -> Geometry:
         """G-buffer of a prepass image."""
@@ -184,7 +191,7 @@ class ShotContext:
             images = [self.image(f) for f in sorted({*around, frame})]
             pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
             is_known = self.inputs.record(pass_name, frame).is_known
-            return accumulate(self.light_geometry(frame), is_known, images)
+            return accumulate(self.irradiance_geometry(frame), is_known, images)
 
         return self._accumulated.get(frame, make)
 
