@@ -42,10 +42,11 @@ def test_lists_without_paths_are_left_out():
 
 
 def test_contributions_to_one_lane_are_summed():
-    light = Contributions()
-    assert rows(light.summed(2)).tolist() == [[0, 0, 0], [0, 0, 0]]
+    light = Contributions(4)
+    assert rows(light.summed()).tolist() == [[0, 0, 0]] * 4
     light.add(Array3f([1, 2, 3], [10, 20, 30], 0), UInt([2, 0, 2]))
     light.add(Array3f(0.5), UInt([2]))
-    assert rows(light.summed(4)).tolist() == [[2, 20, 0], [0, 0, 0], [4.5, 40.5, 0.5], [0, 0, 0]]
+    light.add_once(Array3f(1), UInt([1]))
+    assert rows(light.summed()).tolist() == [[2, 20, 0], [1, 1, 1], [4.5, 40.5, 0.5], [0, 0, 0]]
     light.add(Array3f(np.nan), UInt([0]))  # the estimate leaves such paths out
-    assert np.isnan(rows(light.summed(4))).any(axis=1).tolist() == [True, False, False, False]
+    assert np.isnan(rows(light.summed())).any(axis=1).tolist() == [True, False, False, False]

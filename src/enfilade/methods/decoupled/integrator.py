@@ -195,7 +195,7 @@ class Integrator:
     ) -> tuple[Any, ...]:
         """Radiance of both specular AOVs by lane, of `count` lanes, from camera paths."""
         count = count or dr.width(path.lane)
-        light, deferred = Contributions(), _Deferred()
+        light, deferred = Contributions(SPECULAR_AOVS * count), _Deferred()  # one AOV after the other
 
         # Bounce off the visible surface: all paths, then the other branch at clear interfaces.
         onward = []
@@ -208,7 +208,7 @@ class Integrator:
         # Follow the paths that meet another specular lobe.
         self._trace_specular(light, cache, merged(onward), deferred, transmitted_at=count)
         self._finish(light, cache, deferred, on_miss)
-        radiance = light.summed(SPECULAR_AOVS * count)  # one AOV after the other
+        radiance = light.summed()
         lane = dr.arange(UInt, count)
         return tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
 
@@ -285,15 +285,15 @@ class Integrator:
         self, cache: IrradianceCache, path: Path, direct: Any, vertex: Vertex, on_miss: OnMiss | None
     ) -> Samples:
         """Both layers of a final gather, whose paths have made a bounce."""
-        light, deferred = Contributions(), _Deferred()
+        light, deferred = Contributions(dr.width(path.lane)), _Deferred()
         if cache.view:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
-            light.add(vertex.radiance, vertex.path.lane)
+            light.add_once(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex)
         onward = replace(vertex.path, throughput=vertex.onward)
         onward = compact(onward, dr.compress(onward.is_active))
         self._trace_specular(light, cache, onward, deferred)
         self._finish(light, cache, deferred, on_miss)
-        return Samples((direct, light.summed(dr.width(path.lane))))
+        return Samples((direct, light.summed()))
 
     def _trace_specular(
         self,
@@ -353,8 +353,9 @@ class Integrator:
         direct, is_split, is_end, vertex = self._kernels.extend(
             cache, path, qmc_point, opaque(transmitted_at)
         )
-        light.add(direct, path.lane)
-        light.add(vertex.radiance, vertex.path.lane)
+        add = light.add if qmc_point is None else light.add_once
+        add(direct, path.lane)
+        add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex, jitter)
 
         # Divide the paths that go on.

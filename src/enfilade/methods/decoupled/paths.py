@@ -145,20 +145,33 @@ def _joined(parts: Sequence[Any], targets: Sequence[Any], count: int) -> Any:
 class Contributions:
     """Radiance that paths contribute to lanes, of which a lane may receive any number.
 
-    NumPy adds them in the order in which they came: sums of atomic additions depend on threads.
+    Parameters
+    ----------
+    count
+        Number of lanes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._sum = dr.zeros(Array3f, count)
         self._parts: list[tuple[Any, Any]] = []
 
+    def add_once(self, radiance: Any, lane: Any) -> None:
+        """Add radiance (Array3f) to lanes (UInt), each of which at most one active path has."""
+        scatter_add(self._sum, radiance, lane)
+
     def add(self, radiance: Any, lane: Any) -> None:
-        """Add radiance (Array3f) to lanes (UInt)."""
+        """Add radiance (Array3f) to lanes (UInt), of which several paths may have the same."""
         self._parts.append((radiance, lane))
 
-    def summed(self, count: int) -> Any:
-        """Sums of `count` lanes; Array3f."""
+    def summed(self) -> Any:
+        """Sums of all lanes; Array3f.
+
+        NumPy adds what several paths contribute in the order in which it came: sums of atomic additions
+        depend on threads.
+        """
         if not self._parts:
-            return dr.zeros(Array3f, count)
+            return self._sum
         dr.eval(self._parts)
         parts = [(np.array(lane), radiance) for radiance, lane in self._parts]
         lane = np.concatenate([lane for lane, _ in parts])
@@ -168,7 +181,8 @@ class Contributions:
             )
             for axis in range(3)
         ]
-        return Array3f(*(lanes(np.bincount(lane, axis, count).astype(np.float32)) for axis in axes))
+        sums = (lanes(np.bincount(lane, axis, self._count).astype(np.float32)) for axis in axes)
+        return self._sum + Array3f(*sums)
 
 
 def scatter_add(radiance: Any, contribution: Any, lane: Any) -> None:
