@@ -20,7 +20,7 @@ from enfilade.methods.decoupled.edges import (
     small_emitter_pixels,
 )
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.light_camera import hash_grid_camera
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame
 from enfilade.methods.decoupled.shot import ShotContext
@@ -151,7 +151,7 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
         lambda rays, rng: shot.integrator.diffuse_radiance(
-            cache, rays, rng, pixel_angle=hash_grid_camera(camera).pixel_angle
+            cache, rays, rng, pixel_angle=light_camera(camera).pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.GAUSSIAN,

@@ -10,7 +10,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
-from enfilade.methods.decoupled.light_camera import hash_grid_camera
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import SHARP
 from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
@@ -25,14 +25,14 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
-    camera, geometry = hash_grid_camera(walk.path.cameras[frame]), shot.prepass_geometry(frame)
+    camera, geometry = light_camera(walk.path.cameras[frame]), shot.prepass_geometry(frame)
     chunk = walk.settings[LimitSettings].paths_in_flight
 
     # Gather at the surfaces that mirrors and panes show.
     virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
-    is_sharp = np.isin(shot.hash_grid_geometry(frame).surface, SHARP).ravel()
+    is_sharp = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     with_virtual = replace(cache, hash_grid=virtual.upload())
     for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):

@@ -11,7 +11,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import upload
-from enfilade.methods.decoupled.light_camera import hash_grid_camera, irradiance_camera
+from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
@@ -42,7 +42,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
     whole = walk.path.cameras[frame]
-    camera, pixel_angle = irradiance_camera(whole), hash_grid_camera(whole).pixel_angle
+    camera, pixel_angle = irradiance_camera(whole), light_camera(whole).pixel_angle
     estimate = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
@@ -55,7 +55,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
         layers=2,
         is_stratified=True,
     )
-    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes), whole.width * whole.height))
+    estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     layers = [shading.to_image(where) for shading in estimate.shadings]
     direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in layers)
     return IrradianceImage(direct, indirect, where), estimate.paths

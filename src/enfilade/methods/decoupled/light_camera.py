@@ -7,28 +7,27 @@ from dataclasses import replace
 
 from enfilade.camera.pinhole import Camera
 
-IRRADIANCE_PIXELS = 1280 * 720  # of an irradiance image; frames of fewer than 2.25 times as many have one as large
-HASH_GRID_PIXELS = 640 * 360  # from which paths fill the hash grid; the prepass has a quarter
+LIGHT_PIXELS = 640 * 360  # of the light camera; frames of up to 2.25 times as many have one as large
+IRRADIANCE_SCALE = 2  # width and height of irradiance images over those of the light camera
+
+
+def light_camera(camera: Camera) -> Camera:
+    """The camera of the hash grid: the same view at a whole fraction of its size, or itself."""
+    return reduced(camera, light_reduction(camera.width * camera.height))
 
 
 def irradiance_camera(camera: Camera) -> Camera:
-    """The camera of irradiance images: the same view at a whole fraction of its size, or itself."""
-    return reduced(camera, irradiance_reduction(camera.width * camera.height))
+    """The camera of irradiance images: shadows where surfaces meet are narrower than its pixels otherwise."""
+    light = light_camera(camera)
+    width, height = IRRADIANCE_SCALE * light.width, IRRADIANCE_SCALE * light.height
+    if (width, height) == (camera.width, camera.height):
+        return camera
+    return replace(camera, width=width, height=height)
 
 
-def hash_grid_camera(camera: Camera) -> Camera:
-    """The camera of paths that fill the hash grid, likewise. Its pixels give entries their width."""
-    return reduced(camera, hash_grid_reduction(camera.width * camera.height))
-
-
-def irradiance_reduction(pixels: int) -> int:
-    """Width and height of a frame of so many pixels over those of its irradiance images."""
-    return max(round(math.sqrt(pixels / IRRADIANCE_PIXELS)), 1)
-
-
-def hash_grid_reduction(pixels: int) -> int:
-    """The same, over those of the hash grid's camera."""
-    return max(round(math.sqrt(pixels / HASH_GRID_PIXELS)), 1)
+def light_reduction(pixels: int) -> int:
+    """Width and height of a frame of so many pixels over those of its light camera."""
+    return max(round(math.sqrt(pixels / LIGHT_PIXELS)), 1)
 
 
 def reduced(camera: Camera, factor: int) -> Camera:

@@ -12,11 +12,7 @@ from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance import fill_disocclusions, gather_keyframe
-from enfilade.methods.decoupled.light_camera import (
-    HASH_GRID_PIXELS,
-    hash_grid_reduction,
-    irradiance_reduction,
-)
+from enfilade.methods.decoupled.light_camera import light_reduction
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
@@ -80,12 +76,14 @@ class Decoupled(Method):
         whole: Mapping[str, int],
         shots: int,
     ) -> Mapping[str, float]:
-        """Light of large frames has fewer pixels or paths; that of shots with few keyframes has more paths."""
-        own = settings[DecoupledSettings]
-        in_excerpt = irradiance_spp(own, excerpt["irradiance"], HASH_GRID_PIXELS)
-        spp = irradiance_spp(own, whole["irradiance"] / shots, pixels) / irradiance_reduction(pixels) ** 2
-        hash_grid = dict.fromkeys(("prepass", "hash_grid"), 1.0 / hash_grid_reduction(pixels) ** 2)
-        return hash_grid | dict.fromkeys(("irradiance", "disocclusion"), spp / in_excerpt)
+        """Light of large frames has fewer pixels; that of shots with few keyframes needs more paths."""
+        share = 1.0 / light_reduction(pixels) ** 2
+        ratios = dict.fromkeys(("prepass", "hash_grid", "irradiance", "disocclusion"), share)
+        spp, in_excerpt = (
+            irradiance_spp(settings[DecoupledSettings], keyframes)
+            for keyframes in (whole["irradiance"] / shots, excerpt["irradiance"])
+        )
+        return ratios | dict.fromkeys(("irradiance", "disocclusion"), share * spp / in_excerpt)
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """Tasks of keyframes, segments, and all frames."""

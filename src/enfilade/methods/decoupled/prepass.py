@@ -1,4 +1,4 @@
-"""The irradiance prepass: a rough estimate at half the resolution of the hash grid, looked up by final gathering.
+"""The irradiance prepass: a rough estimate at half the resolution of light, looked up by final gathering.
 
 A final gather averages the irradiance of many points, so that it may be rough at each of them (Ward and
 Heckbert 1992; Jensen 1996).
@@ -11,20 +11,20 @@ import numpy as np
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.base import Output
-from enfilade.methods.decoupled.light_camera import hash_grid_camera, reduced
+from enfilade.methods.decoupled.light_camera import light_camera, reduced
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry
 from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-REDUCTION = 2  # of width and height, from those of the hash grid
+REDUCTION = 2  # of width and height, from those of irradiance images
 SPP = 4
 
 
 def prepass_geometry(walk: Walkthrough, frame: int) -> Geometry:
     """G-buffer of a prepass image."""
-    return find_geometry(walk.renderer, reduced(hash_grid_camera(walk.path.cameras[frame]), REDUCTION))
+    return find_geometry(walk.renderer, reduced(light_camera(walk.path.cameras[frame]), REDUCTION))
 
 
 def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Output:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 
-from enfilade.methods.decoupled.light_camera import hash_grid_reduction, irradiance_reduction
 from enfilade.methods.decoupled.shot import ACCUMULATED
 from enfilade.settings import DecoupledSettings
 
 # At quality 1; divided by the square root of the quality.
-IRRADIANCE_PATHS = 380.0  # of a pixel of the hash grid's resolution, in all images together that are averaged
+IRRADIANCE_PATHS = 95.0  # of a pixel, in all images together that are averaged
 SPECULAR_RAYS = 34.0  # of a pixel with specular lobes
 IRRADIANCE_SPP = 4, 512  # of one image: fewest and most
 
 
-def irradiance_spp(settings: DecoupledSettings, keyframes: float, pixels: int) -> int:
+def irradiance_spp(settings: DecoupledSettings, keyframes: float) -> int:
     """Paths a pixel of an irradiance image.
 
     Parameters
@@ -22,13 +21,10 @@ def irradiance_spp(settings: DecoupledSettings, keyframes: float, pixels: int) -
     settings
     keyframes
         Of the shot.
-    pixels
-        Of a frame: larger irradiance images have fewer paths a pixel, and as many in all.
     """
-    share = (irradiance_reduction(pixels) / hash_grid_reduction(pixels)) ** 2
-    spp = share * IRRADIANCE_PATHS / math.sqrt(settings.quality) / averaged_images(keyframes)
+    spp = IRRADIANCE_PATHS / math.sqrt(settings.quality) / averaged_images(keyframes)
     least, most = IRRADIANCE_SPP
-    return settings.irradiance_spp or min(max(4 * round(spp / 4), least), most)
+    return settings.irradiance_spp or min(max(round(spp), least), most)
 
 
 def averaged_images(keyframes: float) -> float:

@@ -21,7 +21,7 @@ from enfilade.methods.decoupled.irradiance_cache import (
     reproject_to,
     upload,
 )
-from enfilade.methods.decoupled.light_camera import hash_grid_camera, irradiance_camera
+from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.prepass import prepass_geometry
 from enfilade.methods.decoupled.virtual_images import VirtualImages
@@ -75,7 +75,7 @@ class ShotContext:
         self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
         self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
-        self._reduced: LruCache[tuple[int, int], Geometry] = LruCache(2)
+        self._resized: LruCache[tuple[int, int], Geometry] = LruCache(2)
         self._irradiance: LruCache[int, UploadedImage] = LruCache(2 * (2 * ACCUMULATED + 1))
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
@@ -153,15 +153,15 @@ class ShotContext:
         """G-buffer of an irradiance image."""
         return self._geometry(frame, irradiance_camera(self.walk.path.cameras[frame]))
 
-    def hash_grid_geometry(self, frame: int) -> Geometry:
-        """G-buffer of the pixels from which paths fill the hash grid."""
-        return self._geometry(frame, hash_grid_camera(self.walk.path.cameras[frame]))
+    def light_geometry(self, frame: int) -> Geometry:
+        """G-buffer of the light camera."""
+        return self._geometry(frame, light_camera(self.walk.path.cameras[frame]))
 
     def _geometry(self, frame: int, camera: Camera) -> Geometry:
-        """G-buffer of a frame at a reduced size."""
+        """G-buffer of a frame by a camera of another size."""
         if camera is self.walk.path.cameras[frame]:
             return self.walk.view(frame).geometry
-        return self._reduced.get((frame, camera.width), lambda: find_geometry(self.renderer, camera))
+        return self._resized.get((frame, camera.width), lambda: find_geometry(self.renderer, camera))
 
     def prepass_geometry(self, frame: int) -> Geometry:
         """G-buffer of a prepass image."""

@@ -17,7 +17,7 @@ from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.decoupled.edges import SPECULAR_DEVIATION, EdgeRays, dilated, is_outline
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.light_camera import hash_grid_camera
+from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
@@ -168,7 +168,7 @@ class _FrameRays:
 
     @property
     def _pixel_angle(self) -> float:
-        return hash_grid_camera(self.geometry.camera).pixel_angle
+        return light_camera(self.geometry.camera).pixel_angle
 
     def _estimate(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose, radiance: Any) -> Estimate:
         return Estimate(
