@@ -92,7 +92,7 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     )
     for _ in range(WARM_UP + arguments.repeats):
         rays.add(arguments.spp)
-    is_known = np.array(reprojected.images[0].shape_indices) > 0
+    is_known = np.array(cache.view.shape_indices) > 0
     has_diffuse = walk.view(frame).geometry.has_diffuse.ravel()
     return times[WARM_UP:], len(pixels) * arguments.spp, float(is_known[has_diffuse].mean())
 

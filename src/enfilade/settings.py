@@ -289,7 +289,7 @@ class DecoupledSettings(Section):
     )
     denoiser: str = option(
         "balanced",
-        "Quality of Open Image Denoise on irradiance images and specular AOVs; none: a wavelet filter.",
+        "Quality of Open Image Denoise on irradiance images; none: a wavelet filter, on specular AOVs, too.",
         choices=("none", "fast", "balanced", "high"),
     )
 

@@ -29,7 +29,7 @@ from enfilade.methods.decoupled.specular import (
     upload_aov,
 )
 from enfilade.methods.decoupled.specular_rays import shade_specular
-from enfilade.records import F32, U8, Frame, Geometry, Mask, Provenance
+from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings, ViewingSettings
 

@@ -26,7 +26,7 @@ MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are est
 
 
 def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, int]:
-    """Gather the irradiance of some pixels of a frame, at their centres and at the resolution of light.
+    """Gather the irradiance of some pixels of an irradiance image, at their centres.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 11
+    revision = 12
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
@@ -76,7 +76,7 @@ class Decoupled(Method):
         whole: Mapping[str, int],
         shots: int,
     ) -> Mapping[str, float]:
-        """Light of large frames has fewer pixels; that of shots with few keyframes needs more paths."""
+        """Cached light of large frames has fewer pixels; shots with few keyframes need more paths."""
         share = 1.0 / light_reduction(pixels) ** 2
         ratios = dict.fromkeys(("prepass", "hash_grid", "irradiance", "disocclusion"), share)
         spp, in_excerpt = (

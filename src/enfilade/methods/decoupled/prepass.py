@@ -1,4 +1,4 @@
-"""The irradiance prepass: a rough estimate at half the resolution of light, looked up by final gathering.
+"""The irradiance prepass: a rough estimate at half the resolution of the light camera, looked up by final gathering.
 
 A final gather averages the irradiance of many points, so that it may be rough at each of them (Ward and
 Heckbert 1992; Jensen 1996).
@@ -18,7 +18,7 @@ from enfilade.records import Geometry
 from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-REDUCTION = 2  # of width and height, from those of irradiance images
+REDUCTION = 2  # of width and height, from those of the light camera
 SPP = 4
 
 

@@ -10,7 +10,7 @@ from enfilade.settings import DecoupledSettings
 # At quality 1; divided by the square root of the quality.
 IRRADIANCE_PATHS = 95.0  # of a pixel, in all images together that are averaged
 SPECULAR_RAYS = 34.0  # of a pixel with specular lobes
-IRRADIANCE_SPP = 4, 512  # of one image: fewest and most
+MIN_IRRADIANCE_SPP = 4  # of one image
 
 
 def irradiance_spp(settings: DecoupledSettings, keyframes: float) -> int:
@@ -23,8 +23,7 @@ def irradiance_spp(settings: DecoupledSettings, keyframes: float) -> int:
         Of the shot.
     """
     spp = IRRADIANCE_PATHS / math.sqrt(settings.quality) / averaged_images(keyframes)
-    least, most = IRRADIANCE_SPP
-    return settings.irradiance_spp or min(max(round(spp), least), most)
+    return settings.irradiance_spp or max(round(spp), MIN_IRRADIANCE_SPP)
 
 
 def averaged_images(keyframes: float) -> float:

@@ -136,7 +136,7 @@ class ShotContext:
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
         """Diffuse pixels of a frame that neither the nearest keyframes nor other images show.
 
-        Of shape (H, W), at the resolution of light.
+        Of shape (H, W), at the resolution of irradiance images.
         """
         geometry = self.irradiance_geometry(frame)
         near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)

@@ -26,6 +26,7 @@ from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.methods.decoupled.wavelet import firefly_weights
 from enfilade.records import F32, Geometry, Mask, Shading
 
+DENOISER = "fast"  # quality: what it leaves is averaged over frames
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
 OUTLIER = 8.0  # times the denoised value: brighter estimates are limited where the mean is kept
 DENOISED_SHARE = 0.25  # of the samples' deviation that the denoiser leaves
@@ -35,7 +36,7 @@ MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another fram
 
 
 def filter_spatially(
-    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, denoiser: str
+    virtual: Sequence[Geometry], aovs: Sequence[Shading], where: Mask, *, is_denoised: bool
 ) -> list[SpecularAov]:
     """Denoise specular AOVs, or smooth them along the surfaces that are seen in them by the wavelet filter.
 
@@ -47,8 +48,8 @@ def filter_spatially(
         Of shape (H, W).
     where : (H, W) bool
         Pixels that were sampled; others do not contribute.
-    denoiser
-        Quality of the denoiser, or ``none``.
+    is_denoised
+        Whether to use the denoiser.
 
     Returns
     -------
@@ -58,8 +59,8 @@ def filter_spatially(
     surfaces = [
         replace(g, depth=np.where(g.shape_index < IN_VIRTUAL_IMAGE, g.depth, np.float32(0))) for g in virtual
     ]
-    if denoiser != "none":
-        return [_denoised(g, aov, where, denoiser) for g, aov in zip(surfaces, aovs, strict=True)]
+    if is_denoised:
+        return [_denoised(g, aov, where) for g, aov in zip(surfaces, aovs, strict=True)]
     height, width = where.shape
     # Find fireflies in the sum: where few rays sample an AOV, each of its samples would be one.
     total = sum((lanes(aov.color) for aov in aovs), Array3f(0))
@@ -99,9 +100,9 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
     return upload_layers(geometry, lanes(where), [*layers, *[black] * (count - len(layers))])
 
 
-def _denoised(geometry: Geometry, aov: Shading, where: Mask, quality: str) -> SpecularAov:
+def _denoised(geometry: Geometry, aov: Shading, where: Mask) -> SpecularAov:
     """Denoise an AOV, guided by the surfaces that are seen in it."""
-    color = denoise_light(geometry, aov, where, quality=quality, outlier=OUTLIER)
+    color = denoise_light(geometry, aov, where, quality=DENOISER, outlier=OUTLIER)
     deviation = DENOISED_SHARE * scipy.ndimage.uniform_filter(np.sqrt(aov.variance), DENOISED_SUPPORT)
     return SpecularAov(to_half(color), to_half(deviation.astype(np.float32)))
 

@@ -72,7 +72,8 @@ def shade_specular(
 
     # Filter the AOVs along the surfaces that are seen in them.
     count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
-    aovs = filter_spatially(virtual[:count], traced[:count], where, shot.settings.denoiser)
+    is_denoised = shot.settings.denoiser != "none"
+    aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
     # Aliasing is more visible than noise: these edges have the tolerance of camera rays.

@@ -79,7 +79,7 @@ class Lobes:
         return is_glossy | (_of(self._whole, si, bsdf) & ~_of(self._lambertian, si, bsdf))
 
     def specular_albedo(self, si: Any, bsdf: Any) -> Any:
-        """Albedo of the specular lobes, averaged over the surfaces with a BSDF, by the viewer's angle; Float."""
+        """Albedo of the specular lobes, a mean over all points of a BSDF, by the viewer's angle; Float."""
         entry = _albedo_entry(_number(bsdf), dr.abs(si.wi.z))
         return dr.gather(Float, self._specular_albedo, entry, si.is_valid())
 
@@ -175,9 +175,11 @@ class Lobes:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
         rng = mi.PCG32(ALBEDO_SAMPLES, ALBEDO_SEED)
         box = scene.bbox()
-        start, end = (
-            box.min + mi.Vector3f(*(rng.next_float32() for _ in range(3))) * box.extents() for _ in range(2)
-        )
+
+        def random_point() -> Any:
+            return box.min + mi.Vector3f(*(rng.next_float32() for _ in range(3))) * box.extents()
+
+        start, end = random_point(), random_point()
         si = scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
         bsdf = si.bsdf()
         _, pdf, weight, _ = self.sample_specular(si, bsdf, rng)
