@@ -13,7 +13,7 @@ from support.in_memory import run_passes
 PATH = room_path(7, (48, 32))
 TABLES = {
     "sampling": {"spp": 16},
-    "keyframes": {"spacing": 3},
+    "keyframes": {"spacing": 6},
     "decoupled": {"quality": 100.0},
     "masks": {"split_percent": 20.0},
 }

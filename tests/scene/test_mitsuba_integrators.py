@@ -59,6 +59,22 @@ def test_a_mask_is_as_diffuse_as_it_is_opaque(tmp_path, opacity):
     assert pierced.has_specular[0] == (opacity < 1.0)
 
 
+@pytest.mark.parametrize(
+    ("bsdf", "least", "most"),
+    [
+        (DIFFUSE, 0.0, 0.0),
+        ('<bsdf type="conductor"><rgb name="specular_reflectance" value="0.5"/></bsdf>', 0.499, 0.501),
+        ('<bsdf type="thindielectric"/>', 0.999, 1.001),
+        ('<bsdf type="roughplastic"/>', 0.03, 0.06),  # 4 % at normal incidence
+        ('<bsdf type="principled"><float name="metallic" value="1"/></bsdf>', 0.3, 0.6),  # its base is 0.5
+    ],
+)
+def test_specular_albedo_tells_how_much_the_specular_lobes_scatter(tmp_path, bsdf, least, most):
+    renderer = opened(of_integrator(tmp_path, "", bsdf))
+    point = renderer.intersect(Rays(Array3f(0, 0, 6), Array3f(0, 0, -1)))
+    assert least <= point.specular_albedo[0] <= most
+
+
 def test_properties_that_mitsuba_does_not_know_are_named(tmp_path):
     unknown = (
         '<integrator type="direct"><integer name="a" value="8"/><integer name="b" value="9"/></integrator>'

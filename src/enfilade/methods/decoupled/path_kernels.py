@@ -21,7 +21,7 @@ from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, 
 __all__ = ["ENTRY_PX", "PathKernels", "Vertex"]
 
 MAX_BOUNCES = MAX_PATH_DEPTH - 1  # off specular lobes; longer paths are path traced to their end
-# Russian roulette: paths survive with this times their throughput after the next bounce, if that is below one.
+# Russian roulette: paths survive with this times their throughput after the next bounce, if below one.
 ROULETTE_GAIN = 20.0
 MIN_SURVIVAL = 0.05  # least probability of survival
 # Width of a hash grid entry: in pixels where a surface is seen sharply; as a part of the lobe's width where

@@ -1,4 +1,4 @@
-"""The irradiance prepass: a rough estimate at half the resolution of the light camera, looked up by final gathering.
+"""The irradiance prepass: a rough estimate at half the light camera's size, for final gathering.
 
 A final gather averages the irradiance of many points, so that it may be rough at each of them (Ward and
 Heckbert 1992; Jensen 1996).

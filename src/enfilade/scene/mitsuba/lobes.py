@@ -18,7 +18,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, Float, UInt
+from enfilade.arrays import PCG32, Bool, Float, UInt, UInt64
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
@@ -29,7 +29,7 @@ LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: La
 CLEAR = {"SmoothDielectric", "ThinDielectric"}  # their sample chooses reflection first
 ALMOST_ONE = 1.0 - 2.0**-24
 
-ALBEDO_BINS = 8  # of a BSDF's specular albedo, by the cosine of the viewer's direction
+ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
 ALBEDO_SAMPLES, ALBEDO_SEED = 1 << 18, 1
 MIN_ALBEDO_SAMPLES = 16  # of a bin; with fewer its albedo is taken to be one
 
@@ -80,7 +80,7 @@ class Lobes:
 
     def specular_albedo(self, si: Any, bsdf: Any) -> Any:
         """Albedo of the specular lobes, a mean over all points of a BSDF, by the viewer's angle; Float."""
-        entry = _albedo_entry(_number(bsdf), dr.abs(si.wi.z))
+        entry = _albedo_entry(_number(bsdf), si.wi.z)
         return dr.gather(Float, self._specular_albedo, entry, si.is_valid())
 
     def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
@@ -173,7 +173,7 @@ class Lobes:
 
     def _mean_specular_albedo(self, scene: Any) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
-        rng = mi.PCG32(ALBEDO_SAMPLES, ALBEDO_SEED)
+        rng = PCG32(size=ALBEDO_SAMPLES, initstate=UInt64(ALBEDO_SEED))
         box = scene.bbox()
 
         def random_point() -> Any:
@@ -184,7 +184,7 @@ class Lobes:
         bsdf = si.bsdf()
         _, pdf, weight, _ = self.sample_specular(si, bsdf, rng)
         value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)
-        entry = _albedo_entry(_number(bsdf), dr.abs(si.wi.z))
+        entry = _albedo_entry(_number(bsdf), si.wi.z)
         dr.eval(value, entry)
 
         # NumPy adds in a fixed order.
@@ -227,7 +227,7 @@ def _number(bsdf: Any) -> Any:
 
 def _albedo_entry(number: Any, cosine: Any) -> Any:
     """Entries of the table of specular albedos; UInt."""
-    return number * ALBEDO_BINS + dr.minimum(UInt(cosine * ALBEDO_BINS), ALBEDO_BINS - 1)
+    return number * ALBEDO_BINS + UInt(dr.clip((0.5 + 0.5 * cosine) * ALBEDO_BINS, 0.0, ALBEDO_BINS - 1))
 
 
 def _classes(bsdf: Any) -> set[str]:
