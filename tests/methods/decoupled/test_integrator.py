@@ -163,6 +163,22 @@ def test_images_of_weight_zero_add_no_surfaces(diffuse):
     np.testing.assert_array_equal(np.array(alone.lookup(*at)[1]), np.array(filled.lookup(*at)[1]))
 
 
+def test_the_view_of_a_cache_is_looked_up_like_its_images(diffuse):
+    renderer, images = diffuse
+    geometry = find_geometry(renderer, front_camera())
+    at = [lanes(values) for values in (positions(geometry), geometry.normal, geometry.shape_index)]
+    image, other = (upload(*one) for one in images[:2])
+    cache = IrradianceCache.of([other], [1.0], view=image)
+    (found, is_found), (expected, is_expected) = (
+        cache.lookup_in_view(*at),
+        IrradianceCache.of([image], [1.0]).lookup(*at),
+    )
+    assert np.array(is_found).mean() > 0.5
+    np.testing.assert_array_equal(np.array(is_found), np.array(is_expected))
+    np.testing.assert_array_equal(np.array(found), np.array(expected))
+    assert not np.array(IrradianceCache.of([other], [1.0]).lookup_in_view(*at)[1]).any()
+
+
 def test_other_scenes_may_be_open(tmp_path):
     # Mitsuba numbers the materials of all open scenes; one of them is an emitting mesh.
     mesh = '<emitter type="area"><rgb name="radiance" value="1"/></emitter></shape><shape type="cube">'

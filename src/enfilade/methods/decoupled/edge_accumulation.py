@@ -57,9 +57,9 @@ def redisplayed(
     """An image of :func:`upload_displayed` with other colours, in some pixels only, (H, W)."""
     shown = _displayed(color, deviation, exposure_ev)
     depths = dr.select(lanes(where), image.depths, 0.0)
-    values = (lanes(to_float(shown.color)),), (lanes(np.square(to_float(shown.deviation))),)
-    dr.eval(depths, values)
-    return replace(image, depths=depths, values=values[0], variances=values[1])
+    value, variance = lanes(to_float(shown.color)), lanes(np.square(to_float(shown.deviation)))
+    dr.eval(depths, value, variance)
+    return replace(image, depths=depths, values=(value,), variances=(variance,))
 
 
 def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
