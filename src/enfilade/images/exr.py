@@ -78,7 +78,7 @@ def write_exr(
     with OpenEXR.File(header, channels) as image:
         image.write(packed)
     with whole_file(file) as temporary:
-        temporary.write_bytes(packed.getbuffer())
+        temporary.write_bytes(packed.getvalue())
 
 
 def read_exr(file: Path) -> dict[str, Array]:

@@ -122,5 +122,10 @@ def _without_none(hint: Any) -> Any:
 
 
 def _dtype_of(hint: Any) -> Any:
-    """The scalar type of an array's annotation, ``NDArray[np.float32]``."""
-    return typing.get_args(typing.get_args(hint)[1])[0]
+    """The scalar type of an array's annotation, ``NDArray[np.float32]``: its innermost argument.
+
+    NumPy 2.5 made ``NDArray`` an alias with one argument; it was an array's shape and type before.
+    """
+    while arguments := typing.get_args(hint):
+        hint = arguments[-1]
+    return hint
