@@ -29,6 +29,7 @@ MIN_SURVIVAL = 0.05  # least probability of survival
 ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
+BELOW_TOTAL = 1.0 - 2.0**-16  # probability of a reflection that is not total; GPUs round total ones to below one
 AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
@@ -274,5 +275,5 @@ def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_a
     if path.bounce is None:
         return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
     is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
-    is_back = is_clear & ~is_through & (bounce.pdf < 1.0) & (path.lane >= transmitted_at)
+    is_back = is_clear & ~is_through & (bounce.pdf < BELOW_TOTAL) & (path.lane >= transmitted_at)
     return path.lane - dr.select(is_back, transmitted_at, 0)
