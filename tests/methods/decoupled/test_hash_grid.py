@@ -9,6 +9,7 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import hash_grid as module
 from enfilade.methods.decoupled.hash_grid import (
     LEVELS,
+    MAX_ERROR,
     MIN_SAMPLES,
     RELIABLE_ERROR,
     RELIABLE_SAMPLES,
@@ -118,7 +119,7 @@ def test_lookup_finds_the_mean_of_the_smallest_reliable_entry_or_of_the_largest(
         best = None
         for level, key in enumerate(k[i] for k in by_level):
             twice = np.tile(light[by_level[level] == key] @ REC709_LUMINANCE, 2)
-            if len(twice) >= MIN_SAMPLES:
+            if len(twice) >= MIN_SAMPLES and sem(twice) <= MAX_ERROR * twice.mean():
                 best = level, key
                 if len(twice) >= RELIABLE_SAMPLES and sem(twice) <= RELIABLE_ERROR * twice.mean():
                     break
@@ -172,3 +173,14 @@ def test_samples_that_are_not_finite_are_left_out():
 def test_entries_of_few_samples_are_not_uploaded(count):
     entries = Entries.joined([Entries.of(np.full(count, 9, np.uint64), np.ones((count, 3)))])
     assert entries.upload() is None
+
+
+def test_entries_with_most_of_their_light_from_one_path_are_not_uploaded():
+    light = np.ones((14, 3))
+    light[5] = 8.0
+    key = np.full(14, 9, np.uint64)
+    assert Entries.of(key, light).upload() is not None
+    light[5] = 30.0
+    assert Entries.of(key, light).upload() is None
+    confirmed = [Entries.of(key, light) for _ in range(4)]
+    assert Entries.joined(confirmed).upload() is not None

@@ -19,7 +19,7 @@ from enfilade.arrays import Array3f, Bool, Float, Int, UInt, UInt64, lanes, opaq
 from enfilade.kernels.tone import REC709_LUMINANCE
 
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
-MIN_SAMPLES = 4  # of an entry that is used
+MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, of an entry that is used
 RELIABLE_SAMPLES, RELIABLE_ERROR = 16, 0.1  # fewest, and largest relative standard error, of a reliable one
 SEARCH_STEPS = 22
 MAX_ENTRIES = 1 << SEARCH_STEPS  # that are uploaded; of more, those with the most samples
@@ -201,18 +201,21 @@ class Entries:
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""
-        chosen = np.flatnonzero(self.counts >= MIN_SAMPLES)
+        # Compute relative standard errors.
+        count = np.maximum(self.counts, 2)
+        irradiance = self.sums / count[:, None]
+        mean = irradiance @ REC709_LUMINANCE
+        variance = np.maximum(self.squares / count - np.square(mean), 0.0) / (count - 1)
+        error = np.sqrt(variance) / np.maximum(mean, QUANTUM)
+
+        # Choose the entries that no single path dominates.
+        chosen = np.flatnonzero((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR))
         if not len(chosen):
             return None
         if len(chosen) > MAX_ENTRIES:
             chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
-        count = self.counts[chosen]
-        irradiance = self.sums[chosen] / count[:, None]
-
-        # Compute standard errors.
-        mean = irradiance @ REC709_LUMINANCE
-        variance = np.maximum(self.squares[chosen] / count - np.square(mean), 0.0) / (count - 1)
-        is_reliable = (count >= RELIABLE_SAMPLES) & (variance <= np.square(RELIABLE_ERROR * mean))
+        irradiance = irradiance[chosen]
+        is_reliable = ((self.counts >= RELIABLE_SAMPLES) & (error <= RELIABLE_ERROR))[chosen]
         grid = HashGrid(
             lanes(self.keys[chosen]),
             lanes(irradiance.astype(np.float32)[None]),
