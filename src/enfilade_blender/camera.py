@@ -69,7 +69,8 @@ def _view(camera: Any, selection: Selection) -> View:
     projection = np.array(
         evaluated.calc_matrix_camera(
             graph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
-        )
+        ),
+        np.float64,  # JSON has no place for the float32 that Blender 5.2 hands over
     )
     lens: dict[str, Any] = {}
     if max(abs(projection[0, 2]), abs(projection[1, 2])) > 1e-7:
