@@ -70,6 +70,8 @@ def test_paths_are_absolute(settings, tmp_path, monkeypatch):
     made = settings("--settings", "../there/look.toml")
     assert made[VideoSettings].ocio == str(there / "studio.ocio")
     assert made[LimitSettings].allow == f"{there / 'models'}{os.pathsep}/textures"
+    (here / "link").symlink_to(there)
+    assert settings("--allow", "link")[LimitSettings].allow == str(here / "link")
     file.write_text('[video]\nocio = "ocio://studio-config-latest"\n')
     assert settings("--settings", file)[VideoSettings].ocio == "ocio://studio-config-latest"
 

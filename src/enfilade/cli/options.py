@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import Field, fields
@@ -271,7 +272,8 @@ def _absolute(value: Any, folder: Path, joined_by: str) -> Any:
     if not isinstance(value, str) or value == "" or "://" in value:
         return value
     parts = value.split(joined_by) if joined_by else [value]
-    return joined_by.join(str((folder / part).resolve()) if part else part for part in parts)
+    # Links stay: the `python` of a virtual environment is one.
+    return joined_by.join(os.path.abspath(folder / part) if part else part for part in parts)  # noqa: PTH100
 
 
 def settings_of(ctx: click.Context, kinds: Iterable[type[Section]]) -> Settings:
