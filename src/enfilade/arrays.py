@@ -19,6 +19,7 @@ from drjit.auto.ad import (
     PCG32,
     Array2f,
     Array3f,
+    Array3f16,
     Array4f,
     Bool,
     Float,
@@ -65,16 +66,18 @@ def lanes(values: npt.NDArray[Any]) -> Any:
     Parameters
     ----------
     values : (H, W) or (H, W, 2) or (H, W, 3) or (N,)
-        float32, int32, uint32, uint64, uint8 (widened to uint32) or bool. Other sizes are not taken.
+        float16, float32, int32, uint32, uint64, uint8 (widened to uint32) or bool. Other sizes are not taken.
 
     Returns
     -------
-    Float, Int, UInt, Bool, Array2f or Array3f
+    Float16, Float, Int, UInt, Bool, Array2f, Array3f or Array3f16
         A copy for vectors (structure of arrays); memory may be shared for scalars.
     """
     match values.dtype.kind, values.dtype.itemsize:
+        case "f", 2:
+            scalar: Any = Float16
         case "f", 4:
-            scalar: Any = Float
+            scalar = Float
         case "i", 4:
             scalar = Int
         case "u", 4:
@@ -89,7 +92,7 @@ def lanes(values: npt.NDArray[Any]) -> Any:
             raise TypeError(f"no Dr.Jit type for arrays of {values.dtype}")
     if values.ndim < 3:
         return scalar(_aligned(values))
-    vector = {2: Array2f, 3: Array3f}[values.shape[2]]
+    vector = {2: Array2f, 3: Array3f16 if scalar is Float16 else Array3f}[values.shape[2]]
     return vector(*(scalar(_aligned(c)) for c in values.reshape(-1, values.shape[2]).T))
 
 

@@ -57,7 +57,7 @@ def redisplayed(
     """An image of :func:`upload_displayed` with other colours, in some pixels only, (H, W)."""
     shown = _displayed(color, deviation, exposure_ev)
     depths = dr.select(lanes(where), image.depths, 0.0)
-    value, variance = lanes(to_float(shown.color)), lanes(np.square(to_float(shown.deviation)))
+    value, variance = lanes(shown.color), lanes(np.square(to_float(shown.deviation)))
     dr.eval(depths, value, variance)
     return replace(image, depths=depths, values=(value,), variances=(variance,))
 

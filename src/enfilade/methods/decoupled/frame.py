@@ -43,9 +43,9 @@ class Frames:
     """
 
     def __init__(self) -> None:
-        self._virtual: LruCache[int, list[Geometry]] = LruCache(2)
-        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 2)
-        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH + 2)
+        self._virtual: LruCache[int, list[Geometry]] = LruCache(1)
+        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 1)
+        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH + 1)
         self._last: LruCache[int, Frame] = LruCache(1)
 
     def shade(self, shot: ShotContext, frame: int) -> Output:

@@ -27,7 +27,7 @@ class UploadedImage:
         Images, width * height lanes; the depth of unknown pixels is 0.
     normals : UInt or None
         Of :func:`packed`; None where normals are not compared, as for virtual images.
-    values : tuple of Array3f
+    values : tuple of Array3f or Array3f16
     variances : tuple of Float
         One a layer.
     eye : Array3f
@@ -137,7 +137,7 @@ def lookup(
             cosine = dr.dot(normal, other) * scale
             of_tap *= dr.select(cosine > min_cosine, cosine, 0.0)
         for layer, (value, variance) in enumerate(zip(image.values, image.variances, strict=True)):
-            totals[layer] += of_tap * dr.gather(Array3f, value, tap.lane, is_same)
+            totals[layer] += of_tap * Array3f(dr.gather(type(value), value, tap.lane, is_same))
             variances[layer] += of_tap * dr.gather(Float, variance, tap.lane, is_same)
         weight += of_tap
     return Found(tuple(totals), tuple(variances), weight, taper)

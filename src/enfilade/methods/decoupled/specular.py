@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
+from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, opaque, to_float, to_half, vector3
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -95,8 +95,8 @@ def upload_aovs(geometry: Geometry, aovs: Sequence[SpecularAov], count: int, whe
     where : (H, W) bool
         Pixels that are looked up.
     """
-    layers = [(lanes(to_float(aov.color)), Float(0)) for aov in aovs]
-    black = (dr.zeros(Array3f, where.size), Float(0))
+    layers = [(lanes(aov.color), Float(0)) for aov in aovs]
+    black = (dr.zeros(Array3f16, where.size), Float(0))
     return upload_layers(geometry, lanes(where), [*layers, *[black] * (count - len(layers))])
 
 
@@ -127,7 +127,7 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
     where : (H, W) bool
         Pixels that were sampled.
     """
-    layers = [(lanes(to_float(aov.color)), lanes(np.square(to_float(aov.deviation))))]
+    layers = [(lanes(aov.color), lanes(np.square(to_float(aov.deviation))))]
     return upload_layers(geometry, lanes(where), layers, has_normals=False)
 
 
@@ -153,7 +153,7 @@ def accumulate_temporally(
     (H, W, 3) float32
         0 where the frame was not sampled.
     """
-    (color,), (variance,) = here.values, here.variances
+    color, variance = Array3f(here.values[0]), here.variances[0]
 
     # Compute the apparent positions; virtual images face the eye.
     position = points_of(geometry, here.depths)
