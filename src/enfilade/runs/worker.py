@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from enfilade.arrays import release_memory
 from enfilade.cache import LruCache
 from enfilade.errors import RunFolderError
 from enfilade.images.records import read_record, write_record
@@ -85,6 +86,7 @@ class Worker:
                 case _:
                     self._inputs.begin(task.pass_name)
                     facts, files = self._write(task, self._method.run(task, self._inputs, self._walk))
+        release_memory()
         if taken := RESERVED.intersection(facts):
             raise ValueError(f"these facts have names of the ledger's own: {', '.join(sorted(taken))}")
         number = self._job.path.numbers[task.frame]

@@ -44,8 +44,9 @@ class Frames:
 
     def __init__(self) -> None:
         self._virtual: LruCache[int, list[Geometry]] = LruCache(1)
-        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH + 1)
-        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH + 1)
+        # One frame fewer than a window: its first one is not needed again.
+        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH)
+        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH)
         self._last: LruCache[int, Frame] = LruCache(1)
 
     def shade(self, shot: ShotContext, frame: int) -> Output:
@@ -57,6 +58,8 @@ class Frames:
         diffuse, refined = _shade_diffuse(shot, frame, cache)
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         camera_rays = diffuse.shading.to_image(np.ones_like(where))
+        is_marked, paths = diffuse.is_marked, diffuse.paths
+        del diffuse  # its sums take 48 bytes a pixel
         color = camera_rays.color
         virtual = self._virtual_geometry(shot, frame) if where.any() else []
         specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
@@ -70,11 +73,11 @@ class Frames:
 
         # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
-        provenance = _provenance(geometry, cache, diffuse.is_marked, is_keyframe=is_keyframe)
+        provenance = _provenance(geometry, cache, is_marked, is_keyframe=is_keyframe)
         reflection, *others = specular.aovs
         transmission = others[0] if others else None
         shaded = ShadedFrame(to_half(color), reflection, transmission, to_half(np.sqrt(variance)), provenance)
-        rays = {"camera": diffuse.paths, "specular": specular.paths}
+        rays = {"camera": paths, "specular": specular.paths}
         dropped = camera_rays.dropped + specular.dropped
         return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
 
@@ -90,19 +93,21 @@ class Frames:
         """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
         path, shaded = shot.walk.path, self._record(shot, frame)
         geometry, color = shot.walk.view(frame).geometry, to_float(shaded.diffuse)
-        others = [f for f in window(path, path.shots()[shot.number], frame) if f != frame]
-        weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in others}
+        frames = window(path, path.shots()[shot.number], frame)
+        weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in frames}
         if np.any(shaded.provenance == Provenance.SPECULAR):
-            for k, here in enumerate(self._aovs(shot, frame)):
-                neighbours = [(aovs[k], weights[f]) for f in others if k < len(aovs := self._aovs(shot, f))]
+            aovs = {f: self._aovs(shot, f) for f in frames}
+            for k, here in enumerate(aovs.pop(frame)):
+                neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
                 color = color + accumulate_temporally(geometry, here, neighbours)
 
         # Average refined pixels.
         if shaded.deviation.any():
-            shown, where = self._displayed_image(shot, frame), shaded.deviation > 0
+            displayed = {f: self._displayed_image(shot, f) for f in frames}
+            shown, where = displayed.pop(frame), shaded.deviation > 0
             deviation = to_float(shaded.deviation)
             here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
-            neighbours = [(self._displayed_image(shot, f), weights[f]) for f in others]
+            neighbours = [(image, weights[f]) for f, image in displayed.items()]
             color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
 
         # Specular lobes that are a difference have negative samples: clip the sum.
