@@ -35,6 +35,7 @@ __all__ = [
     "PCG32",
     "Array2f",
     "Array3f",
+    "Array3f16",
     "Array4f",
     "Bool",
     "Float",
