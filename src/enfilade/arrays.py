@@ -154,7 +154,7 @@ def opaque(value: float | int, kind: Any = None) -> Any:
 
 
 def release_memory() -> None:
-    """Give back the memory that Dr.Jit keeps for arrays of sizes it has seen: at the end of a task."""
+    """Give back the memory that Dr.Jit keeps for arrays of sizes it has seen."""
     dr.sync_thread()
     dr.flush_malloc_cache()
 

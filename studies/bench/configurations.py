@@ -28,7 +28,7 @@ PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's m
     "paper-16": ("paper", {"sampling": {"spp": 16}}),
     **{
         f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
-        for quality in (60.0, 15.0, 8.0)
+        for quality in (60.0, 15.0, 10.0, 8.0)
     },
 }
 EXPECTED_SPP = 8

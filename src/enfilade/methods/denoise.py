@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from enfilade.arrays import release_memory
 from enfilade.errors import SettingsError
 from enfilade.records import F32
 
@@ -80,6 +81,7 @@ def _filtered(images: Mapping[str, F32], *, quality: str, **flags: bool) -> F32:
     inputs = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
     output = np.empty_like(inputs["color"])
     device = _device()
+    release_memory()  # the network takes its own
     with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT) as network:
         for name, image in {**inputs, "output": output}.items():
             network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
