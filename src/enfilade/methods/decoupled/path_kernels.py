@@ -29,9 +29,7 @@ MIN_SURVIVAL = 0.05  # least probability of survival
 ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
-BELOW_TOTAL = (
-    1.0 - 2.0**-16
-)  # probability of a reflection that is not total; GPUs round total ones to below one
+BELOW_TOTAL = 1.0 - 2.0**-16  # probability below which a reflection is not total; GPUs round one to less
 AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
 BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
 SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
