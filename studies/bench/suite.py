@@ -21,14 +21,15 @@ PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixe
 FIRST_FRAME = 11  # where the path is long enough
 LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
-    *(f"denoised-{name}" for name in ("2", "4", "8", "16", "32", "8-accumulated-after")),
+    *(f"denoised-{name}" for name in ("4", "8", "16", "32", "64", "8-accumulated-after")),
     "paper-16", "decoupled-60", "decoupled-15",
 )  # fmt: skip
 LARGE = (
-    *(f"denoised-{name}" for name in ("4", "8", "16", "4-accumulated-after")),
+    *(f"denoised-{name}" for name in ("4", "16", "64", "4-accumulated-after")),
     "decoupled-60", "decoupled-15",
 )  # fmt: skip
-QUICK = ("denoised-2", "denoised-4", "denoised-8", "decoupled-60", "decoupled-15")
+QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-15")
+DENOISED_SPP = "4,8,16,32,64"  # those that any of them names
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def run_case(
     folder = out / f"{case.name}-{size}-{frames}"
     command = [
         sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path),
-        "--out", str(folder),
+        "--out", str(folder), "--denoised-spp", DENOISED_SPP,
         "--size", size, "--frames", f"{max(last - frames + 1, 1)}-{last}",
         "--set", f"viewing.diagonal_m={math.hypot(width, height) * PIXEL_M}",
         *(word for pattern in only for word in ("--only", pattern)), *options,
@@ -157,4 +158,4 @@ def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 GENERATED = SCENES
-QUICK_SCENES = ("room", "kitchen")  # one of each split
+QUICK_SCENES = ("room", "courtyard")  # one of each split

@@ -1,4 +1,4 @@
-"""The generated scenes: ROOM and ATRIUM of the case studies (§6), GALLERY and KITCHEN of the bench alone.
+"""The generated scenes: ROOM and ATRIUM of the case studies (§6), others of the bench alone.
 
 Heavy libraries are imported when a scene is written.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from enfilade.errors import SceneError, SettingsError
 
-SCENES = ("room", "atrium", "gallery", "kitchen")
+SCENES = ("room", "atrium", "gallery", "kitchen", "courtyard")
 PRESETS = ("full", "small")
 
 
@@ -41,7 +41,7 @@ def write_scene(
         `room`: diffuse, a walk of varying speed with rests, 448 frames. `atrium`: mirrors, glass,
         metal and a polished floor, a steady walk, 200 frames. `gallery`: a low sun through blinds, showcases
         and a mirror, 300 frames. `kitchen`: coated, rough and metallic materials under small lamps,
-        300 frames.
+        300 frames. `courtyard`: arcades around an open court under sun and sky, 300 frames.
     folder
         Created if absent; files of the same names are replaced.
     preset

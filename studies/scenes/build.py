@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from studies.scenes import atrium, gallery, kitchen, room
+from studies.scenes import atrium, courtyard, gallery, kitchen, room
 from studies.scenes.presets import PRESETS
 from studies.scenes.walk import write_path
 from studies.scenes.writer import SceneWriter
@@ -12,7 +12,8 @@ from studies.scenes.writer import SceneWriter
 
 def build_scene(name: str, folder: Path, preset_name: str, size: tuple[int, int] | None) -> tuple[Path, Path]:
     """Write `scene.xml` and `camera_path.json` of a known scene and preset; return both paths."""
-    design = {"room": room, "atrium": atrium, "gallery": gallery, "kitchen": kitchen}[name]
+    designs = {"room": room, "atrium": atrium, "gallery": gallery, "kitchen": kitchen, "courtyard": courtyard}
+    design = designs[name]
     preset = PRESETS[preset_name]
     size = size or preset.size
     writer = SceneWriter(folder)

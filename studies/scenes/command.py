@@ -40,7 +40,8 @@ def command(*, name: str, folder: Path, preset: str, size: tuple[int, int] | Non
     """Write a generated scene and its camera path.
 
     room: diffuse. atrium: mirrors, glass, gloss. gallery: low sun through blinds, showcases, a mirror.
-    kitchen: coated, rough and metallic materials under small lamps.
+    kitchen: coated, rough and metallic materials under small lamps. courtyard: arcades around an open
+    court under sun and sky.
     """
     from studies.scenes import write_scene
 

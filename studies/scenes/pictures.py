@@ -88,12 +88,12 @@ def overcast(size: int, strength: float) -> npt.NDArray[np.float32]:
     return np.asarray(strength * image, dtype=np.float32)
 
 
-def horizon(size: int, strength: float, sun: Vector) -> npt.NDArray[np.float32]:
+def horizon(size: int, strength: float, sun: Vector, *, north: float = 0.0) -> npt.NDArray[np.float32]:
     """Return the radiance of a sky in latitude and longitude, (size, size, 3), zenith first.
 
     Columns run from north by east, south and west. The sky is brighter around the sun, whose light travels
-    along `sun`, and the sun itself is left out. Trees stand on the horizon. The north is dark: a scene
-    without windows to the north then wastes no samples on it.
+    along `sun`, and the sun itself is left out. Trees stand on the horizon. The north is scaled by `north`: a
+    scene without windows to the north wastes no samples on it where it is dark.
     """
     u, v = grid(size)
     azimuth, polar = 2 * np.pi * u, np.pi * v
@@ -106,4 +106,4 @@ def horizon(size: int, strength: float, sun: Vector) -> npt.NDArray[np.float32]:
     leaves = blend(linear("#34472a"), linear("#7a8b55"), cloud(u, v, 32, 9))
     image = blend(image, 0.5 * leaves, np.clip((crest - z) / 0.01, 0, 1))
     image = blend(image, 0.25 * linear("#a09a80"), np.clip(-z / 0.02, 0, 1))
-    return np.asarray(strength * image * (y < 0.5)[..., None], dtype=np.float32)
+    return np.asarray(strength * image * np.where(y < 0.5, 1.0, north)[..., None], dtype=np.float32)

@@ -5,7 +5,17 @@ import pytest
 from enfilade.errors import SceneError
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.splits import split_of, splits
-from studies.bench.suite import GENERATED, LARGE, QUICK, QUICK_SCENES, SMALL, found_in, only_for, summary
+from studies.bench.suite import (
+    DENOISED_SPP,
+    GENERATED,
+    LARGE,
+    QUICK,
+    QUICK_SCENES,
+    SMALL,
+    found_in,
+    only_for,
+    summary,
+)
 from support.study_runs import room_job
 
 
@@ -14,7 +24,7 @@ def test_every_generated_scene_is_in_one_split():
     assert not splits()["tuning"].keys() & splits()["held-out"].keys()
     assert all(split_of(name) != "not listed" for name in GENERATED)
     assert {split_of(name) for name in QUICK_SCENES} == {"tuning", "held-out"}
-    assert (split_of("room"), split_of("kitchen"), split_of("my house")) == (
+    assert (split_of("room"), split_of("courtyard"), split_of("my house")) == (
         "tuning",
         "held-out",
         "not listed",
@@ -37,7 +47,9 @@ def test_scenes_of_a_folder(tmp_path):
 
 
 def test_configurations_of_the_suite_exist(tmp_path):
-    known = all_configurations(room_job(tmp_path, 2), traced=(4,), denoised=(1, 2, 4, 8, 16, 32))
+    known = all_configurations(
+        room_job(tmp_path, 2), traced=(4,), denoised=[int(spp) for spp in DENOISED_SPP.split(",")]
+    )
     for patterns in (SMALL, LARGE, QUICK):
         assert len(selected(known, patterns)) >= len(patterns)
     assert only_for("320x180", is_quick=False) == SMALL

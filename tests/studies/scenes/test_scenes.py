@@ -17,8 +17,10 @@ from scene_views import View, folder_bytes, read_path
 from enfilade.camera import load_path
 from enfilade.errors import InputError, SettingsError
 from studies.scenes import PRESETS, SCENES, SceneFiles, write_scene
+from studies.scenes import courtyard_plan as courtyard
 from studies.scenes import gallery_plan as gallery
 from studies.scenes.atrium import walk as atrium_walk
+from studies.scenes.courtyard import walk as courtyard_walk
 from studies.scenes.gallery import walk as gallery_walk
 from studies.scenes.kitchen import walk as kitchen_walk
 from studies.scenes.presets import PRESETS as SIZES
@@ -93,7 +95,13 @@ def test_path_is_rigid_and_complete(name: str, small: dict[str, SceneFiles]) -> 
 
 @pytest.mark.parametrize(
     ("design", "counts"),
-    [(room_walk, (448, 60)), (atrium_walk, (200, 60)), (gallery_walk, (300, 60)), (kitchen_walk, (300, 60))],
+    [
+        (room_walk, (448, 60)),
+        (atrium_walk, (200, 60)),
+        (gallery_walk, (300, 60)),
+        (kitchen_walk, (300, 60)),
+        (courtyard_walk, (300, 60)),
+    ],
 )
 def test_walks_have_their_length_and_no_jerks(design: Callable[..., Any], counts: tuple[int, ...]) -> None:
     assert tuple(design(SIZES[preset])[1] for preset in PRESETS) == counts
@@ -128,7 +136,7 @@ def test_camera_keeps_clear_and_indoors(name: str, look: Look) -> None:
     for frame in range(0, 59, 6):
         distance = look(name, frame).distance
         assert distance.min() > 0.3
-        if name != "gallery":
+        if name not in ("gallery", "courtyard"):
             assert np.isfinite(distance).all()  # no ray leaves through a gap
 
 
@@ -168,6 +176,25 @@ def test_kitchen_has_small_lamps_and_layered_materials(small: dict[str, SceneFil
     assert {e.get("type") for e in root.iter("emitter")} == {"area", "spot"}
     layered = {"principled", "roughplastic", "plastic", "roughconductor", "conductor", "dielectric"}
     assert layered <= {e.get("type") for e in root.iter("bsdf")}
+
+
+def test_the_sky_is_seen_above_the_courtyard_only(look: Look) -> None:
+    views = [look("courtyard", frame) for frame in range(0, 59, 6)]
+    low, high = np.array(courtyard.COURT)
+    for view in views:
+        out = view.rays[np.isinf(view.distance)]
+        above = _crossing(view.eye, out, axis=2, plane=courtyard.PARAPET)[:, :2]  # NaN where it points down
+        assert ((above > low - 0.3) & (above < high + 0.3)).all()
+    assert max(np.isinf(view.distance).mean() for view in views) > 0.02
+
+
+def test_half_of_the_court_is_in_the_sun(loaded: Callable[[str], Any]) -> None:
+    (x0, y0), (x1, y1) = courtyard.COURT
+    x, y = np.meshgrid(np.linspace(x0, x1, 60), np.linspace(y0, y1, 60))
+    points = np.stack([x, y, np.full_like(x, -0.119)], axis=-1).reshape(-1, 3)
+    towards = mi.Vector3f((-np.array(courtyard.SUN) / np.linalg.norm(courtyard.SUN)).tolist())
+    rays = mi.Ray3f(mi.Point3f(points.T.astype(np.float32)), towards)
+    assert 0.3 < np.array(loaded("courtyard").ray_test(rays)).mean() < 0.8
 
 
 @pytest.mark.parametrize("design", [gallery_walk, kitchen_walk])
