@@ -21,7 +21,7 @@ PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixe
 FIRST_FRAME = 11  # where the path is long enough
 LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
-    *(f"denoised-{name}" for name in ("4", "8", "16", "32", "64", "8-accumulated-after")),
+    *(f"denoised-{name}" for name in ("8", "16", "32", "64", "128", "8-accumulated-after")),
     "paper-16", "decoupled-60", "decoupled-15",
 )  # fmt: skip
 LARGE = (
@@ -29,7 +29,7 @@ LARGE = (
     "decoupled-60", "decoupled-15",
 )  # fmt: skip
 QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-15")
-DENOISED_SPP = "4,8,16,32,64"  # those that any of them names
+DENOISED_SPP = "4,8,16,32,64,128"  # those that any of them names
 
 
 @dataclass(frozen=True)
