@@ -22,6 +22,7 @@ from studies.bench.charts import plot_page
 from studies.bench.measures import QUALITIES
 from studies.bench.suite import (
     GENERATED,
+    LARGE_SCENES,
     QUICK_SCENES,
     found_in,
     generated,
@@ -41,7 +42,12 @@ def main() -> int:
     """Run the bench on each scene and size; the exit status is 1 where one fails."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="two scenes, one size, few configurations")
-    parser.add_argument("--scene", nargs="+", choices=GENERATED, help="generated scenes; all by default")
+    parser.add_argument(
+        "--scene",
+        nargs="+",
+        choices=GENERATED,
+        help="generated scenes; all by default, three of large images",
+    )
     parser.add_argument(
         "--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones"
     )
@@ -53,19 +59,19 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
     arguments, options = parser.parse_known_args()
     sizes = arguments.sizes or (["320x180"] if arguments.quick else ["320x180", "1280x720"])
-    names = arguments.scene or (QUICK_SCENES if arguments.quick else GENERATED)
     benches: list[dict[str, Any]] = []
     failed = []
     for size in sizes:
+        is_large = is_large_size(size)
+        names = QUICK_SCENES if arguments.quick else LARGE_SCENES if is_large else GENERATED
         try:
             cases = (
                 found_in(arguments.scenes)
                 if arguments.scenes
-                else generated(names, size, arguments.out / "scenes")
+                else generated(arguments.scene or names, size, arguments.out / "scenes")
             )
         except EnfiladeError as error:
             parser.error(str(error))
-        is_large = is_large_size(size)
         frames = arguments.frames or (LARGE_FRAMES if is_large else FRAMES)
         spp = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
         is_chosen = any(option.startswith("--only") for option in options)

@@ -24,10 +24,7 @@ SMALL = (
     *(f"denoised-{name}" for name in ("8", "16", "32", "64", "128", "8-accumulated-after")),
     "paper-16", "decoupled-60", "decoupled-15",
 )  # fmt: skip
-LARGE = (
-    *(f"denoised-{name}" for name in ("4", "16", "64", "4-accumulated-after")),
-    "decoupled-60", "decoupled-15",
-)  # fmt: skip
+LARGE = ("denoised-8", "denoised-32", "decoupled-60", "decoupled-15")
 QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-15")
 DENOISED_SPP = "4,8,16,32,64,128"  # those that any of them names
 
@@ -158,4 +155,5 @@ def summary(benches: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 GENERATED = SCENES
+LARGE_SCENES = ("gallery", "kitchen", "courtyard")
 QUICK_SCENES = ("room", "courtyard")  # one of each split
