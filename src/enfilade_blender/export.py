@@ -15,7 +15,7 @@ from enfilade_blender.lights import emitters, is_portal, note_seen, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
-from enfilade_blender.open_file import open_source
+from enfilade_blender.open_file import files_used, open_source
 from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import Element, plugin, write_scene
@@ -75,6 +75,7 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
         "version": 1,
         "blender": bpy.app.version_string.split()[0],
         "source": job.source.name,
+        "files": files_used(job),
         "scene": scene.name,
         "camera": scene.camera.name if scene.camera else None,
         "fps": scene.render.fps / scene.render.fps_base,

@@ -60,6 +60,13 @@ def open_source(job: Job, notes: Notes) -> Selection:
     return _select(job)
 
 
+def files_used(job: Job) -> list[str]:
+    """Absolute paths of the libraries, images and other files that the open source uses."""
+    files = {Path(name).resolve() for name in bpy.utils.blend_paths(absolute=True)}
+    files.discard(job.source.resolve())
+    return sorted(str(file) for file in files if file.is_file() and _is_allowed(file, job))
+
+
 def _take_camera(notes: Notes) -> None:
     """Choose the first camera, and the frames of its animation: importers leave the scene without them."""
     scene = bpy.context.scene

@@ -3,6 +3,7 @@
 import json
 import shutil
 from functools import cache
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -25,6 +26,7 @@ FILES = (
     "names",
     "missing_image",
     "library",
+    "image_file",
     "procedural",
     "emission",
     "lamps_in_view",
@@ -153,6 +155,15 @@ def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, fi
     assert (code, "outside the allowed folders" in error["what"]) == (3, True)
     code, _, _ = blender.job(apart, "allowed", library_folders=[str(files["library"].parent)])
     assert code == 0
+
+
+def test_libraries_and_images_are_listed(exported):
+    names = {"library": "shelf of a library.blend", "image_file": "picture é.png"}
+    for file, name in names.items():
+        _, result = exported(file)
+        assert [Path(one).name for one in result["files"]] == [name]
+        assert Path(result["files"][0]).is_absolute()
+    assert exported("missing_image")[1]["files"] == []
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])

@@ -37,6 +37,7 @@ RESULT = {
     "view": {"display": "sRGB", "view_transform": "Standard", "look": "None"},
     "counts": {"objects": 3, "instances": 4, "triangles": 500, "materials": 2, "textures": 1},
     "notes": [],
+    "files": [],
 }
 
 

@@ -244,6 +244,20 @@ def test_a_change_of_the_source_is_noticed(shot):
     assert before.differences(source, Choices()) == [f"{source} has changed since it was imported"]
 
 
+def test_a_change_of_an_image_or_library_is_noticed(load, shot, tmp_path):
+    wood, shelf = tmp_path / "wood.png", tmp_path / "shelf.blend"
+    wood.write_bytes(b"oak")
+    shelf.write_bytes(b"BLENDER")
+    source = shot(files=[str(wood), str(shelf), str(tmp_path / "moved away.png")])
+    recorded = Source.read(load(source).folder)
+    assert [other.file for other in recorded.others] == [str(wood), str(shelf)]
+    os.utime(wood, (1.0, 1.0))
+    shelf.unlink()  # the imported scene stands for it
+    assert recorded.differences(source, Choices()) == []
+    wood.write_bytes(b"elm")
+    assert recorded.differences(source, Choices()) == [f"{wood} has changed since it was imported"]
+
+
 IMPORT = """
 import signal
 import sys

@@ -62,6 +62,8 @@ class ImportedScene:
         Of ``objects``, ``instances``, ``triangles``, ``materials``, ``textures``.
     notes : tuple of Note
         How the parts of the file were carried over.
+    files : tuple of Path
+        Libraries and images that the file uses.
     """
 
     folder: Path
@@ -76,6 +78,7 @@ class ImportedScene:
     view: SourceView
     counts: Mapping[str, int]
     notes: tuple[Note, ...]
+    files: tuple[Path, ...] = ()
 
     @property
     def scene_file(self) -> Path:
@@ -180,4 +183,5 @@ def _of(folder: Path, table: Mapping[str, Any]) -> ImportedScene:
         view=SourceView(*(printable(str(view[key])) for key in ("display", "view_transform", "look"))),
         counts={printable(str(name)): int(count) for name, count in table["counts"].items()},
         notes=tuple(map(Note.from_json, table["notes"])),
+        files=tuple(map(Path, table.get("files", ()))),  # absent in scenes of earlier versions
     )

@@ -20,7 +20,7 @@ from enfilade.scene.blender.find import Blender, find_blender
 from enfilade.scene.blender.imported import SETTINGS_FILE, ImportedScene, SourceView
 from enfilade.scene.blender.notes import Note, NoteKind, grouped
 from enfilade.scene.blender.process import RESULT_FILE, cpu_of_children_s, run_job
-from enfilade.scene.blender.source import Choices, Source, check_source
+from enfilade.scene.blender.source import Choices, FileState, Source, check_source
 from enfilade.settings import LimitSettings, VideoSettings
 
 COLORS = "colormanagement"  # folder of the configuration of OpenColorIO, in Blender and in the scene folder
@@ -74,7 +74,8 @@ def import_file(
         if is_strict:
             check_strict(imported)
         wall_s, cpu_s = time.monotonic() - began, cpu_of_children_s() - cpu_began
-        replace(before, wall_s=round(wall_s, 2), cpu_s=round(cpu_s, 2)).write(beside)
+        others = tuple(FileState.of_file(file) for file in imported.files if file.is_file())
+        replace(before, others=others, wall_s=round(wall_s, 2), cpu_s=round(cpu_s, 2)).write(beside)
     return replace(imported, folder=out)
 
 

@@ -1,4 +1,4 @@
-"""The file that a scene was imported from: its checksum and choices, to know whether it has changed since."""
+"""The files that a scene was imported from: checksums and choices, to know whether they have changed."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class Choices:
 
 
 @dataclass(frozen=True)
-class Source:
-    """A file at the time when it was imported.
+class FileState:
+    """A file at the time when it was read.
 
     Attributes
     ----------
@@ -77,22 +77,15 @@ class Source:
         Its absolute path.
     bytes, mtime_ns : int
     sha256 : str
-    choices : dict
-        See :class:`Choices`.
-    wall_s, cpu_s : float
-        Time of the import.
     """
 
     file: str
     bytes: int
     mtime_ns: int
     sha256: str
-    choices: dict[str, Any] = field(default_factory=dict)
-    wall_s: float = 0.0
-    cpu_s: float = 0.0
 
     @staticmethod
-    def of(file: Path, choices: Choices) -> Source:
+    def of_file(file: Path) -> FileState:
         """The present state of a file.
 
         Raises
@@ -106,7 +99,45 @@ class Source:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise SceneError(f"can't read {file}: {error.strerror}") from error
-        return Source(str(file.resolve()), status.st_size, status.st_mtime_ns, digest, _plain(choices))
+        return FileState(str(file.resolve()), status.st_size, status.st_mtime_ns, digest)
+
+    def has_changed(self, file: Path) -> bool:
+        """Whether a file has other content; one that was copied or touched has not."""
+        status = file.stat()
+        if (status.st_size, status.st_mtime_ns) == (self.bytes, self.mtime_ns):
+            return False
+        return status.st_size != self.bytes or FileState.of_file(file).sha256 != self.sha256
+
+
+@dataclass(frozen=True)
+class Source(FileState):
+    """A file at the time when it was imported.
+
+    Attributes
+    ----------
+    choices : dict
+        See :class:`Choices`.
+    others : tuple of FileState
+        Libraries and images that it uses.
+    wall_s, cpu_s : float
+        Time of the import.
+    """
+
+    choices: dict[str, Any] = field(default_factory=dict)
+    others: tuple[FileState, ...] = ()
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+
+    @staticmethod
+    def of(file: Path, choices: Choices) -> Source:
+        """The present state of a file, without others.
+
+        Raises
+        ------
+        SceneError
+            It can't be read.
+        """
+        return Source(**asdict(FileState.of_file(file)), choices=_plain(choices))
 
     @staticmethod
     def read(folder: Path) -> Source:
@@ -119,7 +150,9 @@ class Source:
         """
         file = folder / SOURCE_FILE
         try:
-            return Source(**read_json(file))
+            table = read_json(file)
+            others = tuple(FileState(**other) for other in table.pop("others", ()))
+            return Source(**table, others=others)
         except TypeError as error:
             raise RunFolderError(f"{file} is damaged ({error}); delete {folder}") from error
 
@@ -128,12 +161,12 @@ class Source:
         write_json(folder / SOURCE_FILE, asdict(self))
 
     def differences(self, file: Path, choices: Choices) -> list[str]:
-        """What has changed since the import; a file that was copied or touched has not.
+        """What has changed since the import.
 
         Parameters
         ----------
         file
-            If it is missing, the imported scene stands for it.
+            It must exist. For others that are missing the imported scene stands.
         choices
             That are wanted now.
         """
@@ -143,12 +176,11 @@ class Source:
             for name, value in now.items()
             if self.choices.get(name) != value
         ]
-        status = file.stat()
-        if (status.st_size, status.st_mtime_ns) != (self.bytes, self.mtime_ns):
-            is_same = status.st_size == self.bytes and Source.of(file, choices).sha256 == self.sha256
-            if not is_same:
-                changes.append(f"{file} has changed since it was imported")
-        return changes
+        others = [(Path(other.file), other) for other in self.others]
+        files = [(file, self), *((path, other) for path, other in others if path.is_file())]
+        return changes + [
+            f"{path} has changed since it was imported" for path, state in files if state.has_changed(path)
+        ]
 
 
 def _plain(choices: Choices) -> dict[str, Any]:
