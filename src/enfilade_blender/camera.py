@@ -95,12 +95,6 @@ def _focus(camera: Any, graph: Any) -> float:
 def _note_lenses(views: list[View], selection: Selection, notes: Notes) -> None:
     for name in dict.fromkeys(view.name for view in views):
         lenses = [view.lens for view in views if view.name == name]
-        if any("principal_point" in lens for lens in lenses):
-            what, effect = (
-                "in the camera path; used where the renderer has it",
-                "else the picture is framed without the shift",
-            )
-            notes.add("approximated", name, "Lens shift", what, effect)
         if any("aperture_radius" in lens for lens in lenses):
             what = "in the camera path; used where the renderer has lenses"
             notes.add("not-carried", name, "Depth of field", what, "else everything is in focus")

@@ -33,7 +33,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import image, lanes, to_float, to_half
-from enfilade.camera.pinhole import Camera
+from enfilade.camera.pinhole import CENTRE, Camera
 from enfilade.errors import InputError
 from enfilade.files import write_json
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
@@ -248,7 +248,8 @@ def _weights(kind: SampleFilter, side: int) -> npt.NDArray[np.float64]:
 def _facts(camera: Camera | None) -> list[Any] | None:
     if camera is None:
         return None
-    return [camera.world_from_camera.ravel().tolist(), camera.fov_deg, camera.width, camera.height]
+    shift = [] if camera.principal_point == CENTRE else [camera.principal_point]
+    return [camera.world_from_camera.ravel().tolist(), camera.fov_deg, camera.width, camera.height, *shift]
 
 
 def _digest(key: Any) -> str:

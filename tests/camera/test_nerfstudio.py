@@ -30,6 +30,18 @@ def test_poses_are_read_bit_by_bit(write, shape):
         assert camera.fov_deg == 50.0
 
 
+def test_lens_shift_is_read(write):
+    shifted = document()
+    shifted["camera_path"][1]["principal_point"] = [0.5, 0.7]
+    assert [camera.principal_point for camera in load_path(write(shifted)).cameras[:2]] == [
+        (0.5, 0.5),
+        (0.5, 0.7),
+    ]
+    shifted["camera_path"][2]["principal_point"] = [0.5]
+    with pytest.raises(CameraPathError, match=r"frame 3: principal_point is \[0.5\]; expected a list of 2"):
+        load_path(write(shifted))
+
+
 def test_another_frame_rate_keeps_the_frames(write):
     assert load_path(write(document(fps=None, seconds=2.5))).fps == 2.0
     path = load_path(write(document(fps=None)), fps=60.0)

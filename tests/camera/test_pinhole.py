@@ -12,8 +12,8 @@ from enfilade.errors import CameraPathError
 coordinates = st.tuples(*[st.floats(-100, 100)] * 3)
 
 
-def a_camera(width=640, height=480, fov_deg=50.0, pose=None):
-    return Camera(look_at((1, 2, 3), (0, 1, 0)) if pose is None else pose, fov_deg, width, height)
+def a_camera(width=640, height=480, fov_deg=50.0, pose=None, **shift):
+    return Camera(look_at((1, 2, 3), (0, 1, 0)) if pose is None else pose, fov_deg, width, height, **shift)
 
 
 def test_axes_and_vertical_field_of_view():
@@ -22,6 +22,17 @@ def test_axes_and_vertical_field_of_view():
     pixels = [(320, 240, 1), (640, 240, 1), (320, 480, 1)]  # centre, right edge, bottom edge
     rays = np.array(pixels) @ camera.direction_from_pixel.T
     np.testing.assert_allclose(rays, [(0, 0, -1), (4 / 3, 0, -1), (0, -1, -1)], atol=1e-12)
+
+
+def test_a_shifted_lens_shows_another_part_of_the_image_plane():
+    whole = a_camera(640, 480)
+    fov_deg = math.degrees(2 * math.atan(0.5 * 240 / whole.focal_px))
+    part = a_camera(320, 240, fov_deg, principal_point=(0.5 * 640 / 320, (0.5 * 480 - 200) / 240))
+    corner = np.array([0, 200, 0])  # of the part in the whole
+    pixels = np.array([(0, 0, 1), (320, 240, 1), (31.5, 7.5, 1)])
+    expected = (pixels + corner) @ whole.direction_from_pixel.T
+    np.testing.assert_allclose(pixels @ part.direction_from_pixel.T, expected, atol=1e-12)
+    assert not part.is_same_view(a_camera(320, 240, fov_deg))
 
 
 @given(coordinates, coordinates, st.floats(1, 170), st.floats(0, 1), st.floats(0, 1), st.floats(0.01, 1000))
@@ -91,6 +102,11 @@ def test_poses_of_four_digits_are_rigid():
 def test_numbers_out_of_range(fov_deg, size):
     with pytest.raises(CameraPathError):
         a_camera(*size, fov_deg=fov_deg)
+
+
+def test_a_principal_point_must_be_finite():
+    with pytest.raises(CameraPathError, match="principal point"):
+        a_camera(principal_point=(0.5, math.inf))
 
 
 def test_same_views():

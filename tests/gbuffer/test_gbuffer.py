@@ -1,5 +1,7 @@
 """The G-buffer against exact rays in float64."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ SCENES = {
     "ball": (ball(), slide(1).cameras[0]),
     "room": (room(), room_walk(5).cameras[1]),
     "specular room": (room(specular=True), room_walk(5).cameras[3]),
+    "lens shift": (room(), replace(room_walk(5).cameras[1], principal_point=(0.4, 0.75))),
 }
 
 

@@ -28,8 +28,15 @@ def settings(**tables):
     return Settings.from_tables(tables, [*SECTIONS, ToySettings])
 
 
+def shifted(path):
+    """A path whose last camera has a shifted lens."""
+    last = dataclasses.replace(path.cameras[-1], principal_point=(0.5, 0.75))
+    return dataclasses.replace(path, cameras=(*path.cameras[:-1], last))
+
+
 def test_the_way_through_json_changes_nothing(tmp_path):
     path = slide(4, cuts=(2,))
+    path = shifted(path)
     cameras = [dataclasses.replace(path.cameras[0], fov_deg=np.float64(50)), *path.cameras[1:]]
     job = toy_job(tmp_path, path=dataclasses.replace(path, cameras=tuple(cameras), fps=24), toy={"gain": 2.0})
     again = Job.from_json(json.loads(json.dumps(job.to_json())))
@@ -58,6 +65,7 @@ def test_settings_that_the_method_does_not_read_do_not_count(tmp_path):
         ("settings", lambda job: dataclasses.replace(job, settings=settings(toy={"gain": 2.0}))),
         ("settings", lambda job: dataclasses.replace(job, settings=settings(output={"layers": "Z"}))),
         ("path", lambda job: dataclasses.replace(job, path=slide(5))),
+        ("path", lambda job: dataclasses.replace(job, path=shifted(job.path))),
         ("path", lambda job: dataclasses.replace(job, path=slide(4, cuts=(2,)))),
         ("path", lambda job: dataclasses.replace(job, path=slide(4, size=(9, 6)))),
         ("scene", lambda job: dataclasses.replace(job, scene=other_scene(job.scene))),

@@ -42,11 +42,11 @@ def pixel_centres(camera: Camera) -> np.ndarray:
 def ray_directions(camera: Camera, at: np.ndarray | None = None) -> np.ndarray:
     """World directions of unit depth through image points (..., 2), float64."""
     at = pixel_centres(camera) if at is None else at
-    f = camera.focal_px
+    f, (x, y) = camera.focal_px, camera.principal_point
     local = np.stack(
         [
-            (at[..., 0] - camera.width / 2) / f,
-            -(at[..., 1] - camera.height / 2) / f,
+            (at[..., 0] - x * camera.width) / f,
+            -(at[..., 1] - y * camera.height) / f,
             -np.ones(at.shape[:-1]),
         ],
         axis=-1,
@@ -92,9 +92,9 @@ def projected(camera: Camera, world: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Image coordinates (..., 2) and depth of world points, float64."""
     local = (world - camera.eye) @ camera.world_from_camera[:3, :3]
     depth = -local[..., 2]
-    f = camera.focal_px
-    x = camera.width / 2 + f * local[..., 0] / depth
-    y = camera.height / 2 - f * local[..., 1] / depth
+    f, (centre_x, centre_y) = camera.focal_px, camera.principal_point
+    x = centre_x * camera.width + f * local[..., 0] / depth
+    y = centre_y * camera.height - f * local[..., 1] / depth
     return np.stack([x, y], axis=-1), depth
 
 

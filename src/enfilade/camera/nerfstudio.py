@@ -1,9 +1,10 @@
 """nerfstudio's ``camera_path.json``: a camera for every frame.
 
 Source: ``get_path_from_json`` in nerfstudio/cameras/camera_paths.py, and the export of its viewer. Poses are
-row-major 4x4 matrices from camera to world in OpenGL axes, ``fov`` is vertical, in degrees. Two keys are
+row-major 4x4 matrices from camera to world in OpenGL axes, ``fov`` is vertical, in degrees. Three keys are
 additions of ours: ``first_frame`` is the number of the first frame, ``cuts`` lists the frames that begin a
-shot, counted from 1. Other keys, of radiance fields (``crop``, ``render_time``) and of the viewer
+shot, counted from 1, and ``principal_point`` of a frame shifts its lens (shares of width and height, from the
+top left). Other keys, of radiance fields (``crop``, ``render_time``) and of the viewer
 (``keyframes``), are ignored.
 """
 
@@ -16,9 +17,10 @@ import numpy as np
 from enfilade.camera.cuts import find_cuts
 from enfilade.camera.fields import FOV_DEG, FPS, JsonObject
 from enfilade.camera.path import CameraPath
-from enfilade.camera.pinhole import Camera
+from enfilade.camera.pinhole import CENTRE, Camera
 from enfilade.errors import CameraPathError
 
+PRINCIPAL_POINT = (-4.0, 5.0)
 FRAME_NUMBER = (-1_000_000.0, 1_000_000.0)
 
 
@@ -52,7 +54,8 @@ def _marked_cuts(document: JsonObject, count: int) -> frozenset[int]:
 def _camera(frame: JsonObject, size: tuple[int, int]) -> Camera:
     pose = frame.array("camera_to_world", (16,), (4, 4)).reshape(4, 4)
     fov_deg = frame.number("fov", FOV_DEG)
+    x, y = frame.array("principal_point", (2,), within=PRINCIPAL_POINT, default=CENTRE)
     try:
-        return Camera(pose, fov_deg, *size)
+        return Camera(pose, fov_deg, *size, principal_point=(float(x), float(y)))
     except CameraPathError as error:
         raise frame.error(str(error)) from error

@@ -17,6 +17,7 @@ from enfilade.errors import CameraPathError
 
 Matrix = npt.NDArray[np.float64]
 LAST_ROW, ROW_TOLERANCE = (0.0, 0.0, 0.0, 1.0), 1e-5  # of a pose
+CENTRE = (0.5, 0.5)  # principal point of a camera without lens shift
 RIGID_TOLERANCE = 1e-3  # largest entry of |R^T R - 1|; exporters write 5 to 8 digits
 
 
@@ -32,6 +33,9 @@ class Camera:
         Vertical field of view, degrees, in (0, 180).
     width, height : int
         Pixels. Pixels are square.
+    principal_point : tuple of float
+        Where the optical axis meets the image: shares of width and height, from the top left. Other points
+        than the centre shift the lens: vertical lines stay parallel in a view that shows more above.
 
     Raises
     ------
@@ -43,6 +47,7 @@ class Camera:
     fov_deg: float
     width: int
     height: int
+    principal_point: tuple[float, float] = CENTRE
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.world_from_camera, np.float64)
@@ -51,6 +56,8 @@ class Camera:
             raise CameraPathError(f"the field of view is {self.fov_deg} deg; it must lie in (0, 180)")
         if self.width < 1 or self.height < 1:
             raise CameraPathError(f"an image of {self.width}x{self.height} pixels can't be rendered")
+        if not np.isfinite(self.principal_point).all():
+            raise CameraPathError(f"the principal point is {self.principal_point}; it must be finite")
         object.__setattr__(self, "world_from_camera", matrix)
 
     @cached_property
@@ -60,7 +67,7 @@ class Camera:
 
     @property
     def pixel_angle(self) -> float:
-        """Angle between the rays of adjacent pixels at the image centre, radians."""
+        """Angle between the rays of adjacent pixels at the principal point, radians."""
         return 1.0 / self.focal_px
 
     @property
@@ -75,7 +82,7 @@ class Camera:
         Depth is measured along the optical axis: ``eye + depth * (P @ (x, y, 1))`` is the point.
         """
         f = self.focal_px
-        x, y = 0.5 * self.width, 0.5 * self.height
+        x, y = self.principal_point[0] * self.width, self.principal_point[1] * self.height
         camera_from_pixel = np.array([[1.0 / f, 0.0, -x / f], [0.0, -1.0 / f, y / f], [0.0, 0.0, -1.0]])
         result: Matrix = self.world_from_camera[:3, :3] @ camera_from_pixel
         return result
@@ -88,7 +95,9 @@ class Camera:
 
     def is_same_view(self, other: Camera) -> bool:
         """Whether pose and intrinsics are exactly equal."""
-        intrinsics = [(camera.width, camera.height, camera.fov_deg) for camera in (self, other)]
+        intrinsics = [
+            (camera.width, camera.height, camera.fov_deg, camera.principal_point) for camera in (self, other)
+        ]
         is_same_pose = np.array_equal(self.world_from_camera, other.world_from_camera)
         return is_same_pose and intrinsics[0] == intrinsics[1]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from enfilade import __version__
 from enfilade.camera.path import CameraPath
-from enfilade.camera.pinhole import Camera
+from enfilade.camera.pinhole import CENTRE, Camera
 from enfilade.errors import RunFolderError, SettingsError
 from enfilade.files import read_json
 from enfilade.images import check_encodable
@@ -163,6 +163,7 @@ class Job:
                 "cuts": sorted(path.cuts),
                 "poses": [camera.world_from_camera.ravel().tolist() for camera in path.cameras],
                 "fov_deg": [camera.fov_deg for camera in path.cameras],
+                "principal_points": [list(camera.principal_point) for camera in path.cameras],
             },
         }
 
@@ -180,8 +181,10 @@ class Job:
         path = table["path"]
         width, height = map(int, path["size"])
         poses = np.array(path["poses"], np.float64).reshape(-1, 4, 4)
+        points = path.get("principal_points", [CENTRE] * len(poses))  # absent in runs of earlier versions
         cameras = tuple(
-            Camera(pose, float(fov), width, height) for pose, fov in zip(poses, path["fov_deg"], strict=True)
+            Camera(pose, float(fov), width, height, (float(x), float(y)))
+            for pose, fov, (x, y) in zip(poses, path["fov_deg"], points, strict=True)
         )
         numbers = tuple(int(number) for number in path["numbers"])
         kinds = list(dict.fromkeys([*SECTIONS, *open_method(table["method"]).settings]))
@@ -223,6 +226,8 @@ def path_identity(path: CameraPath) -> dict[str, Any]:
     for camera in path.cameras:
         digest.update(camera.world_from_camera.tobytes())
         digest.update(repr(float(camera.fov_deg)).encode())
+        if camera.principal_point != CENTRE:
+            digest.update(repr(camera.principal_point).encode())
     return {
         "size": [path.width, path.height],
         "fps": path.fps,

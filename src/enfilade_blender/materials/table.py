@@ -166,7 +166,8 @@ OBJECTS = (
     ),
     ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
     ("Animated objects, lamps, materials and worlds", "not carried", "as in the first frame"),
-    ("Gamma, curves and white balance of the view; frame step", "not carried", "left out"),
+    ("Gamma, curves and white balance of the view", "not carried", "left out"),
+    ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),
 )
