@@ -32,6 +32,10 @@ MATERIALS = {
     f'<bsdf type="roughconductor">{ROUGH}</bsdf></bsdf>',
     "mask": f'<bsdf type="mask"><float name="opacity" value="1"/>'
     f'<bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
+    "translucent": f'<bsdf type="principledthin">{TINT.format("base_color")}'
+    '<float name="diff_trans" value="1.6"/></bsdf>',
+    "one-sided, from behind": '<boolean name="flip_normals" value="true"/><bsdf type="mask">'
+    f'<float name="opacity" value="0.5"/><bsdf type="diffuse">{TINT.format("reflectance")}</bsdf></bsdf>',
     "twosided": f'<bsdf type="twosided"><bsdf type="roughplastic">{ROUGH}</bsdf></bsdf>',
     "glowing air": '<bsdf type="null"/><emitter type="area"><rgb name="radiance" value="0.4"/></emitter>',
 }

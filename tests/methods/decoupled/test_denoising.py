@@ -33,6 +33,15 @@ def test_the_mean_of_skewed_samples_is_kept(chance):
     assert found.mean() == pytest.approx(light.color.mean(), rel=0.01)
 
 
+def test_a_difference_of_lobes_keeps_its_negative_light():
+    sign = np.where(np.arange(160) < 80, 1.0, -0.5).astype(np.float32)
+    light = noisy(2)
+    found = denoised(Shading(light.color * sign[:, None], light.variance * np.square(sign)))
+    assert found[:, :70].mean() == pytest.approx(1.0, rel=0.02)
+    assert found[:, 90:].mean() == pytest.approx(-0.5, rel=0.02)
+    assert found[:, 90:].std() < 0.1
+
+
 def test_one_outlier_does_not_tint_the_surface():
     light = noisy(2)
     light.color[60, 80] = 1e5

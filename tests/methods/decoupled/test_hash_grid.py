@@ -175,6 +175,10 @@ def test_entries_of_few_samples_are_not_uploaded(count):
     assert entries.upload() is None
 
 
+def test_entries_whose_paths_found_no_light_are_not_uploaded():
+    assert grid_at((0.3, 0.3, 0.3), 1.0, light=0.0) is None
+
+
 def test_entries_with_most_of_their_light_from_one_path_are_not_uploaded():
     light = np.ones((14, 3))
     light[5] = 8.0

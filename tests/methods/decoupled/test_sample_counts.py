@@ -49,6 +49,7 @@ def test_light_of_large_frames_has_fewer_pixels():
 
     assert size(320, 180) == (320, 180)
     assert size(1280, 720) == size(1920, 1080) == size(3840, 2160) == (640, 360)
+    assert size(4096, 2160) == size(2048, 1080) == (683, 360)  # the outermost columns are in view
     assert size(2, 1_000_000) == (1, 333_333)  # never without pixels
     assert size(320, 180, irradiance_camera) == (640, 360)
     assert size(1280, 720, irradiance_camera) == size(3840, 2160, irradiance_camera) == (1280, 720)

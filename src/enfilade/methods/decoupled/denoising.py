@@ -23,7 +23,8 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     The denoiser loses some percent of the light where samples are skewed, and adds a third to regions two
     pixels wide. The difference from its input, smoothed along surfaces over a range that leaves little noise,
     is added to its result, as far as it exceeds its own standard error. Outliers are limited, so that no
-    single path tints a surface.
+    single path tints a surface. The denoiser takes no negative light: specular lobes that are a difference
+    have it, and it is denoised apart.
 
     Parameters
     ----------
@@ -45,12 +46,15 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     # Denoise the part of the image that has light.
     white = np.repeat(where[..., None], 3, axis=2).astype(np.float32)
     normal = np.where(where[..., None], geometry.normal, np.float32(0))
-    clean = np.zeros_like(light.color)
-    for part in _bounding_box(np.any(light.color, axis=2)):
-        clean[part] = denoise(light.color[part], white[part], normal[part], quality=quality)
+    above, below = np.zeros_like(light.color), np.zeros_like(light.color)
+    for sign, clean in ((1, above), (-1, below)):
+        signed = np.maximum(sign * light.color, np.float32(0))
+        for part in _bounding_box(np.any(signed, axis=2)):
+            clean[part] = denoise(signed[part], white[part], normal[part], quality=quality)
 
     # Smooth the difference.
-    limited = np.minimum(light.color, np.float32(outlier) * clean)
+    clean, lowest = above - below, -np.float32(outlier) * below
+    limited = np.clip(light.color, lowest, np.float32(outlier) * above)
     guide = guide_of(geometry, np.where(where, geometry.shape_index, np.uint32(0)))
     difference, variance = smooth(
         lanes(limited - clean), lanes(light.variance), guide, levels=LEVELS, deviations=None
@@ -60,7 +64,7 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     squared = dr.square(dr.dot(difference, Array3f(*REC709_LUMINANCE)))
     correction = difference * squared / dr.maximum(squared + variance, 1e-20)
     corrected: F32 = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
-    return np.maximum(corrected, np.float32(0))
+    return np.maximum(corrected, lowest)
 
 
 def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:

@@ -31,7 +31,11 @@ def light_reduction(pixels: int) -> int:
 
 
 def reduced(camera: Camera, factor: int) -> Camera:
-    """A camera with width and height divided by a factor and rounded down; itself where that is 1."""
+    """A camera with width and height divided by a factor, which sees the whole frame; itself where that is 1.
+
+    The height is rounded down; the width is rounded up, by the aspect: the outermost columns are in view.
+    """
     if factor == 1:
         return camera
-    return replace(camera, width=max(camera.width // factor, 1), height=max(camera.height // factor, 1))
+    height = max(camera.height // factor, 1)
+    return replace(camera, width=-(-camera.width * height // camera.height), height=height)

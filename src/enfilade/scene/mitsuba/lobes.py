@@ -23,7 +23,8 @@ from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured"}  # not split by a context
-NOT_DIFFUSE = ("metallic", "spec_trans")  # attributes: shares of the base colour without a diffuse lobe
+# Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
+NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
 CLEAR = {"SmoothDielectric", "ThinDielectric"}  # their sample chooses reflection first
@@ -52,6 +53,10 @@ class Lobes:
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
         self._whole = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
+        self._sides = tuple(
+            bsdf_table(scene, lambda bsdf, side=side: _is_diffuse_on(bsdf, side))
+            for side in (flags.FrontSide, flags.BackSide)
+        )
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
         self._specular_albedo = self._mean_specular_albedo(scene)
@@ -59,7 +64,7 @@ class Lobes:
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._whole, self._lambertian, self._clear, self._specular_albedo
+        return self._whole, self._lambertian, self._sides, self._clear, self._specular_albedo
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -93,9 +98,12 @@ class Lobes:
             is_whole &= is_diffuse
             own = bsdf.eval_diffuse_reflectance(si, is_whole)
             own *= _opacity(si, bsdf, is_whole)
-            for name in NOT_DIFFUSE:
+            for name, scale in NOT_DIFFUSE.items():
                 has_it = is_whole & bsdf.has_attribute(name, is_whole)
-                own *= 1.0 - dr.select(has_it, bsdf.eval_attribute_1(name, si, has_it), 0.0)
+                own *= 1.0 - dr.select(has_it, scale * bsdf.eval_attribute_1(name, si, has_it), 0.0)
+            own = dr.select(
+                dr.select(si.wi.z > 0.0, *(_of(side, si, bsdf) for side in self._sides)), own, 0.0
+            )
             albedo = dr.select(is_whole, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
@@ -233,6 +241,14 @@ def _albedo_entry(number: Any, cosine: Any) -> Any:
 def _classes(bsdf: Any) -> set[str]:
     """Mitsuba's classes of a BSDF and of those nested in it."""
     return {n.class_name() for n in mi.traverse(bsdf).hierarchy if isinstance(n, mi.BSDF)}
+
+
+def _is_diffuse_on(bsdf: Any, side: Any) -> bool:
+    """Whether a BSDF has a diffuse lobe on a side of the surface."""
+    parts = [bsdf.flags(i) for i in range(bsdf.component_count())]
+    return any(
+        has_lobe(part, "DiffuseReflection", "DiffuseTransmission") and part & int(side) for part in parts
+    )
 
 
 def _opacity(si: Any, bsdf: Any, active: Any) -> Any:
