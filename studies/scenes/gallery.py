@@ -1,7 +1,7 @@
 """GALLERY: a museum hall with a low sun behind slatted blinds, showcases, gilded frames and a mirror.
 
 Stripes of shadow fall on floor, walls, a painting and pedestals, near the blinds and far from them. x runs
-east along the hall, y north. No constant of enfilade was chosen on this scene.
+east along the hall, y north.
 """
 
 from __future__ import annotations

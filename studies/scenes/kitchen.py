@@ -1,7 +1,7 @@
 """KITCHEN: coated, rough and metallic materials under many small lamps, at night.
 
 No sun and no sky: pendants, strips below cupboards, discs in the ceiling and a spot light. x runs east,
-y north. No constant of enfilade was chosen on this scene.
+y north.
 """
 
 from __future__ import annotations
