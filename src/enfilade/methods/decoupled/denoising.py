@@ -63,8 +63,9 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     # Add it as far as it is significant.
     squared = dr.square(dr.dot(difference, Array3f(*REC709_LUMINANCE)))
     correction = difference * squared / dr.maximum(squared + variance, 1e-20)
-    corrected: F32 = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
-    return np.maximum(corrected, lowest)
+    corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
+    bounded: F32 = np.maximum(corrected, lowest)
+    return bounded
 
 
 def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:

@@ -53,9 +53,9 @@ class Lobes:
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
         self._whole = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
-        self._sides = tuple(
-            bsdf_table(scene, lambda bsdf, side=side: _is_diffuse_on(bsdf, side))
-            for side in (flags.FrontSide, flags.BackSide)
+        self._sides = (
+            bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.FrontSide)),
+            bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.BackSide)),
         )
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
