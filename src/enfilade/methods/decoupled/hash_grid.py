@@ -208,8 +208,8 @@ class Entries:
         variance = np.maximum(self.squares / count - np.square(mean), 0.0) / (count - 1)
         error = np.sqrt(variance) / np.maximum(mean, QUANTUM)
 
-        # Choose the entries that no single path dominates. Entries without light are left out, too: a few paths
-        # miss rare light by chance, and entries that have found it are often left out as dominated by one path.
+        # Choose the entries that no single path dominates, but for those without light: a few paths miss rare
+        # light by chance, and entries that have found it are often left out.
         chosen = np.flatnonzero((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))
         if not len(chosen):
             return None
