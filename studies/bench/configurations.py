@@ -24,8 +24,21 @@ BASELINES = {
     "denoised": "studies.bench.baselines:Denoised",
     "interpolated": "studies.bench.baselines:Interpolated",
 }
+NO_SPLITS = {"split_percent": 100.0}
 PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's methods: settings that differ
     "paper-16": ("paper", {"sampling": {"spp": 16}}),
+    "paper-16-unsplit": ("paper", {"sampling": {"spp": 16}, "masks": NO_SPLITS}),
+    **{
+        f"paper-16-uniform-{spacing}": (
+            "paper",
+            {
+                "sampling": {"spp": 16},
+                "keyframes": {"placement": "uniform", "spacing": spacing},
+                "masks": NO_SPLITS,
+            },
+        )
+        for spacing in (25, 12, 6)
+    },
     **{
         f"decoupled-{quality:g}": ("decoupled", {"decoupled": {"quality": quality}})
         for quality in (60.0, 15.0, 10.0, 8.0)

@@ -13,7 +13,15 @@ from enfilade.images import read_exr
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Silence
 from enfilade.runs.render import render
-from enfilade.settings import DecoupledSettings, ReferenceSettings, SampleFilter, SamplingSettings
+from enfilade.settings import (
+    DecoupledSettings,
+    KeyframeSettings,
+    MaskSettings,
+    Placement,
+    ReferenceSettings,
+    SampleFilter,
+    SamplingSettings,
+)
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
 from studies.bench.bench import Place, bench, undecided
@@ -167,6 +175,10 @@ def test_all_configurations(tmp_path):
     assert (denoised.spp, paper.spp) == (2, 16)
     assert decoupled.job.settings[DecoupledSettings].quality == 15.0
     assert not decoupled.is_baseline
+    unsplit, uniform = (found[names.index(f"paper-16-{name}")].job for name in ("unsplit", "uniform-6"))
+    assert unsplit.settings[MaskSettings].split_percent == 100.0
+    assert uniform.settings[KeyframeSettings].placement is Placement.UNIFORM
+    assert uniform.settings[KeyframeSettings].spacing == 6
 
 
 def interpolated(folder, path=None, **tables):
