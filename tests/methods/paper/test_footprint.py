@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from enfilade.methods.paper.footprint import outline_pixels, shown_alike
+from enfilade.methods.paper.disparity import outline_pixels
+from enfilade.methods.paper.footprint import shown_alike
 from enfilade.methods.paper.warp import warp_keyframe
 from enfilade.records import Halves
 from enfilade.settings import WarpSettings

@@ -9,7 +9,8 @@ import scipy.ndimage
 from scipy.spatial.transform import Rotation
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.paper.warp import _land, disparity_gradient, warp_keyframe
+from enfilade.methods.paper.disparity import disparity_gradient
+from enfilade.methods.paper.warp import _land, warp_keyframe
 from enfilade.records import Geometry, Halves, Keyframe
 from enfilade.settings import WarpSettings
 from support.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere, Waves

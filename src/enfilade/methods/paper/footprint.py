@@ -13,41 +13,12 @@ import numpy as np
 
 from enfilade.methods.paper.convolve import SIGMAS
 from enfilade.methods.paper.spatial_filter import reconstruct
-from enfilade.methods.paper.warp import disparity_gradient
-from enfilade.records import F32, Geometry, Halves, Mask, Warped
+from enfilade.records import F32, Halves, Mask, Warped
 
 # Variance along an axis, square pixels: with that of the filter of §5 at rest (1/4), a Gaussian of one pixel.
 # It passes 0.29 at half the Nyquist frequency. Finer structure is aliased and resampled in any keyframe, and
 # differs at any distance of two of them. Chosen in ROOM and ATRIUM without noise, of 0.25 to 1.
 FINEST = 0.75
-
-NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
-
-
-def outline_pixels(geometry: Geometry, depth_tolerance: float) -> Mask:
-    """Pixels with another surface in their neighbourhood of 3x3 pixels, (H, W).
-
-    They show two surfaces, of which a warp moves one. They differ by their sampling, at any distance of the
-    keyframes.
-
-    Parameters
-    ----------
-    geometry
-    depth_tolerance
-        Largest deviation of a neighbour on the same surface from the pixel's own plane, relative.
-    """
-    shape_index, disparity = geometry.shape_index, geometry.disparity
-    gradient = disparity_gradient(geometry)
-    height, width = disparity.shape
-    shapes = np.pad(shape_index, 1, mode="edge")
-    disparities = np.pad(disparity, 1, mode="reflect", reflect_type="odd")
-    is_outline = np.zeros(disparity.shape, np.bool_)
-    for down, across in NEIGHBOURS:
-        beside = np.s_[1 + down : 1 + down + height, 1 + across : 1 + across + width]
-        expected = disparity + across * gradient[..., 0] + down * gradient[..., 1]
-        is_outline |= shapes[beside] != shape_index
-        is_outline |= np.abs(disparities[beside] - expected) > depth_tolerance * disparity
-    return is_outline
 
 
 def shown_alike(before: Warped, after: Warped, is_compared: Mask, support_px: F32) -> tuple[Halves, Halves]:

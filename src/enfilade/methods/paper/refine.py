@@ -9,7 +9,8 @@ from typing import Any
 from enfilade.camera.path import Segment
 from enfilade.gbuffer import View
 from enfilade.methods.paper.composite import agrees
-from enfilade.methods.paper.footprint import outline_pixels, shown_alike
+from enfilade.methods.paper.disparity import outline_pixels
+from enfilade.methods.paper.footprint import shown_alike
 from enfilade.methods.paper.masks import reusable_specular_shapes, slow_pixels, specular_pixels
 from enfilade.methods.paper.support import spatial_support_px
 from enfilade.methods.paper.warp import warped_pair

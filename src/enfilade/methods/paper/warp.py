@@ -6,21 +6,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import numpy as np
 
 from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, planar_warp
 from enfilade.kernels.bilinear import bilinear_taps
 from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject, warp_jacobian
+from enfilade.methods.paper.disparity import disparity_gradient
 from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, U32, Geometry, Halves, Keyframe, Warped
+from enfilade.records import Geometry, Halves, Keyframe, Warped
 from enfilade.settings import WarpSettings
 
-CONTINUOUS = 0.1  # largest relative change of disparity between neighbours on one surface
 PIXEL_VARIANCE = 1.0 / 12.0  # of positions over a pixel along an axis, square pixels
-EVEN = 0.1  # largest relative difference of two such changes in a row on one slope
 
 
 def warp_keyframe(keyframe: Keyframe, camera: Camera, settings: WarpSettings) -> Warped:
@@ -50,40 +48,6 @@ def warped_pair(walk: Walkthrough, first: Keyframe, last: Keyframe, frame: int) 
     """Both keyframes of a segment, reprojected to a frame between them."""
     camera, settings = walk.path.cameras[frame], walk.settings[WarpSettings]
     return warp_keyframe(first, camera, settings), warp_keyframe(last, camera, settings)
-
-
-def disparity_gradient(geometry: Geometry) -> F32:
-    """Change of the disparity from pixel to pixel on each pixel's own surface, (H, W, 2).
-
-    On a plane the disparity is linear in image coordinates, so that the difference to one neighbour is exact.
-    Of the two neighbours along an axis the one with the smaller change is used; changes across a jump or to
-    another shape are not.
-    """
-    disparity, shape_index = geometry.disparity, geometry.shape_index
-    gradient = np.zeros((*disparity.shape, 2), np.float32)
-    gradient[..., 0] = _smaller_step(disparity, shape_index)
-    gradient[..., 1] = _smaller_step(disparity.T, shape_index.T).T
-    return gradient
-
-
-def _smaller_step(disparity: F32, shape_index: U32) -> F32:
-    """Change of the disparity to the left or right neighbour, 0 where neither lies on the same surface."""
-    step = np.diff(disparity, axis=1)
-    is_same = np.diff(shape_index.astype(np.int64), axis=1) == 0
-
-    # Keep small steps, and steps of an even slope: towards the horizon of a plane every step is large.
-    is_small = np.abs(step) <= CONTINUOUS * np.minimum(disparity[:, 1:], disparity[:, :-1])
-    size = np.abs(step)
-    is_even = is_same[:, 1:] & is_same[:, :-1]
-    is_even &= np.abs(np.diff(step, axis=1)) <= EVEN * np.minimum(size[:, 1:], size[:, :-1])
-    is_sloped = np.pad(is_even, ((0, 0), (1, 0))) | np.pad(is_even, ((0, 0), (0, 1)))
-    step = np.where(is_same & (is_small | is_sloped[:, : step.shape[1]]), step, np.inf)
-
-    # Choose the smaller one of the two.
-    behind = np.pad(step, ((0, 0), (1, 0)), constant_values=np.inf)
-    ahead = np.pad(step, ((0, 0), (0, 1)), constant_values=np.inf)
-    smaller = np.where(np.abs(behind) < np.abs(ahead), behind, ahead)
-    return np.where(np.isfinite(smaller), smaller, 0.0).astype(np.float32)
 
 
 @dataclass(frozen=True)
