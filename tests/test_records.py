@@ -33,7 +33,9 @@ def geometry(**fields):
 
 
 def warped():
-    return Warped(Halves(floats(3), floats(3)), floats(), words(), floats(), floats(), np.zeros((H, W), bool))
+    return Warped(
+        Halves(floats(3), floats(3)), floats(), words(), floats(), floats(), *(np.zeros((H, W), bool),) * 2
+    )
 
 
 RECORDS = [

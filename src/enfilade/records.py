@@ -223,6 +223,8 @@ class Warped:
         Extent of the surface that the pixel averages: variance along an axis, square pixels of the new image.
     is_disoccluded : (H, W) bool
         Pixels without a splat; the paper calls them holes.
+    is_mixed : (H, W) bool
+        Pixels from an outline in the keyframe: their colour may have a share of another surface.
     """
 
     shading: Halves
@@ -231,6 +233,7 @@ class Warped:
     magnification: F32
     footprint: F32
     is_disoccluded: Mask
+    is_mixed: Mask
 
     def __post_init__(self) -> None:
         size = self.is_disoccluded.shape
@@ -239,6 +242,7 @@ class Warped:
         _check(self.shape_index, size, np.uint32, "shape_index")
         _check(self.magnification, size, np.float32, "magnification")
         _check(self.footprint, size, np.float32, "footprint")
+        _check(self.is_mixed, size, np.bool_, "is_mixed")
 
     @property
     def color(self) -> F32:

@@ -8,11 +8,20 @@ import scipy.ndimage
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.paper.composite import agrees, composite
+from enfilade.methods.paper.disparity import outline_pixels
 from enfilade.methods.paper.warp import warp_keyframe
-from enfilade.records import Geometry, Halves, Warped
+from enfilade.records import Geometry, Halves, Keyframe, Warped
 from enfilade.settings import WarpSettings
-from support.analytic_scene import AnalyticScene, Material, Plane, Sphere
-from support.analytic_truth import first_hits, geometry_of, keyframe_of, projected, psnr, ray_directions
+from support.analytic_scene import AnalyticScene, Material, Plane, Quad, Sphere
+from support.analytic_truth import (
+    first_hits,
+    geometry_of,
+    keyframe_of,
+    projected,
+    psnr,
+    ray_directions,
+    traced_image,
+)
 from support.example_scenes import room, room_walk
 
 SETTINGS = WarpSettings(depth_tolerance=0.02)
@@ -31,7 +40,7 @@ def pixel(depth=2.0, shape_index=1):
     )
 
 
-def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded=False):
+def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded=False, is_mixed=False):
     size = (1, 1)
     return Warped(
         Halves(*(np.full((*size, 3), value, np.float32) for _ in range(2))),
@@ -40,6 +49,7 @@ def warped(value, *, depth=2.0, shape_index=1, magnification=1.0, is_disoccluded
         np.full(size, magnification, np.float32),
         np.full(size, 0.25 * magnification, np.float32),
         np.full(size, is_disoccluded),
+        np.full(size, is_mixed),
     )
 
 
@@ -73,6 +83,7 @@ def test_magnified_samples_weigh_less():
         {"depth": 2.05},
         {"shape_index": 2},
         {"is_disoccluded": True},
+        {"is_mixed": True},  # with a share of another surface
     ],
 )
 def test_only_the_visible_surface_is_used(wrong):
@@ -98,7 +109,7 @@ def test_sky_is_composited():
 def test_disocclusions_are_not_sky():
     sky = pixel(depth=0.0, shape_index=0)
     disoccluded = warped(0.0, depth=0.0, shape_index=0, is_disoccluded=True)
-    assert not agrees(disoccluded, sky, 0.02).any()
+    assert not agrees(disoccluded, sky, np.full((1, 1), False), 0.02).any()
     assert composited(disoccluded, disoccluded, of=sky) == (0.0, True)
 
 
@@ -140,7 +151,8 @@ def test_two_keyframes_show_both_sides_of_an_occluder():
 
     before, after = (warp_keyframe(keyframe_of(scene, at(x)), middle, SETTINGS) for x in (-0.5, 0.5))
     geometry = geometry_of(scene, middle)
-    one = [~agrees(w, geometry, SETTINGS.depth_tolerance) for w in (before, after)]
+    is_outline = outline_pixels(geometry, SETTINGS.depth_tolerance)
+    one = [~agrees(w, geometry, is_outline, SETTINGS.depth_tolerance) for w in (before, after)]
     color, is_disoccluded = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
     np.testing.assert_array_equal(is_disoccluded, one[0] & one[1])
     assert is_disoccluded.mean() < 0.2 * min(one[0].mean(), one[1].mean())
@@ -152,7 +164,7 @@ def test_two_keyframes_show_both_sides_of_an_occluder():
 @pytest.mark.parametrize("frame", [3, 12, 21])
 def test_disocclusions_are_surfaces_that_neither_keyframe_shows(frame):
     scene, path = room(), room_walk(25, size=(160, 120), turn_deg=30)
-    _, is_disoccluded, truth, _ = between(scene, path, 0, 24, frame)
+    _, is_disoccluded, truth, (before, after) = between(scene, path, 0, 24, frame)
     camera = path.cameras[frame]
     direction = ray_directions(camera)
     depth, shape_index = first_hits(scene, camera.eye, direction)
@@ -169,6 +181,8 @@ def test_disocclusions_are_surfaces_that_neither_keyframe_shows(frame):
     assert (is_disoccluded & ~border).sum() > 20
     # Surfaces at grazing angles in the keyframe, whose splats exceed the largest size, are disoccluded, too.
     assert not (wrong & ~is_disoccluded).any()
+    # Samples from an outline of a keyframe are not used.
+    wrong &= ~(before.is_mixed | after.is_mixed)
     assert wrong.mean() < 0.002
     assert (truth.geometry.shape_index > 0).all()
 
@@ -184,3 +198,27 @@ def edges(labels):
     low = scipy.ndimage.minimum_filter(labels.astype(int), 3, mode="nearest")
     high = scipy.ndimage.maximum_filter(labels.astype(int), 3, mode="nearest")
     return low != high
+
+
+def test_a_share_of_the_foreground_is_not_moved_into_the_open_background():
+    # A dark post before a white wall: keyframes show both in the pixels along its sides.
+    post = Quad((-0.3, -5, 0), (0.6, 0, 0), (0, 10, 0), Material((0.05, 0.05, 0.05)))
+    wall = Plane((0, 0, -6), (0, 0, 1), Material((0.8, 0.8, 0.8)))
+    scene = AnalyticScene((wall, post), ambient=(1, 1, 1), light=(0, 0, 0))
+    middle = Camera(look_at((0, 0, 2.5), (0, 0, 0)), 50.0, 80, 60)
+
+    def at(x):
+        pose = middle.world_from_camera.copy()
+        pose[0, 3] = x
+        return dataclasses.replace(middle, world_from_camera=pose)
+
+    def keyframe(camera):
+        color = traced_image(scene, camera, spp=64, box=True).color
+        return Keyframe(0, geometry_of(scene, camera), Halves(color, color))
+
+    before, after = (warp_keyframe(keyframe(at(x)), middle, SETTINGS) for x in (-0.15, 0.15))
+    geometry = geometry_of(scene, middle)
+    color, is_disoccluded = composite(before, after, geometry, progress=0.5, settings=SETTINGS)
+    is_open = (geometry.shape_index == 1) & ~outline_pixels(geometry, SETTINGS.depth_tolerance)
+    np.testing.assert_allclose(color[is_open & ~is_disoccluded], 0.8, atol=0.01)
+    assert is_disoccluded.mean() < 0.03

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from enfilade.methods.paper.disparity import outline_pixels
 from enfilade.records import F32, Geometry, Mask, Warped
 from enfilade.settings import WarpSettings
 
@@ -14,7 +15,8 @@ def composite(
     """Composite two warped keyframes at a frame between them.
 
     Only samples of the surface that the frame's own G-buffer shows are used: all others are occluded, or
-    occlude it. Two such samples are blended by the distance of the keyframes in time and by the
+    occlude it. Samples from an outline of the keyframe, which have a share of another surface, are used at
+    outlines alone. Two such samples are blended by the distance of the keyframes in time and by the
     magnification of the surface.
 
     Parameters
@@ -35,8 +37,9 @@ def composite(
         Pixels whose surface neither keyframe shows; the paper calls them holes.
     """
     # Weight each keyframe where it shows the surface.
-    weight_before = (1.0 - progress) * _confidence(before, geometry, settings.depth_tolerance)
-    weight_after = progress * _confidence(after, geometry, settings.depth_tolerance)
+    is_outline = outline_pixels(geometry, settings.depth_tolerance)
+    weight_before = (1.0 - progress) * _confidence(before, geometry, is_outline, settings.depth_tolerance)
+    weight_after = progress * _confidence(after, geometry, is_outline, settings.depth_tolerance)
     total = weight_before + weight_after
     is_disoccluded = total <= 0.0
 
@@ -47,15 +50,27 @@ def composite(
     return color.astype(np.float32), is_disoccluded
 
 
-def agrees(warped: Warped, geometry: Geometry, tolerance: float) -> Mask:
-    """Pixels at which a warped keyframe shows the same surface as the frame, (H, W)."""
+def agrees(warped: Warped, geometry: Geometry, is_outline: Mask, tolerance: float) -> Mask:
+    """Pixels at which a warped keyframe shows the same surface as the frame, and no other, (H, W).
+
+    Parameters
+    ----------
+    warped
+    geometry
+        G-buffer of the frame.
+    is_outline : (H, W) bool
+        Pixels of the frame beside another surface, where it shows both, too.
+    tolerance
+        Largest relative difference of depth.
+    """
     difference = np.abs(warped.depth - geometry.depth)
     is_same = (warped.shape_index == geometry.shape_index) & (difference <= tolerance * geometry.depth)
-    agreed: Mask = ~warped.is_disoccluded & is_same
+    agreed: Mask = ~warped.is_disoccluded & is_same & (is_outline | ~warped.is_mixed)
     return agreed
 
 
-def _confidence(warped: Warped, geometry: Geometry, tolerance: float) -> F32:
+def _confidence(warped: Warped, geometry: Geometry, is_outline: Mask, tolerance: float) -> F32:
     """Inverse magnification where the keyframe shows the surface, 0 elsewhere."""
     sharpness = 1.0 / np.maximum(warped.magnification, 1.0)
-    return np.where(agrees(warped, geometry, tolerance), sharpness, 0.0).astype(np.float32)
+    agreed = agrees(warped, geometry, is_outline, tolerance)
+    return np.where(agreed, sharpness, 0.0).astype(np.float32)

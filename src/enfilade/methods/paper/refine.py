@@ -127,10 +127,11 @@ class Refinement:
 
         # Compare inside the surfaces that both keyframes show.
         tolerance = walk.settings[WarpSettings].depth_tolerance
-        is_inside = ~outline_pixels(view.geometry, tolerance)
+        is_outline = outline_pixels(view.geometry, tolerance)
+        is_inside = ~is_outline
         is_compared = is_inside.copy()
         for one in warped:
-            is_compared &= agrees(one, view.geometry, tolerance)
+            is_compared &= agrees(one, view.geometry, is_outline, tolerance)
         jnd, jnd_no_pursuit = self._differences(view, warped, is_compared)
 
         # Mask the pixels that will be traced: slow ones, and specular shapes whose reuse is visible.

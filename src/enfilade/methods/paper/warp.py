@@ -7,12 +7,12 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array2f, Array3f, Float, UInt, image, lanes, matrix3, vector3
+from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, image, lanes, matrix3, vector3
 from enfilade.camera.pinhole import Camera, planar_warp
 from enfilade.kernels.bilinear import bilinear_taps
 from enfilade.kernels.rays import pixel_centres
 from enfilade.kernels.reproject import reproject, warp_jacobian
-from enfilade.methods.paper.disparity import disparity_gradient
+from enfilade.methods.paper.disparity import disparity_gradient, outline_pixels
 from enfilade.methods.paper.splat import EMPTY, INFINITE, Splats, splat_nearest
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry, Halves, Keyframe, Warped
@@ -115,11 +115,12 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
 
     # Interpolate among the neighbours on the winner's surface.
     shape_indices = lanes(keyframe.geometry.shape_index)
+    outlines = lanes(outline_pixels(keyframe.geometry, tolerance))
     halves = lanes(keyframe.shading.first), lanes(keyframe.shading.second)
     shape_index = dr.gather(UInt, shape_indices, winner, ~is_empty)
     disparity = dr.gather(Float, landing.disparity, winner, ~is_empty)
     gradient = dr.gather(Array2f, landing.gradient, winner, ~is_empty)
-    total, colors = Float(0), [Array3f(0), Array3f(0)]
+    total, colors, is_mixed = Float(0), [Array3f(0), Array3f(0)], Bool(False)
     for tap in bilinear_taps(at.x, at.y, width=source.width, height=source.height):
         step = Array2f(tap.column, tap.row) + 0.5 - centre
         expected = disparity + dr.dot(gradient, step)
@@ -127,6 +128,7 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
         is_same = (dr.gather(UInt, shape_indices, tap.lane) == shape_index) & (jump <= tolerance * disparity)
         weight = dr.select(is_same & ~is_empty, tap.weight, 0.0)  # the position may be NaN where it is empty
         total += weight
+        is_mixed |= (weight > 0.0) & dr.gather(Bool, outlines, tap.lane)
         colors = [c + weight * dr.gather(Array3f, h, tap.lane) for c, h in zip(colors, halves, strict=True)]
 
     # Normalize, and clear disoccluded pixels.
@@ -136,7 +138,8 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
     first, second = (color * inverse for color in colors)
     depth = dr.select(is_disoccluded | (depth >= INFINITE), 0.0, depth)
     shape_index = dr.select(is_disoccluded, 0, shape_index)
-    dr.eval(first, second, depth, shape_index, magnification, footprint, is_disoccluded)
+    is_mixed &= ~is_disoccluded
+    dr.eval(first, second, depth, shape_index, magnification, footprint, is_disoccluded, is_mixed)
     return Warped(
         shading=Halves(image(first, height, width), image(second, height, width)),
         depth=image(depth, height, width),
@@ -144,4 +147,5 @@ def _resample(keyframe: Keyframe, camera: Camera, landing: _Landing, keys: Any, 
         magnification=image(magnification, height, width),
         footprint=image(footprint, height, width),
         is_disoccluded=image(is_disoccluded, height, width),
+        is_mixed=image(is_mixed, height, width),
     )
