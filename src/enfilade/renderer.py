@@ -37,6 +37,7 @@ class Purpose(IntEnum):
     SPECULAR_CENTRE = 13
     KEYFRAME_SECOND_HALF = 14
     VIRTUAL_IMAGES = 15
+    GUIDE_SECOND_HALF = 16
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 
 from enfilade.methods.paper.keyframe import find_guides, trace_keyframe
 from enfilade.renderer import PixelFilter, Purpose
 from support.analytic import AnalyticRenderer
-from support.example_scenes import room, room_walk
+from support.analytic_scene import AnalyticScene, Checker, Material, Plane
+from support.example_scenes import room, room_walk, slide
 from support.in_memory import walk_of
 
 SIZE = (48, 36)
@@ -33,8 +35,21 @@ def test_the_halves_have_independent_errors_and_little_noise(walk):
     np.testing.assert_array_equal(got.color, (got.first + got.second) / 2)
 
 
+def test_the_halves_have_guides_of_their_own():
+    # Squares of a third of a pixel: their mean over a pixel is known as well as its rays tell.
+    fine = Checker((0.8, 0.8, 0.8), (0.1, 0.1, 0.1), period=0.02)
+    scene = AnalyticScene((Plane((0, 0, 0), (0.2, 0.1, 1), Material(fine)),), noise=0.5)
+    walk = walk_of(slide(2), AnalyticRenderer(scene), sampling={"spp": 64})
+    first, second = (trace_keyframe(walk, frame) for frame in (0, 1))
+    differences = [
+        (a - b - scipy.ndimage.uniform_filter(a - b, (9, 9, 0)))[8:-8, 8:-8].ravel()
+        for a, b in ((first.first, second.first), (first.second, second.second))
+    ]
+    assert abs(np.corrcoef(*differences)[0, 1]) < 0.1
+
+
 def test_guides_are_means_over_the_pixels(walk):
-    albedo, normal = find_guides(walk, 1)
+    albedo, normal = find_guides(walk, 1, Purpose.GUIDE, spp=4)
     geometry = walk.view(1).geometry
     assert np.median(np.abs(albedo - geometry.albedo)) < 0.02
     assert np.linalg.norm(normal, axis=2).max() < 1.0 + 1e-5

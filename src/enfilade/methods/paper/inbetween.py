@@ -57,13 +57,8 @@ def _trace_into(walk: Walkthrough, frame: int, color: F32, where: Mask) -> int:
     """
     if not where.any():
         return 0
-    filled = walk.trace(
-        frame,
-        where,
-        Purpose.FILL,
-        spp=walk.settings[SamplingSettings].spp,
-        pixel_filter=PixelFilter.BOX,
-    )
+    spp = walk.settings[SamplingSettings].spp
+    filled = walk.trace(frame, where, Purpose.FILL, spp=spp, pixel_filter=PixelFilter.BOX)
     color[where] = filled.color
-    color[where] = denoise(color, *find_guides(walk, frame))[where]
+    color[where] = denoise(color, *find_guides(walk, frame, Purpose.GUIDE, spp=spp))[where]
     return filled.dropped

@@ -15,14 +15,15 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import SamplingSettings
 
 MIN_SPP = 2  # one path of each half
-GUIDE_RAYS = 16  # a pixel
+MIN_GUIDE_RAYS = 16  # a pixel
 
 
 def trace_keyframe(walk: Walkthrough, frame: int) -> Halves:
     """Trace a whole frame, with paths distributed over the pixels.
 
-    The paper's ray tracer has no noise. Here each half of the paths is denoised alone: errors that the
-    denoiser makes of the noise are independent, too, and do not agree in both halves.
+    The paper's ray tracer has no noise. Here each half of the paths is denoised alone, with guides of its
+    own: errors that the denoiser makes of the noise, of paths and of guides, are independent, too, and do not
+    agree in both halves.
 
     Returns
     -------
@@ -30,23 +31,33 @@ def trace_keyframe(walk: Walkthrough, frame: int) -> Halves:
         Denoised.
     """
     spp, size = walk.settings[SamplingSettings].spp, (walk.path.height, walk.path.width)
-    everywhere, guides = np.ones(size, np.bool_), find_guides(walk, frame)
-    first, second = (
-        walk.trace(frame, everywhere, purpose, spp=paths, pixel_filter=PixelFilter.BOX)
-        for purpose, paths in ((Purpose.KEYFRAME, spp - spp // 2), (Purpose.KEYFRAME_SECOND_HALF, spp // 2))
-    )
-    return Halves(
-        denoise(first.color.reshape(*size, 3), *guides),
-        denoise(second.color.reshape(*size, 3), *guides),
-        first.dropped + second.dropped,
-    )
+    everywhere, halves, dropped = np.ones(size, np.bool_), [], 0
+    for purpose, guide, paths in (
+        (Purpose.KEYFRAME, Purpose.GUIDE, spp - spp // 2),
+        (Purpose.KEYFRAME_SECOND_HALF, Purpose.GUIDE_SECOND_HALF, spp // 2),
+    ):
+        traced = walk.trace(frame, everywhere, purpose, spp=paths, pixel_filter=PixelFilter.BOX)
+        guides = find_guides(walk, frame, guide, spp=paths)
+        halves.append(denoise(traced.color.reshape(*size, 3), *guides))
+        dropped += traced.dropped
+    return Halves(halves[0], halves[1], dropped)
 
 
-def find_guides(walk: Walkthrough, frame: int) -> tuple[F32, F32]:
+def find_guides(walk: Walkthrough, frame: int, purpose: Purpose, *, spp: int) -> tuple[F32, F32]:
     """Albedo and normal of the surfaces visible in each pixel, box filtered: guides of the denoiser.
 
     Those of the G-buffer are sampled at pixel centres. As guides they would bring its aliasing into the
     image.
+
+    Parameters
+    ----------
+    walk
+    frame
+    purpose
+        Of the random numbers.
+    spp
+        Paths a pixel of the image. There are as many rays, and :data:`MIN_GUIDE_RAYS` or more: the denoiser
+        takes the guides to be free of noise, so that textures would have the noise of too few of them.
 
     Returns
     -------
@@ -55,14 +66,16 @@ def find_guides(walk: Walkthrough, frame: int) -> tuple[F32, F32]:
     normal : (H, W, 3) float32
         Mean of unit vectors in world space.
     """
-    camera, random = walk.path.cameras[frame], walk.random(frame, Purpose.GUIDE)
+    camera, random = walk.path.cameras[frame], walk.random(frame, purpose)
     at, pixel = pixel_centres(camera), dr.arange(UInt, camera.height * camera.width)
     albedo, normal = dr.zeros(Array3f, dr.width(pixel)), dr.zeros(Array3f, dr.width(pixel))
-    for ray in range(GUIDE_RAYS):
+    count = max(spp, MIN_GUIDE_RAYS)
+    for ray in range(count):
         offset = box_offsets(stratified(pixel, opaque(ray), random))
         hit = walk.renderer.surfaces(camera_rays(camera, at + offset))
         albedo += dr.select(hit.is_hit, hit.albedo, 0)
         normal += dr.select(hit.is_hit, hit.normal, 0)
         dr.eval(albedo, normal)
     size = camera.height, camera.width
-    return image(albedo / opaque(float(GUIDE_RAYS)), *size), image(normal / opaque(float(GUIDE_RAYS)), *size)
+    share = opaque(1.0 / count)
+    return image(albedo * share, *size), image(normal * share, *size)

@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 3
+    revision = 4
     settings = (
         TraceSettings,
         SamplingSettings,
