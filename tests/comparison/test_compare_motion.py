@@ -6,6 +6,7 @@ from PIL import Image
 
 from enfilade.comparison.motion import flow_of_layers
 from enfilade.errors import ImageError
+from enfilade.images import write_exr
 from support.sequences import SIZE, Notes, compared, textured, write_run
 
 RIGHT, DOWN = 3.0, -2.0  # of the surface, pixels per frame
@@ -153,6 +154,27 @@ def test_what_flickers_at_a_cut_is_not_counted(sequence, levels):
     found = compared(test, reference)
     assert [f.transient.score for f in found.frames] == [0.0] * 4
     assert min(f.steady.score for f in found.frames) > 0.1
+
+
+def test_a_cut_between_images_without_flow_is_found(sequence):
+    shots = [textured(level=level) for level in (0.1, 0.6) for _ in range(2)]
+    faulty = [image * np.float32(0.9) for image in shots]
+    found = compared(sequence("t", faulty), sequence("r", shots), flow="none")
+    assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 4, abs=1e-3)
+    assert min(f.steady.score for f in found.frames) > 0.1
+
+
+def test_motion_beside_a_rest_is_the_mean_with_no_motion(tmp_path):
+    """The camera of a run rests in the first two frames."""
+    folder = write_run(tmp_path / "run", [textured()] * 3, (1, 2, 3))
+    moving = np.zeros((*SIZE, 2), np.float32)
+    moving[..., 0] = 2.0
+    for number, backward, forward in ((1, STILL, STILL), (2, STILL, moving), (3, -moving, STILL)):
+        layers = {"RGB": textured(), "backward": backward, "forward": forward}
+        write_exr(folder / "frames" / f"{number:04}.exr", layers)
+    found = compared(folder, folder)
+    speed = found.viewing.velocity_deg_s(np.array([0.0, 1.0, 2.0]))
+    assert [f.velocity_deg_s for f in found.frames] == pytest.approx(speed, rel=1e-5)
 
 
 def flickering(images):

@@ -77,3 +77,15 @@ def test_masked_pixels_do_not_count(aqm, textured):
     valid[30:90, 40:110] = False
     one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
     assert aqm.compare(other, one, valid=valid).jnd.max() == 0.0
+
+
+def test_a_uniform_difference_stands_still_wherever_the_image_moves(aqm):
+    background = np.full((128, 160), 40.0, np.float32)
+    brighter = np.float32(1.02) * background
+    velocity = np.zeros((128, 160, 2), np.float32)
+    velocity[:, 100:, 0] = 20.0
+    reference, test = (LuminanceHalves(image, image) for image in (background, brighter))
+    still, moving = (
+        aqm.compare(test, reference, velocity=v, pursuit=Pursuit.NONE).jnd for v in (None, velocity)
+    )
+    np.testing.assert_allclose(moving, still, rtol=0.05)

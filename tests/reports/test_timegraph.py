@@ -60,6 +60,14 @@ def test_visible_pixels_and_bands():
     assert labels == ["14 to 20", "7 to 14", "below 7"]
 
 
+def test_a_single_frame_is_seen():
+    figure = time_figure(made_up(1, flicker=0.1))
+    (mesh,) = figure.axes[2].collections
+    across = mesh.get_coordinates()[..., 0]
+    assert across.max() - across.min() == 1.0
+    assert all(line.get_marker() == "o" for line in figure.axes[0].lines if len(line.get_xdata()) == 1)
+
+
 @pytest.mark.parametrize("frames", [1, 300])
 def test_any_length_is_drawn(tmp_path, frames):
     file = plot_comparison(made_up(frames), tmp_path / "new" / "graph.png")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Protocol
 
@@ -101,12 +101,11 @@ def open_motion(
             f"neither {reference.name(0)} nor {test.name(0)} has layers of image flow; known are: "
             f"{'; '.join(kind.text for kind in KINDS)}. --flow estimate needs none"
         )
-    known = frozenset[int]() if starts is None else starts
     if choice is FlowChoice.NONE:
-        return _Still("image flow: none; the sequences are compared as static", known)
+        return _Still("image flow: none; the sequences are compared as static", starts)
     if len(reference) == 1:
-        return _Still("image flow: none in a single image; it is compared as static", known)
-    return _Estimated(reference.width, reference.height, known)
+        return _Still("image flow: none in a single image; it is compared as static", starts)
+    return _Estimated(reference.width, reference.height, starts or frozenset())
 
 
 @dataclass(frozen=True)
@@ -234,7 +233,11 @@ class _FromLayers:
             raise ImageError(
                 f"{name} has NaN or infinite values in its image flow; --flow estimate needs none of it"
             )
-        return flow
+        if self._starts is None:
+            return flow
+        # The camera may rest: a neighbour of the same pose has no motion, and counts.
+        before, after = (0 < i < len(self._sequence) and i not in self._starts for i in (index, index + 1))
+        return replace(flow, has_backward=flow.has_backward or before, has_forward=flow.has_forward or after)
 
 
 class _Estimated:
@@ -271,11 +274,20 @@ class _Estimated:
 class _Still:
     kind = "none"
 
-    def __init__(self, text: str, starts: frozenset[int]) -> None:
+    def __init__(self, text: str, starts: frozenset[int] | None) -> None:
         self.text = text
         self._starts = starts
 
     def follow(self, pairs: Iterable[Pair]) -> Iterator[tuple[Pair, Moved]]:
-        """Pairs without motion."""
+        """Pairs without motion. Where no run tells, a cut is where the image changes altogether."""
+        before: F32 | None = None
         for pair in pairs:
-            yield pair, Moved(is_cut=pair.index in self._starts)
+            now = srgb_encode(pair.reference_relative)
+            yield pair, Moved(is_cut=self._is_cut(pair.index, now, before))
+            before = now
+
+    def _is_cut(self, index: int, now: F32, before: F32 | None) -> bool:
+        if self._starts is not None:
+            return index in self._starts
+        nowhere = np.zeros((*now.shape, 2), np.float32)
+        return before is not None and _change(now, before, nowhere) > CUT_DIFFERENCE

@@ -109,11 +109,13 @@ class HalvesAqm:
         for band in self._bank.bands:
             ring, area = self._bank.cortex.ring(spectra, band), pool.area(band.reduction)
             for orientation, weight in zip(band.orientations, sensitivity.weights(band), strict=True):
-                channel = self._bank.crop(self._bank.cortex.fan(ring, band, orientation), band) * weight
+                contrast = self._bank.crop(self._bank.cortex.fan(ring, band, orientation), band)
+                channel = contrast * weight
                 tests = channel[:2] + channel[2:]
                 if band.is_base:
-                    at_rest = sensitivity.at_rest(band) / weight
-                    channel[2:] = [_at_rest(one, is_valid, band, at_rest) for one in channel[2:]]
+                    more = sensitivity.at_rest(band) - weight  # the uniform part stands still
+                    sampled = is_valid[:: band.reduction, :: band.reduction]
+                    channel[2:] += [uniform_part(one, sampled) * more for one in contrast[2:]]
                 products = _excess(*channel[2:]), channel[0] * channel[1], tests[0] * tests[1]
                 energy, *maskers = (self._integrated(one, area, band) for one in products)
                 energy /= np.square(threshold_elevation(np.sqrt(np.minimum(*maskers)), self._mask_slope))
@@ -143,12 +145,6 @@ def _excess(first: F32, second: F32) -> F32:
     """Shared less unshared energy of two halves, a b - (a - b)^2 / 2; signed."""
     excess: F32 = first * second - np.float32(0.5) * np.square(first - second)
     return excess
-
-
-def _at_rest(difference: F32, valid: Mask, band: Band, at_rest: F32) -> F32:
-    """A difference of the base band, with the uniform part as seen at rest."""
-    uniform = uniform_part(difference, valid[:: band.reduction, :: band.reduction])
-    return difference - uniform + uniform * at_rest
 
 
 def _csf(

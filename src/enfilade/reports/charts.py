@@ -118,7 +118,8 @@ def draw(ax: Any, panel: Panel) -> None:
         if series.mark == "bar":
             below = _stack(ax, series, below)
         else:
-            mark = "circle" if len(series.values) == 1 and series.mark == "line" else series.mark
+            is_point = len(series.values) == 1 and series.mark in ("line", "dashed")
+            mark = "circle" if is_point else series.mark
             frames, values = list(series.values), list(series.values.values())
             ax.plot(frames, values, color=series.color, label=series.name, **MARKS[mark])
     if panel.level is not None:

@@ -85,7 +85,9 @@ def _draw_bands(
     """Draw the larger of the steady and the transient difference, by frame and band."""
     parts = [np.array([row[key] for row in rows]).T for key in ("steady_bands_jnd", "transient_bands_jnd")]
     jnd = np.maximum(*parts)
-    numbers, top = [row["number"] for row in rows], float(jnd.max()) or 1.0  # any, where nothing differs
+    numbers, top = [float(row["number"]) for row in rows], float(jnd.max()) or 1.0  # any, if nothing differs
+    if len(numbers) == 1:  # one column would have no width
+        numbers, jnd = [numbers[0] - 0.25, numbers[0] + 0.25], jnd.repeat(2, axis=1)
     mesh = ax.pcolormesh(
         numbers, range(len(bands)), jnd, cmap="cividis", vmin=0.0, vmax=top, shading="nearest"
     )
