@@ -1,8 +1,12 @@
 """All methods, task by task in memory: independent random numbers, finite frames near the reference."""
 
+import json
+
 import numpy as np
 import pytest
 
+import enfilade
+from enfilade.images import read_exr
 from enfilade.methods.opener import METHODS, open_method
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Provenance
@@ -56,3 +60,21 @@ def test_frames_are_those_of_the_reference_up_to_noise(runs, name):
         Provenance.KEYFRAME,
         *(reused if name != "reference" else ()),
     }
+
+
+@pytest.mark.parametrize("name", ["decoupled", "paper"])
+def test_frames_of_a_pose_that_is_held_reuse_its_first_frame(name, tmp_path):
+    opened_room(tmp_path)
+    keys = [
+        {"time": 0, "eye": [-0.2, 1.3, 0.8], "target": [0, 1.1, -2], "fov": 70},
+        {"time": 2, "eye": [0.2, 1.3, 0.8], "target": [0, 1.1, -2], "hold": 2},
+        {"time": 6, "eye": [0.4, 1.3, 0.8], "target": [0, 1.1, -2]},
+    ]
+    path = {"format": "enfilade-path", "fps": 1, "size": [48, 32], "keys": keys}
+    (tmp_path / "path.json").write_text(json.dumps(path))
+    enfilade.render(
+        tmp_path / "scene.xml", tmp_path / "path.json", tmp_path / "run", method=name, settings=TABLES
+    )
+    for number in (4, 5):
+        held = read_exr(tmp_path / "run" / "frames" / f"{number:04d}.exr")
+        assert (held["provenance"] == Provenance.REUSED).all()

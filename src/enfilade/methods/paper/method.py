@@ -54,7 +54,7 @@ class Paper(Method):
     passes = (
         Pass("keyframes", Halves),
         Pass("segments", Halves, reads=("keyframes",)),
-        Pass("inbetweens", Frame, reads=("keyframes", "segments")),
+        Pass("inbetweens", Frame, reads=("keyframes", "segments", "inbetweens")),
         Pass(FRAMES, Frame, reads=("inbetweens",)),
     )
 
