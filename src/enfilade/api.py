@@ -134,7 +134,7 @@ def import_scene(
     source
         A .blend, glTF, USD, FBX or OBJ file. Scripts in it are not run.
     out
-        The scene folder. An existing one is replaced.
+        The scene folder. An imported scene is replaced, a folder with anything else is refused.
     settings
         Tables of the sections ``blender`` and ``limits``, such as ``{"blender": {"camera": "Walk"}}``.
     size
@@ -151,8 +151,8 @@ def import_scene(
     Raises
     ------
     SceneError
-        There is no Blender; the file is missing, damaged or too large; or part of it is not carried over, and
-        ``[blender] strict`` is set.
+        There is no Blender; the file is missing, damaged or too large; part of it is not carried over, and
+        ``[blender] strict`` is set; or the folder holds something else.
     RunFolderError, NoSpaceError
         The folder can't be written.
     """

@@ -88,11 +88,6 @@ def test_folders_are_replaced_on_demand_only(run, shot, tmp_path):
     again = run("import", shot(), "--out", out)
     assert (again.exit_code, "--overwrite" in again.stderr) == (2, True)
     assert run("import", shot(), "--out", out, "--overwrite").exit_code == 0
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "thesis.tex").touch()
-    refused = run("import", shot(), "--out", tmp_path / "other", "--overwrite")
-    assert refused.exit_code == 2
-    assert "holds no imported scene" in refused.stderr
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from enfilade.cli.options import (
     settings_of,
     settings_options,
 )
-from enfilade.errors import SceneError, SettingsError
+from enfilade.errors import SettingsError
 from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings
 
 if TYPE_CHECKING:
@@ -89,7 +89,6 @@ def command(
             raise SettingsError(f"{flag} has no effect on an import, which does not read [{table}]")
     if checking["check_frames"] is not None and not checking["is_checked"]:
         raise SettingsError("--check-frames needs --check")
-    _check_place(folder, is_replaced=is_replaced)
     blender = settings[BlenderSettings]
     from enfilade.cli.progress import watch
     from enfilade.runs.source import choices_of
@@ -100,7 +99,7 @@ def command(
     with watch(quiet=quiet) as monitor:
         imported = import_file(
             source, folder, choices, settings[LimitSettings], monitor,
-            program=blender.program, is_strict=blender.strict,
+            program=blender.program, is_strict=blender.strict, is_replaced=is_replaced,
         )  # fmt: skip
         checked = _checked(imported, source, settings, choices, monitor, **checking)
     spent = Source.read(folder)
@@ -150,20 +149,6 @@ def _check_lines(checked: dict[str, Any]) -> Iterator[str]:
         more = f"contrast {of['contrast_percent']:+.1f} %, highlights {of['highlight_percent']:+.1f} %"
         yield f"check   {of['name'][:32]:32} colour {color:5.1f} % (noise {noise:.1f}), {more}"
     yield f"page    {checked['page']}"
-
-
-def _check_place(folder: Path, *, is_replaced: bool) -> None:
-    """Refuse a folder with anything but an imported scene, which only --overwrite replaces."""
-    from enfilade.scene.blender.process import RESULT_FILE
-
-    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
-        return
-    if not (folder / RESULT_FILE).is_file():
-        raise SceneError(f"{folder} is there already, and holds no imported scene; choose another --out")
-    if not is_replaced:
-        raise SceneError(
-            f"{folder} holds an imported scene; replace it by --overwrite, or choose another --out"
-        )
 
 
 def _span(frames: str) -> tuple[int, int]:

@@ -17,11 +17,10 @@ from enfilade.records import F32, U8, U32
 from enfilade.reports.page import write_page
 from enfilade.reports.tables import seconds
 from enfilade.runs.fidelity import CheckedFrame, ImportCheck
-from enfilade.scene.blender.imported import ImportedScene
+from enfilade.scene.blender.imported import CHECK_PAGE, ImportedScene
 from enfilade.scene.blender.notes import TITLES, grouped
 from enfilade.settings import Settings, VideoSettings, ViewingSettings
 
-CHECK_PAGE = "check.html"  # in an imported scene folder
 LISTED = 40  # objects
 WEBP_QUALITY = 92
 

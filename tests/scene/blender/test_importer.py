@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -105,10 +106,37 @@ def test_settings_of_the_file_stand_under_those_given(load, shot):
 
 
 def test_an_earlier_import_is_replaced_as_a_whole(load, shot):
-    load(shot(echo=1))
-    made = load(shot(camera="Other"))
-    assert made.camera == "Other"
-    assert not (made.folder / "seen.json").exists()
+    made = load(shot())
+    (made.folder / "check.html").touch()
+    assert made.path_file is not None
+    assert load(shot(camera="")).path_file is None
+    assert "check.html" not in left(made.folder)
+
+
+def test_only_an_imported_scene_is_replaced(load, shot, tmp_path, monkeypatch):
+    def refused(words, source=None, out=tmp_path / "scene"):
+        source = source or shot()
+        before = sorted(file for file in tmp_path.rglob("*") if file.suffix != ".calls")
+        with pytest.raises(SceneError, match=words):
+            load(source, out)
+        assert [file for file in sorted(tmp_path.rglob("*")) if file.suffix != ".calls"] == before
+
+    (tmp_path / "scene").mkdir()
+    (tmp_path / "scene" / "thesis.tex").touch()
+    refused("holds no imported scene")
+    (tmp_path / "scene" / "thesis.tex").rename(tmp_path / "thesis.tex")
+    load(shot())
+    (tmp_path / "scene" / "notes.txt").touch()
+    refused("the import has not written notes.txt")
+    (tmp_path / "scene" / "notes.txt").unlink()
+    (tmp_path / "scene" / "textures").mkdir()
+    inside = shot("scene/textures/other.blend")
+    refused("other.blend is in .*scene, which would be replaced", inside)
+    refused("other.blend is in .*scene, which would be replaced", shot(files=[str(inside)]))
+    refused("is no folder", out=shot())
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    refused("the working folder is in", out=Path())
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from enfilade.settings import read_tables
 
 FORMAT, VERSION = "enfilade-import", 1
 SCENE_FILE, PATH_FILE, SETTINGS_FILE = "scene.xml", "camera_path.json", "settings.toml"
+CHECK_PAGE = "check.html"
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,28 @@ from typing import Any
 
 from enfilade.camera import load_path
 from enfilade.errors import CameraPathError, SceneError, SettingsError
-from enfilade.files import read_json, whole_folder, write_json
+from enfilade.files import MARK, read_json, whole_folder, write_json
 from enfilade.images.view import files_of_view
 from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import Blender, find_blender
-from enfilade.scene.blender.imported import SETTINGS_FILE, ImportedScene, SourceView
+from enfilade.scene.blender.imported import (
+    CHECK_PAGE,
+    PATH_FILE,
+    SCENE_FILE,
+    SETTINGS_FILE,
+    ImportedScene,
+    SourceView,
+)
 from enfilade.scene.blender.notes import Note, NoteKind, grouped
 from enfilade.scene.blender.process import RESULT_FILE, cpu_of_children_s, run_job
-from enfilade.scene.blender.source import Choices, FileState, Source, check_source
+from enfilade.scene.blender.source import SOURCE_FILE, Choices, FileState, Source, check_source
 from enfilade.settings import LimitSettings, VideoSettings
 
 COLORS = "colormanagement"  # folder of the configuration of OpenColorIO, in Blender and in the scene folder
 CONFIG = "config.ocio"
-SHOWN = 8  # parts that are not carried over, in the message of --strict
+FILES = frozenset({SCENE_FILE, PATH_FILE, SETTINGS_FILE, RESULT_FILE, SOURCE_FILE, CHECK_PAGE})
+FOLDERS = frozenset({"meshes", "textures", COLORS})  # and files, of a scene folder
+SHOWN = 8  # parts that are not carried over, and files, in a message
 
 
 def import_file(
@@ -37,6 +46,7 @@ def import_file(
     *,
     program: str = "",
     is_strict: bool = False,
+    is_replaced: bool = True,
 ) -> ImportedScene:
     """Import a file of Blender, or of a format that Blender reads, into a scene folder.
 
@@ -44,7 +54,7 @@ def import_file(
     ----------
     source
     out
-        The scene folder. An existing one is replaced when the import has succeeded.
+        The scene folder; new, empty, or an imported scene, which is replaced when the import has succeeded.
     choices
     limits
     monitor
@@ -52,16 +62,20 @@ def import_file(
         See :func:`~enfilade.scene.blender.find.find_blender`.
     is_strict
         Whether a part that is not carried over is an error.
+    is_replaced
+        Whether an imported scene may be replaced.
 
     Raises
     ------
     SceneError
-        There is no Blender; the file is missing, damaged, refused, or too large; or a part of it is not
-        carried over, and that is an error.
+        There is no Blender; the file is missing, damaged, refused, or too large; a part of it is not
+        carried over, and that is an error; or the folder holds something else.
     RunFolderError, NoSpaceError
         The folder can't be written.
     """
     check_source(source)
+    _check_place(out, is_replaced=is_replaced)
+    _check_outside(out, source)
     blender = find_blender(program)
     if blender.note:
         monitor.message(blender.note)
@@ -71,6 +85,7 @@ def import_file(
         run_job(blender, job_table("export", source, beside, choices, limits), limits, monitor)
         imported = _with_view(ImportedScene.read(beside), blender)
         _check(imported, limits)
+        _check_outside(out, *imported.files)
         if is_strict:
             check_strict(imported)
         wall_s, cpu_s = time.monotonic() - began, cpu_of_children_s() - cpu_began
@@ -103,6 +118,33 @@ def check_strict(imported: ImportedScene) -> None:
     raise SceneError(
         f"--strict refuses {imported.source}, of which this is not carried over:{''.join(lines)}{more}"
     )
+
+
+def _check_place(out: Path, *, is_replaced: bool) -> None:
+    """Refuse to replace anything but an imported scene."""
+    if not out.exists():
+        return
+    if not out.is_dir():
+        raise SceneError(f"{out} is there already, and is no folder; choose another --out")
+    if Path.cwd().is_relative_to(out.resolve()):
+        raise SceneError(f"the working folder is in {out}, which would be replaced; choose another --out")
+    names = {entry.name for entry in out.iterdir()}
+    if names and RESULT_FILE not in names:
+        raise SceneError(f"{out} is there already, and holds no imported scene; choose another --out")
+    if names and not is_replaced:
+        raise SceneError(f"{out} holds an imported scene; replace it by --overwrite, or choose another --out")
+    if others := sorted(name for name in names - FILES - FOLDERS if MARK not in name):
+        shown = ", ".join(others[:SHOWN]) + (", ..." if len(others) > SHOWN else "")
+        raise SceneError(
+            f"{out} is not replaced: the import has not written {shown}; move it, or choose another --out"
+        )
+
+
+def _check_outside(out: Path, *files: Path) -> None:
+    """Refuse to replace a folder that holds what is imported."""
+    for file in files:
+        if file.resolve().is_relative_to(out.resolve()):
+            raise SceneError(f"{file} is in {out}, which would be replaced; choose another --out")
 
 
 def _check(imported: ImportedScene, limits: LimitSettings) -> None:
