@@ -51,9 +51,11 @@ def test_the_printed_command_renders_with_the_settings_of_the_file(run, shot, tm
 
 
 def test_as_json(run, shot, tmp_path):
-    result = run("import", shot(), "--out", tmp_path / "s", "--json", "--frames", "3-5", "--size", "32x24")
+    source = shot(files=["/wood.png"])
+    result = run("import", source, "--out", tmp_path / "s", "--json", "--frames", "3-5", "--size", "32x24")
     found = json.loads(result.stdout)
     assert (found["frames"], found["size"], found["view"]) == ([3, 5], [32, 24], RESULT["view"])
+    assert (found["folder"], found["files"]) == (str(tmp_path / "s"), ["/wood.png"])
     assert found["wall_s"] > 0.0
 
 

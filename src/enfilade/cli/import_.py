@@ -105,7 +105,7 @@ def command(
     spent = Source.read(folder)
     if as_json:
         found = _table(imported, spent) | ({"check": checked} if checked else {})
-        click.echo(json.dumps(found, indent=2))
+        click.echo(json.dumps(found, indent=2, default=str))
         return
     for line in (*_notes(imported.notes), *_ending(imported, spent), *_check_lines(checked)):
         click.echo(line)
@@ -161,10 +161,9 @@ def _span(frames: str) -> tuple[int, int]:
 
 
 def _table(imported: ImportedScene, spent: Source) -> dict[str, object]:
-    """The import as plain values, fit for JSON."""
-    table = {**asdict(imported), "folder": str(imported.folder)}
+    """The import as values for JSON, and paths."""
     times = {"wall_s": spent.wall_s, "cpu_s": spent.cpu_s}
-    return {**table, "notes": [note.to_json() for note in imported.notes], **times}
+    return {**asdict(imported), "notes": [note.to_json() for note in imported.notes], **times}
 
 
 def _notes(notes: Iterable[Note]) -> Iterator[str]:
