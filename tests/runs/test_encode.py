@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -98,7 +100,13 @@ def test_a_damaged_frame_is_not_encoded(own):
     assert not list(own.glob("*encoded*"))
 
 
-def test_another_configuration_drops_the_view_of_the_run(run):
+def test_another_configuration_drops_the_view_of_the_run(run, own):
+    table = json.loads((own / "job.json").read_text())
+    table["settings"]["video"] |= {"ocio": "/own.ocio", "view": "AgX", "look": "Punchy", "display": "sRGB"}
+    (own / "job.json").write_text(json.dumps(table))
+    np.testing.assert_array_equal(
+        images(encode(own, {"video": {"ocio": ""}}, Silence())), images(run / "video.mkv")
+    )
     with pytest.raises(SettingsError, match="view"):
         encode(run, {"video": {"view": "Film"}}, Silence())
     pytest.importorskip("PyOpenColorIO")
