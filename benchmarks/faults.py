@@ -44,6 +44,7 @@ EXECUTORS = (("in-process", 1), ("processes", 1), ("processes", 2), ("processes"
 LIMITS = ("--set", "limits.task_timeout_s=60", "--set", "limits.preflight_s=300")
 ALONE = ("unshare", "-n", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")  # Ray listens on all interfaces
 TIMEOUT_S = 3600
+DELIVERED = ("frames/", "clips/", "video")  # other files are made again only if they are read
 SCENE = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="5"/></integrator>
   <shape type="rectangle">
@@ -181,7 +182,7 @@ def compare(case: Case, out: Path, what: str) -> str:
     run = RunFolder.read(out)
     if run.digest() != case.digest:
         raise WrongError(f"{what}: the ledger differs")
-    if damaged := run.damaged():
+    if damaged := [name for name in run.damaged() if (out / name).exists() or name.startswith(DELIVERED)]:
         raise WrongError(f"{what}: {damaged[0]} differs")
     if left := list(out.rglob(".*writing-*")):
         raise WrongError(f"{what}: {left[0]} is left")
@@ -339,7 +340,7 @@ def bits(case: Case, place: Path, chance: random.Random, number: int) -> str:
     data[place_of_bit // 8] ^= 1 << place_of_bit % 8
     file.write_bytes(data)
     for later in names:  # tasks that read the file are done again
-        if number % 3 == 1 and later.startswith(("frames/", "clips/", "video")) and later != name:
+        if number % 3 == 1 and later.startswith(DELIVERED) and later != name:
             (out / later).unlink()
     return continued(case, out, f"bit {place_of_bit} of {name}", "--verify")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 
 import pytest
 
@@ -103,7 +104,7 @@ def test_damaged_files_are_found_by_verifying_and_missing_ones_at_once(job, run,
     assert monitor.done == []  # their sizes are right
     render(job, run, monitor, is_verified=True)
     assert monitor.said == [
-        f"{name} is missing or damaged: its task is done again"
+        f"{name} is missing or damaged: its task is done again, if it is still needed"
         for name in ("light/0003.exr", "frames/0002.exr")
     ]
     assert sorted(monitor.done) == ["frames", "light"]
@@ -121,6 +122,22 @@ def test_damaged_files_are_found_by_verifying_and_missing_ones_at_once(job, run,
         "frames-2",
         "frames-4",
     }
+
+
+def test_records_of_a_finished_run_may_be_deleted(job, run, tmp_path, whole):
+    render(job, run, Silence())
+    shutil.rmtree(run / "light")
+    shutil.rmtree(run / "mean")
+    monitor = Recorder()
+    render(job, run, monitor)
+    assert monitor.done == []
+    render(changed(job, VideoSettings, codec="prores"), run, monitor)
+    assert monitor.done == ["clips", "video"]
+    (run / "frames" / "0002.exr").unlink()
+    render(job, run, monitor)
+    assert sorted(set(monitor.done[2:])) == ["clips", "frames", "light", "mean", "video"]
+    assert attempts(tmp_path)["frames-1"] == 1
+    assert digest(run) == whole
 
 
 @pytest.mark.parametrize("place", [400, -1])

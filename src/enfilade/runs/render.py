@@ -74,7 +74,7 @@ def render(
             monitor.message(note)
         for name in run.damaged() if is_verified else ():
             run.forget(name)
-            monitor.message(f"{name} is missing or damaged: its task is done again")
+            monitor.message(f"{name} is missing or damaged: its task is done again, if it is still needed")
         work(job, run, workers or Workers(), monitor)
         run.sweep()  # of workers that were killed
         summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}

@@ -12,7 +12,7 @@ from typing import Any
 from enfilade.device import active
 from enfilade.errors import DamagedFileError, EnfiladeError, UnfinishedError
 from enfilade.files import whole_file
-from enfilade.methods.base import Pass, Task, TaskId
+from enfilade.methods.base import FRAMES, Pass, Task, TaskId
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO, analysis_tasks, video_tasks
 from enfilade.runs.executor import Executor, InProcess, Order, Workers
@@ -56,6 +56,23 @@ def is_done(job: Job, run: RunFolder, task: Task) -> bool:
     return not is_video or bool(line["video"] == job.video_identity)
 
 
+def tasks_left(job: Job, run: RunFolder, tasks: Iterable[Task]) -> list[Task]:
+    """Tasks to do, of some: those that never finished, and those whose files are lost and still needed.
+
+    Files of frames and of the video are needed, and records that a pass with tasks to do reads.
+    """
+    left: list[Task] = []
+    needed = {FRAMES, CLIPS.name, VIDEO.name}
+    undone = [task for task in tasks if not is_done(job, run, task)]
+    for of in reversed(passes_of(job)):
+        own = [task for task in undone if task.pass_name == of.name]
+        numbers = [job.path.numbers[task.frame] for task in own]
+        if of.name in needed or any(run.recorded(of.name, number) is None for number in numbers):
+            left += own
+            needed.update(of.reads if own else ())
+    return left
+
+
 def work(
     job: Job, run: RunFolder, workers: Workers, monitor: Monitor, *, chosen: Chosen | None = None
 ) -> None:
@@ -87,7 +104,7 @@ def work(
         while True:
             # The analysis alone, at first: the tasks of the method depend on it.
             mine = tasks_of(job, run) if chosen is None else chosen(tasks_of(job, run))
-            left = [task for task in mine if not is_done(job, run, task)]
+            left = tasks_left(job, run, mine)
             if not left:
                 return
             executor = executor or open_executor(job, run, workers)
