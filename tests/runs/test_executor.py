@@ -65,6 +65,18 @@ def test_a_host_with_another_scene_is_refused(begun):
     assert executor.wait(None)[0].result.kind is FailureKind.FATAL
 
 
+def test_a_host_with_another_denoiser_is_refused(tmp_path, monkeypatch):
+    job = toy_job(tmp_path, method="decoupled")
+    monkeypatch.setattr("enfilade.methods.decoupled.method.denoiser_name", lambda: "OIDN 1")
+    prepare(job, tmp_path / "run")
+    monkeypatch.setattr("enfilade.methods.decoupled.method.denoiser_name", lambda: "OIDN 2")
+    run = RunFolder.read(tmp_path / "run")
+    with pytest.raises(RunFolderError, match="or of the denoiser is not that with which the run began"):
+        open_worker(job, run)
+    del run.identity["method"]["denoiser"]  # as runs of earlier versions
+    open_worker(job, run)
+
+
 @pytest.mark.parametrize(
     ("paths", "reduction", "left"), [(1 << 20, 4, 1 << 18), (5000, 16, 1024), (1024, 4, 1024)]
 )

@@ -16,6 +16,7 @@ import pytest
 
 import enfilade
 from enfilade.errors import RunFolderError, SceneError, SettingsError
+from enfilade.methods.denoise import denoiser_name
 from enfilade.runs.job import Job, read_job
 from enfilade.runs.render import prepare
 from enfilade.scene.opener import Scene
@@ -77,6 +78,13 @@ def test_everything_else_counts(tmp_path, key, changed):
     before, after = job.identity(), changed(job).identity()
     assert before[key] != after[key]
     assert set(before) == {"enfilade", "method", "scene", "path", "settings"}
+
+
+def test_the_denoiser_counts_where_it_is_used(tmp_path):
+    name = denoiser_name()
+    for denoiser, expected in (("balanced", name), ("none", None)):
+        job = toy_job(tmp_path, method="decoupled", decoupled={"denoiser": denoiser})
+        assert job.identity()["method"].get("denoiser") == expected
 
 
 def other_scene(scene):

@@ -164,6 +164,14 @@ class Method(ABC):
         """
         del settings
 
+    def libraries(self, settings: Settings) -> Mapping[str, str]:
+        """Name and version of each library on which the results depend, by its purpose; none by default.
+
+        A run is not continued with other versions. That of the renderer is always recorded.
+        """
+        del settings
+        return {}
+
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Initial keyframes, for plans and charts; none by default."""
         del analysis

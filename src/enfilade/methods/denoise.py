@@ -106,7 +106,9 @@ def _device() -> Any:
 
 
 def denoiser_name() -> str:
-    """Name and version of the denoiser."""
+    """Name and version of the denoiser; SettingsError where it is not installed."""
+    if why := why_no_denoiser():
+        raise SettingsError(why)
     return f"Open Image Denoise (pyoidn {version('pyoidn')})"
 
 

@@ -13,6 +13,7 @@ from enfilade.errors import RunFolderError, SettingsError
 from enfilade.methods.base import Task
 from enfilade.runs.failure import Failure
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import forms_of
 from enfilade.runs.job import Job
 from enfilade.runs.worker import Worker
 from enfilade.settings import LimitSettings
@@ -181,10 +182,10 @@ def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
     RunFolderError
         This host would render another result: another scene, version or device.
     """
-    if job.identity() != run.identity:
+    if run.identity not in forms_of(job.identity()):
         raise RunFolderError(
-            f"{run.folder}: the scene, the device, or the version of enfilade or of the renderer is not that "
-            "with which the run began; `enfilade render` lists the differences"
+            f"{run.folder}: the scene, the device, or the version of enfilade, of the renderer or of the "
+            "denoiser is not that with which the run began; `enfilade render` lists the differences"
         )
     if reduction > 1:
         paths = job.settings[LimitSettings].paths_in_flight

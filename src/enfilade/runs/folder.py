@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from enfilade.errors import DamagedFileError, RunFolderError
 from enfilade.files import sweep, write_json
-from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, digest_of, identity_of
+from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, digest_of, forms_of, identity_of
 from enfilade.runs.ledger import LEDGER_FILE, Ledger, digest_line
 from enfilade.runs.lock import Lock
 
@@ -83,7 +83,11 @@ class RunFolder:
         lock = Lock(folder)
         try:
             run = cls(folder, wanted, lock)
-            head, known = {"format": FORMAT, "identity": digest_of(wanted)}, run._ledger.head
+            known = run._ledger.head
+            for form in forms_of(wanted):
+                if digest_of(form) == known.get("identity") or _has_identity(folder, form):
+                    run.identity = wanted = form
+            head = {"format": FORMAT, "identity": digest_of(wanted)}
             if known != head:
                 check_same(folder, wanted, is_begun=bool(known))
             if not _has_identity(folder, wanted):

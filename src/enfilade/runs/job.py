@@ -81,11 +81,17 @@ class Job:
         ------
         SceneError
             The scene is missing or malformed.
+        SettingsError
+            A library of the method is not installed.
         """
         method = self.opened_method()
         return {
             "enfilade": __version__,
-            "method": {"name": method.name, "revision": method.revision},
+            "method": {
+                "name": method.name,
+                "revision": method.revision,
+                **method.libraries(self.settings),
+            },
             "scene": self.scene.identity(),
             "path": path_identity(self.path),
             "settings": self.settings.to_tables([*method.settings, OutputSettings]),

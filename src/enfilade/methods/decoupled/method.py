@@ -18,7 +18,7 @@ from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import VirtualImages
-from enfilade.methods.denoise import why_no_denoiser
+from enfilade.methods.denoise import denoiser_name, why_no_denoiser
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Frame
 from enfilade.renderer import LobeRenderer
@@ -63,6 +63,10 @@ class Decoupled(Method):
         """
         if settings[DecoupledSettings].denoiser != "none" and (why := why_no_denoiser()):
             raise SettingsError(why)
+
+    def libraries(self, settings: Settings) -> Mapping[str, str]:
+        """The denoiser, where it is used."""
+        return {} if settings[DecoupledSettings].denoiser == "none" else {"denoiser": denoiser_name()}
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Keyframes, which have irradiance images."""
