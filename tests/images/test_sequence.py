@@ -90,6 +90,7 @@ def test_a_run_states_its_rate_and_where_shots_begin(tmp_path, selected, cuts, s
     (tmp_path / "frames").mkdir()
     for number in (1, 2, 5, 11):
         exr(tmp_path / "frames" / f"{number:04}.exr", number)
+        Image.new("RGB", (6, 4)).save(tmp_path / "frames" / f"{number:04}.png")  # a heatmap
     path = {"fps": 23.976, "frames": None if selected is None else list(selected), "cuts": cuts}
     (tmp_path / "run.json").write_text(json.dumps({"identity": {"path": path}}))
     (tmp_path / "job.json").write_text(json.dumps({"settings": {"viewing": {"exposure_ev": 1.5}}}))

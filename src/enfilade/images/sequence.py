@@ -60,7 +60,8 @@ def files_of(source: Path | str) -> list[Path]:
     path = Path(source)
     if path.is_dir():
         folder = _image_folder(path)
-        return _images(folder.iterdir()) if folder.is_dir() else []
+        # The frames of a run are OpenEXR files; a heatmap may be written beside them.
+        return _images(folder.glob("*" if folder == path else "*.exr"))
     if path.is_file():
         return [path]
     if NUMBER_FIELD.search(path.name) and path.parent.is_dir():
