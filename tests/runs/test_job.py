@@ -167,6 +167,11 @@ def test_wrong_input_is_refused_before_the_scene_is_loaded(tmp_path):
     job = toy_job(tmp_path, path=slide(2, size=(65, 48)))
     with pytest.raises(SettingsError, match="65x48"):
         dataclasses.replace(job, settings=job.settings.replace(VideoSettings, codec="av1")).check()
+    fast = toy_job(
+        tmp_path, path=dataclasses.replace(slide(2, size=(64, 64)), fps=250.0), video={"codec": "av1"}
+    )
+    with pytest.raises(SettingsError, match="250 frames per second"):
+        fast.check()
     with pytest.raises(SettingsError, match="no method 'fast'"):
         dataclasses.replace(job, method="fast").check()
     job.scene.file.unlink()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from enfilade.errors import SettingsError
 
@@ -30,6 +32,8 @@ class Codec:
         Largest rate factor; 0 if the codec has none.
     options : mapping of str to str
         Of the encoder.
+    max_height, max_fps : float
+        Largest height in pixels, and frames per second.
     """
 
     encoder: str
@@ -40,16 +44,30 @@ class Codec:
     min_side: int
     max_quality: int
     options: Mapping[str, str]
+    max_height: float = math.inf
+    max_fps: float = math.inf
 
     def pixel_format_for(self, width: int, height: int) -> str:
         """Pixel format for an image size; SettingsError if the codec can't encode it."""
         problem = f"{self.encoder} can't encode {width}x{height} pixels"
         if min(width, height) < self.min_side:
             raise SettingsError(f"{problem}: {self.min_side} is its least; choose another [video] codec")
+        if height > self.max_height:
+            raise SettingsError(
+                f"{problem}: {self.max_height} is its greatest height; choose another [video] codec"
+            )
         chosen = self.odd_pixel_format if width % 2 or height % 2 else self.pixel_format
         if not chosen:
             raise SettingsError(f"{problem}; choose an even size or another [video] codec")
         return chosen
+
+    def check_rate(self, fps: float | Fraction) -> None:
+        """Refuse frames per second that the codec can't encode, by a SettingsError."""
+        if fps > self.max_fps:
+            raise SettingsError(
+                f"{self.encoder} can't encode {float(fps):g} frames per second: {self.max_fps} is its most; "
+                "choose another [video] codec"
+            )
 
     def options_for(self, quality: int) -> dict[str, str]:
         """Options of the encoder for a rate factor; SettingsError if it is out of range."""
@@ -79,7 +97,7 @@ CODECS = {
     ),
     "av1": Codec(
         "libsvtav1", ".mp4", 10, "yuv420p10le", "", 64, 63,
-        {"preset": "6", "svtav1-params": "lp=1:lookahead=16"},
+        {"preset": "6", "svtav1-params": "lp=1:lookahead=16"}, 8704, 240,
     ),
     "prores": Codec("prores_ks", ".mov", 10, "yuv444p10le", "yuv444p10le", 2, 0, {"profile": "4444"}),
 }  # fmt: skip

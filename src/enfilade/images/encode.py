@@ -58,7 +58,7 @@ def encode_video(
     Raises
     ------
     SettingsError
-        An unknown codec or view, or a size that the codec can't encode.
+        An unknown codec or view, or a size or frame rate that the codec can't encode.
     ImageError
         There are no frames, or one has another size or holds a NaN.
     RunFolderError, NoSpaceError
@@ -69,6 +69,7 @@ def encode_video(
     options = codec.options_for(settings.quality)
     view = open_view(settings, exposure_ev)
     rate = exact_fps(fps)
+    codec.check_rate(rate)
     os.environ.setdefault("SVT_LOG", "1")  # the only way to restrict SVT-AV1's output on stderr to errors
     with written_container(file) as container:
         stream = container.add_stream(codec.encoder, rate=rate, options=options)
@@ -88,10 +89,13 @@ def encode_video(
         container.mux(stream.encode(None))
 
 
-def check_encodable(settings: VideoSettings, *, width: int, height: int, exposure_ev: float) -> None:
+def check_encodable(
+    settings: VideoSettings, *, fps: float, width: int, height: int, exposure_ev: float
+) -> None:
     """Raise before rendering the SettingsError that :func:`encode_video` would raise after it."""
     codec = codec_named(settings.codec)
     codec.pixel_format_for(width, height)
+    codec.check_rate(exact_fps(fps))
     codec.options_for(settings.quality)
     open_view(settings, exposure_ev)
 

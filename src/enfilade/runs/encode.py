@@ -70,7 +70,7 @@ def encode(
     video = _video(job.settings[VideoSettings], changes.get("video", {}))
     viewing = job.settings[ViewingSettings].to_table() | dict(changes.get("viewing", {}))
     exposure_ev = ViewingSettings.from_table(viewing).exposure_ev
-    check_encodable(video, width=path.width, height=path.height, exposure_ev=exposure_ev)
+    check_encodable(video, fps=path.fps, width=path.width, height=path.height, exposure_ev=exposure_ev)
     suffix = video_suffix(video.codec)
     file = folder / f"{STEM}{suffix}" if file is None else file
     _check_free(run, file, suffix, is_replaced=is_replaced)

@@ -116,6 +116,7 @@ class Job:
         self.scene.check(self.settings[LimitSettings])
         check_encodable(
             self.settings[VideoSettings],
+            fps=self.path.fps,
             width=self.path.width,
             height=self.path.height,
             exposure_ev=self.settings[ViewingSettings].exposure_ev,
