@@ -90,6 +90,8 @@ def test_other_settings_of_the_video_encode_again_and_nothing_else(job, run, tmp
     summary = render(changed(job, VideoSettings, codec="prores"), run, monitor, Workers("processes", 1))
     assert monitor.done == ["clips", "video"]
     assert (summary["video"], len(open_sequence(run / "video.mov"))) == ("video.mov", 4)
+    videos = [*run.glob("video.*"), *(run / "clips").iterdir()]
+    assert sorted(file.name for file in videos) == ["0001.mov", "video.mov"]
     assert set(attempts(tmp_path).values()) == {1}
     render(job, run, Silence())
     assert digest(run) == whole

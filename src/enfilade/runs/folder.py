@@ -174,11 +174,17 @@ class RunFolder:
     def finish(self, line: Mapping[str, Any]) -> None:
         """Append a line to the ledger; when this returns, its task is finished.
 
+        Files that an earlier line of the task names, and the new one does not, are removed.
+
         Raises
         ------
         RunFolderError, NoSpaceError
         """
+        earlier = self.recorded(line["pass"], line["frame"]) or {"files": ()}
         self._ledger.append(line)
+        for name in earlier["files"]:
+            if self._ledger.writer(name) is None:
+                _remove(self._file(name))
 
     def record_of(self, files: Sequence[Path]) -> dict[str, dict[str, Any]]:
         """Sizes and checksums of files of this folder, for the line of the task that wrote them."""
@@ -253,11 +259,8 @@ class RunFolder:
         file = self._file(name)
         self.refresh()
         line = self._ledger.writer(name)
-        try:
-            if line is None or not _is_intact(file, line["files"][name]):
-                file.unlink(missing_ok=True)
-        except OSError as error:
-            raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
+        if line is None or not _is_intact(file, line["files"][name]):
+            _remove(file)
 
     def digest(self) -> str:
         """Checksum of the results: of all lines but their times, independent of their order."""
@@ -283,6 +286,13 @@ def _size(file: Path) -> int | None:
         return file.stat().st_size
     except OSError:
         return None
+
+
+def _remove(file: Path) -> None:
+    try:
+        file.unlink(missing_ok=True)
+    except OSError as error:
+        raise RunFolderError(f"can't remove {file}: {error.strerror}") from error
 
 
 def _is_intact(file: Path, record: Mapping[str, Any]) -> bool:
