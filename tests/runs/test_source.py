@@ -84,9 +84,22 @@ def test_before_the_run_begins_a_changed_file_is_imported_again(shot, tables, tm
     assert imported(source, run, tables).fps == 25.0
     assert imported(source, run, tables).fps == 25.0
     assert len(source.with_suffix(".calls").read_text().splitlines()) == 2
-    (run / "run.json").touch()
-    with pytest.raises(RunFolderError, match="has changed since it was imported"):
-        imported(shot(), run, tables)
+    for name in ("run.json", "ledger.jsonl"):
+        (run / name).touch()
+        with pytest.raises(RunFolderError, match="has changed since it was imported"):
+            imported(shot(), run, tables)
+        (run / name).unlink()
+
+
+@pytest.mark.parametrize("name", ["run.json", "ledger.jsonl"])
+def test_nothing_is_imported_into_another_run(shot, tables, tmp_path, name):
+    run, source = tmp_path / "run", shot()
+    run.mkdir()
+    (run / name).touch()
+    with pytest.raises(RunFolderError, match="a run whose scene was not imported"):
+        imported(source, run, tables)
+    assert [file.name for file in run.iterdir()] == [name]
+    assert not source.with_suffix(".calls").exists()
 
 
 def test_wrong_files_leave_no_folder(tables, tmp_path):

@@ -8,6 +8,7 @@ from enfilade.errors import RunFolderError, SceneError
 from enfilade.files import sweep
 from enfilade.monitor import Monitor
 from enfilade.runs.identity import RUN_FILE, SCENE_FOLDER, check_place
+from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import Lock
 from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.importer import check_strict, import_file
@@ -70,6 +71,8 @@ def imported_into(
             check_strict(imported)
         return imported
     check_source(source)
+    if _has_begun(run):
+        raise RunFolderError(f"{run} holds a run whose scene was not imported; choose another --out")
     check_place(run)
     lock = Lock(run)
     try:
@@ -83,6 +86,10 @@ def imported_into(
     for group in grouped(imported.notes_of(NoteKind.NOT_CARRIED)):
         monitor.message(f"not carried over: {group.listed}: {group.what}; {group.effect}")
     return imported
+
+
+def _has_begun(run: Path) -> bool:
+    return (run / RUN_FILE).exists() or (run / LEDGER_FILE).exists()
 
 
 def _is_kept(run: Path, source: Path, choices: Choices) -> bool:
@@ -100,7 +107,7 @@ def _is_kept(run: Path, source: Path, choices: Choices) -> bool:
             f"there is no file {source}; the run has its scene: `enfilade work {run}` continues without it"
         )
     changes = Source.read(run / SCENE_FOLDER).differences(source, choices)
-    if changes and (run / RUN_FILE).exists():
+    if changes and _has_begun(run):
         listed = "".join(f"\n  {change}" for change in changes)
         raise RunFolderError(
             f"{run} holds a run of another import:{listed}\nChoose another --out, or delete {run} to begin "
