@@ -464,8 +464,7 @@ class Settings:
         for name, table in tables.items():
             if name not in known:
                 raise SettingsError(f"unknown section [{name}]; known are: {', '.join(known)}")
-            if not isinstance(table, dict):
-                raise SettingsError(f"[{name}] must be a table of settings, not {table!r}")
+            _check_table(name, table)
         return cls(*(known[name].from_table(table) for name, table in tables.items()))
 
     def to_tables(self, kinds: Iterable[type[Section]] = SECTIONS) -> dict[str, dict[str, Any]]:
@@ -474,19 +473,27 @@ class Settings:
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """Tables of a TOML file, unchecked; :meth:`Settings.from_tables` checks them.
+    """Tables of a TOML file, whose settings are unchecked; :meth:`Settings.from_tables` checks them.
 
     Raises
     ------
     SettingsError
-        The file can't be read or is no TOML.
+        The file can't be read, is no TOML, or has something else than tables.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Windows' editors write a mark
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # Windows' editors write a mark
     except OSError as error:
         raise SettingsError(f"can't read the settings {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # numbers of 5000 digits and deep nesting included
         raise SettingsError(f"{path} is not valid TOML: {error}") from error
+    for name, table in tables.items():
+        _check_table(name, table)
+    return tables
+
+
+def _check_table(name: str, table: Any) -> None:
+    if not isinstance(table, dict):
+        raise SettingsError(f"[{name}] must be a table of settings, not {table!r}")
 
 
 def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any:

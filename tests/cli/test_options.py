@@ -142,6 +142,7 @@ def test_wrong_input_is_one_message_and_2(run, jobs, camera_path, flags, words):
         ("[keyframe]\nspacing = 30\n", ("unknown section [keyframe]", "keyframes")),
         ("[keyframes]\nspaces = 30\n", ("unknown setting 'spaces'", "spacing")),
         ("keyframes = 3\n", ("[keyframes] must be a table",)),
+        ("trace = 3\n", ("[trace] must be a table",)),
         ("[keyframes\n", ("not valid TOML",)),
     ],
 )
@@ -149,7 +150,7 @@ def test_a_wrong_file_names_the_place(run, jobs, camera_path, tmp_path, text, wo
     file = tmp_path / "look.toml"
     file.write_text(text)
     out = camera_path.parent / "run"
-    result = run("render", "s.xml", "--path", camera_path, "--out", out, "--settings", file)
+    result = run("render", "s.xml", "--path", camera_path, "--out", out, "--settings", file, "--seed", "1")
     assert result.exit_code == 2
     for word in words:
         assert word in result.stderr

@@ -260,9 +260,9 @@ def _assignment(text: str) -> tuple[str, str, Any]:
 
 def _make_absolute(tables: dict[str, Any], folder: Path, kinds: Iterable[type[Section]]) -> None:
     for kind in kinds:
-        table = tables.get(kind.table)
+        table = tables.get(kind.table, {})
         for field in fields(kind):
-            if field.metadata["is_path"] and isinstance(table, dict) and field.name in table:
+            if field.metadata["is_path"] and field.name in table:
                 table[field.name] = _absolute(table[field.name], folder, field.metadata["joined_by"])
 
 

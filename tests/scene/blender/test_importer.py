@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from enfilade.errors import SceneError
+from enfilade.errors import SceneError, SettingsError
 from enfilade.images.view import files_of_view
 from enfilade.monitor import Silence
 from enfilade.scene.blender import process
@@ -103,6 +103,9 @@ def test_settings_of_the_file_stand_under_those_given(load, shot):
     config = str(made.folder / "colormanagement" / "config.ocio")
     assert made.tables_under({"video": {"view": "Raw"}})["video"] == {"ocio": config, "view": "Raw"}
     assert made.tables_under({"video": {"ocio": ""}})["video"] == {"ocio": ""}
+    (made.folder / "settings.toml").write_text("video = 1")
+    with pytest.raises(SettingsError, match=r"\[video\] must be a table"):
+        made.tables_under({})
 
 
 def test_an_earlier_import_is_replaced_as_a_whole(load, shot):

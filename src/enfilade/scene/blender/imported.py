@@ -130,7 +130,7 @@ class ImportedScene:
         Raises
         ------
         SettingsError
-            ``settings.toml`` can't be read.
+            ``settings.toml`` can't be read, or holds something else.
         """
         tables = read_tables(self.folder / SETTINGS_FILE)
         video = tables.get("video", {})
@@ -140,9 +140,7 @@ class ImportedScene:
             video = {**video, "ocio": str((self.folder / video["ocio"]).resolve())}
         merged = dict(given)
         for name, table in {**tables, "video": video}.items():
-            over = given.get(name, {})
-            if isinstance(over, dict):  # anything else is refused with the other settings
-                merged[name] = {**table, **over}
+            merged[name] = {**table, **given.get(name, {})}
         return merged
 
     @staticmethod
