@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from enfilade.cli import work
+from enfilade.cli import farm, work
 from enfilade.images import read_exr
 from enfilade.runs.folder import RunFolder
 
@@ -136,3 +136,7 @@ def test_contradictory_options_are_refused(run, words, message):
     result = run(*words)
     assert result.exit_code == 2
     assert message in result.stderr
+
+
+def test_values_for_slurm_are_numbers_where_they_look_like_it():
+    assert [farm._pair(f"a={value}") for value in ("60", "60m", "²")] == [("a", 60), ("a", "60m"), ("a", "²")]

@@ -52,7 +52,7 @@ def test_a_folder_of_two_sequences_is_not_taken_for_one(tmp_path, names, listed)
     assert len(open_sequence(tmp_path / "*.exr")) == len(names)
 
 
-@pytest.mark.parametrize("name", ["%04d", "%d", "####", "#", "*", "[0-9]*"])
+@pytest.mark.parametrize("name", ["%04d", "%d", "####", "#", "*", "**", "[0-9]*"])
 def test_patterns(tmp_path, name):
     for number in (1, 2, 10):
         exr(tmp_path / f"shot-{number}.exr", number)

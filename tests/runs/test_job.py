@@ -172,8 +172,9 @@ def test_wrong_input_is_refused_before_the_scene_is_loaded(tmp_path):
     )
     with pytest.raises(SettingsError, match="250 frames per second"):
         fast.check()
-    with pytest.raises(SettingsError, match="no method 'fast'"):
-        dataclasses.replace(job, method="fast").check()
+    for name in ("fast", ".support:Toy", ":Toy"):
+        with pytest.raises(SettingsError, match=f"no method '{name}'"):
+            dataclasses.replace(job, method=name).check()
     job.scene.file.unlink()
     with pytest.raises(SceneError, match="no scene file"):
         job.check()

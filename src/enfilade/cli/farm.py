@@ -60,4 +60,4 @@ def _pair(text: str) -> tuple[str, Any]:
     key, _, value = text.partition("=")
     if not key or not value:
         raise click.BadParameter(f"{text!r} is not KEY=VALUE", param_hint="--slurm")
-    return key, int(value) if value.isdigit() else value
+    return key, int(value) if value.isdecimal() else value

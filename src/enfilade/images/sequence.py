@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -64,10 +65,12 @@ def files_of(source: Path | str) -> list[Path]:
         return _images(folder.glob("*" if folder == path else "*.exr"))
     if path.is_file():
         return [path]
-    if NUMBER_FIELD.search(path.name) and path.parent.is_dir():
+    if not path.parent.is_dir():
+        return []
+    if NUMBER_FIELD.search(path.name):
         wanted = re.compile(r"(-?\d+)".join(map(re.escape, NUMBER_FIELD.split(path.name))))
         return _images(f for f in path.parent.iterdir() if wanted.fullmatch(f.name))
-    return _images(path.parent.glob(path.name)) if any(c in path.name for c in "*?[") else []
+    return _images(f for f in path.parent.iterdir() if fnmatchcase(f.name, path.name))
 
 
 def _image_folder(folder: Path) -> Path:

@@ -28,7 +28,7 @@ def open_method(name: str) -> Method:
         There is no such method.
     """
     module, _, attribute = METHODS.get(name, name).partition(":")
-    if not attribute:
+    if not attribute or not all(module.split(".")):
         raise SettingsError(
             f"there is no method {name!r}; choose one of {', '.join(METHODS)}, or give module:Class"
         )
