@@ -153,6 +153,8 @@ def import_scene(
     SceneError
         There is no Blender; the file is missing, damaged or too large; part of it is not carried over, and
         ``[blender] strict`` is set; or the folder holds something else.
+    CameraPathError
+        The size of the images is none.
     RunFolderError, NoSpaceError
         The folder can't be written.
     """

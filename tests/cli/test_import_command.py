@@ -96,13 +96,15 @@ def test_folders_are_replaced_on_demand_only(run, shot, tmp_path):
     ("flags", "words"),
     [
         (("--frames", "1,5"), "takes one range"),
+        (("--size", "0x0"), "0x0 is no image size"),
+        (("--size", "99999x99999"), "each side must be 1 to 16384"),
         (("--set", "decoupled.quality=5"), "has no effect on an import"),
         (("--blender", "/nowhere"), "/nowhere can't import scenes"),
         (("--set", "blender.bake_px=1"), "out of range"),
     ],
 )
 def test_wrong_input(run, shot, tmp_path, flags, words):
-    result = run("import", shot(), "--out", tmp_path / "s", *flags)
+    result = run("import", shot(camera=""), "--out", tmp_path / "s", *flags)
     assert result.exit_code == 2
     assert words in result.stderr
 

@@ -1,8 +1,8 @@
 """Cameras, and camera paths: nerfstudio's camera_path.json, our own keyed poses, and selections of frames."""
 
 from enfilade.camera.frames import parse_frames, ranges
-from enfilade.camera.load import load_path
+from enfilade.camera.load import check_size, load_path
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
 
-__all__ = ["Camera", "CameraPath", "Segment", "load_path", "parse_frames", "ranges"]
+__all__ = ["Camera", "CameraPath", "Segment", "check_size", "load_path", "parse_frames", "ranges"]

@@ -60,6 +60,12 @@ def load_path(
     return path if frames is None else _select(document, path, frames)
 
 
+def check_size(width: int, height: int) -> None:
+    """Refuse images that are too small or too large, by a CameraPathError."""
+    if not all(SIDE_PX[0] <= side <= SIDE_PX[1] for side in (width, height)):
+        raise CameraPathError(f"{width}x{height} is no image size; each side must be 1 to {SIDE_PX[1]:g}")
+
+
 def _image_size(document: JsonObject, size: tuple[int, int] | None) -> tuple[int, int]:
     own: list[int] = []
     if "size" in document:
@@ -69,8 +75,7 @@ def _image_size(document: JsonObject, size: tuple[int, int] | None) -> tuple[int
     if not size and not own:
         raise document.error("the file has no image size; give a size")
     width, height = size or own
-    if not all(SIDE_PX[0] <= side <= SIDE_PX[1] for side in (width, height)):
-        raise CameraPathError(f"{width}x{height} is no image size; each side must be 1 to {SIDE_PX[1]:g}")
+    check_size(width, height)
     exact = width * own[1] / own[0] if own else height
     # small images may deviate by a pixel: videos have even heights
     if abs(height / exact - 1.0) > ASPECT_TOLERANCE and abs(height - exact) > 1.0:

@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from enfilade.camera import load_path
+from enfilade.camera import check_size, load_path
 from enfilade.errors import CameraPathError, SceneError, SettingsError
 from enfilade.files import MARK, read_json, whole_folder, write_json
 from enfilade.images.view import files_of_view
@@ -70,10 +70,14 @@ def import_file(
     SceneError
         There is no Blender; the file is missing, damaged, refused, or too large; a part of it is not
         carried over, and that is an error; or the folder holds something else.
+    CameraPathError
+        The size of the images is none.
     RunFolderError, NoSpaceError
         The folder can't be written.
     """
     check_source(source)
+    if choices.size is not None:
+        check_size(*choices.size)
     _check_place(out, is_replaced=is_replaced)
     _check_outside(out, source)
     blender = find_blender(program)
