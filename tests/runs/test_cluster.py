@@ -126,12 +126,15 @@ def joined(tmp_path, monkeypatch, listening):
     return join
 
 
-def test_a_task_takes_its_share_of_ray(joined, listening):
+def test_a_task_takes_its_share_of_ray(joined, listening, monkeypatch):
     ray, cluster = joined(NODE, BIG, count=4, threads=1)
     assert (cluster.slots, ray.begun["address"]) == (4, f"127.0.0.1:{listening.getsockname()[1]}")
     assert ray.options == {"num_cpus": 1, "num_gpus": 0.0, "max_retries": 0, "max_calls": 0}
     ray, _ = joined(BIG, count=3, threads=2, address="")
     assert (ray.begun["address"], ray.begun["num_cpus"]) == ("local", 6)
+    monkeypatch.setattr("enfilade.runs.cluster.cores", lambda: 2)
+    ray, _ = joined(BIG, threads=4, address="")
+    assert ray.begun["num_cpus"] == 4
     ray, _ = joined(BIG, address="auto")
     assert ray.begun["address"] == "auto"
 

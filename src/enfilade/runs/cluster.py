@@ -56,7 +56,7 @@ class Cluster:
         self._in_hand: dict[Any, int] = {}
         threads = max(workers.threads, 1)
         try:
-            self._connect(address, cpus=max((workers.count or cores() // threads) * threads, 1))
+            self._connect(address, cpus=(workers.count or max(cores() // threads, 1)) * threads)
             nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
         except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
             start = "start one there with `ray start --head`, or correct --executor ray:HOST:PORT"
