@@ -27,6 +27,13 @@ def test_it_reports_why_lobes_are_inseparable(scene):
     assert checked(scene(BALL), max_depth=3) == "its paths end at depth 3, below 4"
 
 
+def test_what_its_process_prints_is_not_its_answer(scene, tmp_path, monkeypatch):
+    printing = "import atexit, os\natexit.register(os.write, 1, b'a plugin says')\n"
+    (tmp_path / "sitecustomize.py").write_text(printing)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    assert checked(scene(BALL)) == ""
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [

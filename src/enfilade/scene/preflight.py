@@ -64,6 +64,8 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
 
 def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     die_with(parent)
+    out = os.dup(1)
+    os.dup2(2, 1)  # whatever a plugin prints is not the answer
     settings = Settings.from_tables(json.loads(tables))
     signal.setitimer(signal.ITIMER_REAL, settings[LimitSettings].preflight_s)  # for a parent that is stopped
     is_gpu = variant.startswith("cuda")
@@ -82,7 +84,7 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
         answer["why_inseparable"] = renderer.why_inseparable
     except SceneError as error:
         answer["error"] = str(error)
-    sys.stdout.write(json.dumps(answer))
+    os.write(out, json.dumps(answer).encode())
 
 
 if __name__ == "__main__":
