@@ -312,7 +312,9 @@ class VideoSettings(Section):
     codec: str = option("h264", "Codec of the video.", choices=("h264", "ffv1", "av1", "prores"))
     quality: int = option(16, "Constant rate factor of h264 and av1: lower is better.", least=0, most=63)
     ocio: str = option("", "An OpenColorIO configuration for the view, in place of sRGB.", is_path=True)
-    view: str = option("", "The view of that configuration.")
+    view: str = option(
+        "", "The view of that configuration; another one than a file's or run's leaves out its look."
+    )
     look: str = option("", "A look of that configuration, applied before the view.")
     display: str = option("", "Its display, one for sRGB, Rec.1886 or Rec.709; none: the first of these.")
 

@@ -100,13 +100,38 @@ def test_a_damaged_frame_is_not_encoded(own):
     assert not list(own.glob("*encoded*"))
 
 
-def test_another_configuration_drops_the_view_of_the_run(run, own):
+CONFIG = """ocio_profile_version: 2
+search_path: ""
+roles: {default: lin_rec709, scene_linear: lin_rec709}
+displays:
+  sRGB:
+    - !<View> {name: Raw, colorspace: lin_rec709}
+colorspaces:
+  - !<ColorSpace> {name: lin_rec709}
+"""
+
+
+@pytest.fixture
+def with_look(own):
+    """The run with a view and a look that its configuration does not have."""
+    (own / "own.ocio").write_text(CONFIG)
     table = json.loads((own / "job.json").read_text())
-    table["settings"]["video"] |= {"ocio": "/own.ocio", "view": "AgX", "look": "Punchy", "display": "sRGB"}
+    view = {"view": "AgX", "look": "Punchy", "display": "sRGB"}
+    table["settings"]["video"] |= {"ocio": str(own / "own.ocio"), **view}
     (own / "job.json").write_text(json.dumps(table))
-    np.testing.assert_array_equal(
-        images(encode(own, {"video": {"ocio": ""}}, Silence())), images(run / "video.mkv")
-    )
+    return own
+
+
+def test_another_view_drops_the_look_of_the_run(with_look):
+    pytest.importorskip("PyOpenColorIO")
+    assert len(images(encode(with_look, {"video": {"view": "Raw"}}, Silence()))) == 4
+    with pytest.raises(SettingsError, match="no look 'Punchy'"):
+        encode(with_look, {"video": {"view": "Raw", "look": "Punchy"}}, Silence())
+
+
+def test_another_configuration_drops_the_view_of_the_run(run, with_look):
+    shown = images(encode(with_look, {"video": {"ocio": ""}}, Silence()))
+    np.testing.assert_array_equal(shown, images(run / "video.mkv"))
     with pytest.raises(SettingsError, match="view"):
         encode(run, {"video": {"view": "Film"}}, Silence())
     pytest.importorskip("PyOpenColorIO")

@@ -40,7 +40,7 @@ def encode(
         The run; it may be running.
     changes
         Settings that differ from those of the run: of ``video``, and the exposure of ``viewing``. With
-        another ``ocio``, view, look and display of the run are dropped.
+        another ``ocio``, view, look and display of the run are dropped, with another ``view`` the look.
     monitor
     file
         The video; by default ``encoded`` with the codec's suffix, in the run folder.
@@ -93,6 +93,8 @@ def _video(own: VideoSettings, changes: Mapping[str, Any]) -> VideoSettings:
     table = own.to_table()
     if changes.get("ocio", own.ocio) != own.ocio:
         del table["view"], table["look"], table["display"]
+    elif changes.get("view", own.view) != own.view:
+        del table["look"]
     return VideoSettings.from_table(table | dict(changes))
 
 

@@ -125,7 +125,7 @@ class ImportedScene:
     def tables_under(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Tables of settings of the file, under those that are given, which win.
 
-        A given configuration of OpenColorIO replaces the file's view as a whole.
+        A given configuration of OpenColorIO replaces the file's view as a whole, another view its look.
 
         Raises
         ------
@@ -138,6 +138,8 @@ class ImportedScene:
             video = {}
         elif "ocio" in video:
             video = {**video, "ocio": str((self.folder / video["ocio"]).resolve())}
+            if given.get("video", {}).get("view", video.get("view")) != video.get("view"):
+                video.pop("look", None)
         merged = dict(given)
         for name, table in {**tables, "video": video}.items():
             merged[name] = {**table, **given.get(name, {})}
