@@ -134,11 +134,17 @@ def test_wrong_settings_are_named(tables, problem):
 
 
 @pytest.mark.parametrize(
-    ("layers", "chosen"),
-    [("all", LAYERS), ("none", ()), ("provenance, Z", ("Z", "provenance")), ("N", ("N",))],
+    ("layers", "chosen", "ordered"),
+    [
+        ("all", LAYERS, "all"),
+        (",".join(reversed(LAYERS)), LAYERS, "all"),
+        ("none", (), "none"),
+        ("provenance, Z", ("Z", "provenance"), "Z,provenance"),
+        ("N", ("N",), "N"),
+    ],
 )
-def test_layers_by_name(layers, chosen):
-    assert OutputSettings(layers).chosen == frozenset(chosen)
+def test_layers_by_name(layers, chosen, ordered):
+    assert (OutputSettings(layers).chosen, OutputSettings(layers).ordered) == (frozenset(chosen), ordered)
 
 
 def test_layers_may_be_a_list():

@@ -348,6 +348,12 @@ class OutputSettings(Section):
         groups = {"all": LAYERS, "none": ()}
         return frozenset(groups.get(self.layers, [name.strip() for name in self.layers.split(",")]))
 
+    @property
+    def ordered(self) -> str:
+        """The same layers, always written in the same way."""
+        names = [name for name in LAYERS if name in self.chosen]
+        return {0: "none", len(LAYERS): "all"}.get(len(names), ",".join(names))
+
 
 @dataclass(frozen=True)
 class LimitSettings(Section):

@@ -334,7 +334,7 @@ def _is_finished(job: Job, folder: Path) -> bool:
     """Whether a run folder holds the finished run of a job."""
     if not (folder / "summary.json").is_file():
         return False
-    return bool(json.loads(json.dumps(job.identity())) == RunFolder.read(folder).identity)
+    return RunFolder.read(folder).identity in json.loads(json.dumps(job.identities()))
 
 
 def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:

@@ -88,20 +88,15 @@ def test_another_run_is_refused_with_its_differences(folder):
     RunFolder.create(folder, {**IDENTITY, "path": {"frames": [1, 2, 3], "fps": 24}}).close()
 
 
-def denoised(version):
-    return {**IDENTITY, "method": {"name": "decoupled", "revision": 1, "denoiser": f"OIDN {version}"}}
-
-
-def test_another_denoiser_is_refused_and_one_that_is_not_on_record_is_not(folder, tmp_path):
-    RunFolder.create(folder, denoised(1)).close()
-    with pytest.raises(RunFolderError, match=r'method\.denoiser: "OIDN 1" there, "OIDN 2" now'):
-        RunFolder.create(folder, denoised(2))
-    earlier = {**IDENTITY, "method": {"name": "decoupled", "revision": 1}}
-    RunFolder.create(tmp_path / "earlier", earlier).close()
+def test_a_run_of_an_earlier_version_is_continued(folder):
+    now, earlier = {**IDENTITY, "denoiser": "OIDN 2"}, {**IDENTITY, "denoiser": None}
+    RunFolder.create(folder, earlier).close()
+    with pytest.raises(RunFolderError, match=r'denoiser: null there, "OIDN 2" now'):
+        RunFolder.create(folder, now)
     for lost in ("run.json", "ledger.jsonl", "none"):
-        (tmp_path / "earlier" / lost).unlink(missing_ok=True)
-        with RunFolder.create(tmp_path / "earlier", denoised(2)) as run:
-            assert run.identity == RunFolder.read(run.folder).identity == earlier
+        (folder / lost).unlink(missing_ok=True)
+        with RunFolder.create(folder, now, earlier) as run:
+            assert run.identity == RunFolder.read(folder).identity == earlier
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):

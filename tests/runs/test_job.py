@@ -84,7 +84,16 @@ def test_the_denoiser_counts_where_it_is_used(tmp_path):
     name = denoiser_name()
     for denoiser, expected in (("balanced", name), ("none", None)):
         job = toy_job(tmp_path, method="decoupled", decoupled={"denoiser": denoiser})
-        assert job.identity()["method"].get("denoiser") == expected
+        now, earlier = job.identities()
+        assert now["method"] == {**earlier["method"], **({"denoiser": name} if expected else {})}
+
+
+def test_layers_count_in_any_order(tmp_path):
+    one, other = (toy_job(tmp_path, output={"layers": text}) for text in ("N, Z", ["Z", "N"]))
+    assert one.identity() == other.identity()
+    assert one.identities()[1]["settings"]["output"] == {"layers": "N, Z"}
+    prepare(toy_job(tmp_path, output={"layers": "N,Z"}), tmp_path / "run")
+    prepare(other, tmp_path / "run")
 
 
 def other_scene(scene):

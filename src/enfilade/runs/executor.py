@@ -13,7 +13,6 @@ from enfilade.errors import RunFolderError, SettingsError
 from enfilade.methods.base import Task
 from enfilade.runs.failure import Failure
 from enfilade.runs.folder import RunFolder
-from enfilade.runs.identity import forms_of
 from enfilade.runs.job import Job
 from enfilade.runs.worker import Worker
 from enfilade.settings import LimitSettings
@@ -182,7 +181,7 @@ def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
     RunFolderError
         This host would render another result: another scene, version or device.
     """
-    if run.identity not in forms_of(job.identity()):
+    if run.identity not in job.identities():
         raise RunFolderError(
             f"{run.folder}: the scene, the device, or the version of enfilade, of the renderer or of the "
             "denoiser is not that with which the run began; `enfilade render` lists the differences"

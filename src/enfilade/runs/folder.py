@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from enfilade.errors import DamagedFileError, RunFolderError
 from enfilade.files import sweep, write_json
-from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, digest_of, forms_of, identity_of
+from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, digest_of, identity_of
 from enfilade.runs.ledger import LEDGER_FILE, Ledger, digest_line
 from enfilade.runs.lock import Lock
 
@@ -62,14 +62,15 @@ class RunFolder:
             self.notes.append(f"{LEDGER_FILE}: line {numbers} is damaged and left out")
 
     @classmethod
-    def create(cls, folder: Path, identity: Mapping[str, Any]) -> Self:
+    def create(cls, folder: Path, *identities: Mapping[str, Any]) -> Self:
         """Begin a run in a new or empty folder, or continue the same run.
 
         Parameters
         ----------
         folder
-        identity
-            Everything on which the results depend; fit for JSON.
+        identities
+            Everything on which the results depend, fit for JSON; then other forms of it, in which runs of
+            earlier versions have it.
 
         Raises
         ------
@@ -78,13 +79,14 @@ class RunFolder:
             it.
         NoSpaceError
         """
-        wanted: dict[str, Any] = json.loads(json.dumps(identity, allow_nan=False))
+        forms: list[dict[str, Any]] = json.loads(json.dumps(identities, allow_nan=False))
+        wanted = forms[0]
         check_place(folder)
         lock = Lock(folder)
         try:
             run = cls(folder, wanted, lock)
             known = run._ledger.head
-            for form in forms_of(wanted):
+            for form in forms:
                 if digest_of(form) == known.get("identity") or _has_identity(folder, form):
                     run.identity = wanted = form
             head = {"format": FORMAT, "identity": digest_of(wanted)}

@@ -70,12 +70,6 @@ def identity_of(folder: Path) -> dict[str, Any]:
     return identity
 
 
-def forms_of(identity: dict[str, Any]) -> list[dict[str, Any]]:
-    """An identity, and as runs of earlier versions have it, without the version of the denoiser."""
-    method = identity.get("method", {})
-    return [identity, {**identity, "method": {k: v for k, v in method.items() if k != "denoiser"}}]
-
-
 def check_same(folder: Path, now: dict[str, Any], *, is_begun: bool) -> None:
     """Refuse a folder that holds another run, and list the differences.
 

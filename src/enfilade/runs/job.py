@@ -85,6 +85,7 @@ class Job:
             A library of the method is not installed.
         """
         method = self.opened_method()
+        settings = self.settings.replace(OutputSettings, layers=self.settings[OutputSettings].ordered)
         return {
             "enfilade": __version__,
             "method": {
@@ -94,8 +95,21 @@ class Job:
             },
             "scene": self.scene.identity(),
             "path": path_identity(self.path),
-            "settings": self.settings.to_tables([*method.settings, OutputSettings]),
+            "settings": settings.to_tables([*method.settings, OutputSettings]),
         }
+
+    def identities(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The identity, and as runs of earlier versions have it: without libraries, and with layers as given.
+
+        Raises
+        ------
+        SceneError, SettingsError
+            As :meth:`identity`.
+        """
+        now, method = self.identity(), self.opened_method()
+        earlier = {"name": method.name, "revision": method.revision}
+        settings = self.settings.to_tables([*method.settings, OutputSettings])
+        return now, {**now, "method": earlier, "settings": settings}
 
     @cached_property
     def video_identity(self) -> dict[str, Any]:

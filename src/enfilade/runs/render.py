@@ -193,7 +193,7 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
         check_place(folder)
         if has_preflight and not (folder / LEDGER_FILE).exists():
             job.preflight()
-        run = RunFolder.create(folder, job.identity())
+        run = RunFolder.create(folder, *job.identities())
     except BaseException:
         for place in made:
             with suppress(OSError):
