@@ -18,6 +18,7 @@ from enfilade.errors import (
     UnfinishedError,
 )
 from enfilade.images import open_sequence
+from enfilade.methods.base import Output, Pass, TaskId
 from enfilade.monitor import Silence
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
@@ -25,6 +26,7 @@ from enfilade.runs.job import Job
 from enfilade.runs.render import Shard, prepare, render, render_shard, resume
 from enfilade.scene.opener import Scene
 from enfilade.settings import SECTIONS, OutputSettings, Settings, TraceSettings, VideoSettings, WarpSettings
+from support.toy_method import Light, Toy
 from support.toys import Recorder, attempts, digest, flip, little_room, order, slide, toy_job
 
 
@@ -284,6 +286,33 @@ def test_shards_that_come_too_early_are_refused(tmp_path, run):
         render_shard(run, Shard("dark"), Silence())
     with pytest.raises(SettingsError, match="no shard 3 of 2"):
         Shard("frames", 3, 2)
+
+
+class Held(Toy):
+    """All frames of `light` are copies of the first one, as of a pose that is held."""
+
+    passes = (Pass("light", Light, reads=("light",)), *Toy.passes[1:])
+    copies = tuple(TaskId("light", frame) for frame in (1, 2, 3))
+
+    def tasks(self, analysis):
+        for task in super().tasks(analysis):
+            needs = (TaskId("light", 0),) if task.id in self.copies else task.needs
+            yield dataclasses.replace(task, needs=needs)
+
+    def run(self, task, inputs, walk):
+        if task.id in self.copies:
+            return Output({task.frame: inputs.record("light", 0)})
+        return super().run(task, inputs, walk)
+
+
+def test_a_task_is_in_the_shard_of_those_that_it_needs(tmp_path, run, monkeypatch):
+    monkeypatch.setattr("enfilade.runs.job.open_method", lambda _name: Held())
+    prepare(toy_job(tmp_path), run)
+    render_shard(run, Shard("analysis"), Silence())
+    monitor = Recorder()
+    for number in (2, 1):
+        render_shard(run, Shard("light", number, 2), monitor)
+    assert monitor.done == ["light"] * 4
 
 
 def test_a_shard_makes_damaged_files_of_earlier_passes_again(tmp_path, run, long_whole):

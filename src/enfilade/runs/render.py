@@ -173,9 +173,14 @@ def _of_shard(job: Job, run: RunFolder, tasks: Sequence[Task], shard: Shard) -> 
     mine = [
         task
         for task in tasks
-        if task.pass_name == shard.pass_name and task.frame * shard.count // count + 1 == shard.number
+        if task.pass_name == shard.pass_name and _place(task) * shard.count // count + 1 == shard.number
     ]
     return [*lost, *mine]
+
+
+def _place(task: Task) -> int:
+    """The frame by which a task belongs to a shard: its own, or that of a task of its pass that it needs."""
+    return min([task.frame, *(need.frame for need in task.needs if need.pass_name == task.pass_name)])
 
 
 def _too_early(run: RunFolder, pass_name: str, which: str = "") -> UnfinishedError:
