@@ -14,6 +14,7 @@ from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import linear_pixels
+from enfilade_blender.materials.stand_ins import cut_light_path
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
@@ -142,21 +143,8 @@ def _for_light(world: Any) -> Any:
     """A copy of a world as diffuse light sees it: no ray is one of the camera, which may see it."""
     copy = world.copy()
     copy.cycles_visibility.camera = True
-    _cut_light_path(copy.node_tree)
+    cut_light_path(copy.node_tree)
     return copy
-
-
-def _cut_light_path(tree: Any) -> None:
-    """Replace the outputs of Light Path by 0, in copies of groups, too."""
-    for node in list(tree.nodes):
-        if node.type == "GROUP" and node.node_tree is not None:
-            node.node_tree = node.node_tree.copy()
-            _cut_light_path(node.node_tree)
-        elif node.type == "LIGHT_PATH":
-            zero = tree.nodes.new("ShaderNodeValue")
-            zero.outputs[0].default_value = 0.0
-            for socket in [link.to_socket for link in tree.links if link.from_node == node]:
-                tree.links.new(zero.outputs[0], socket)
 
 
 def _note_world(selection: Selection, notes: Notes) -> None:

@@ -82,3 +82,17 @@ def test_opacity_dims_what_is_emitted(made):
     _, elements, _ = made
     radiance = elements["faint glow"].find("emitter/rgb").get("value")
     assert radiance.split() == ["1", "1", "1"]
+
+
+def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
+    code, out, result = blender.job(blender.make("kinds_of_rays")[0], "kinds of rays")
+    assert code == 0, result
+    root = ET.parse(out / "scene.xml").getroot()
+    found = {element.get("id"): element for element in root}
+    radiance = found["unlit"].find("emitter/rgb").get("value").split()
+    assert [float(number) for number in radiance] == pytest.approx([1.0, 0.5, 0.2])
+    assert found["material shadowless"].find("bsdf").get("type") == "diffuse"
+    # The same for a number that a bake computes: all rays are diffuse ones.
+    assert found["material by ray: by ray"].find(".//rgb").get("value") == "0.5 0.5 0.5"
+    noted = {note["object"] for note in result["notes"] if "transparent for some rays" in note["what"]}
+    assert noted == {"unlit", "shadowless"}

@@ -12,6 +12,7 @@ import numpy as np
 
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials.image_pixels import linear_pixels
+from enfilade_blender.materials.stand_ins import cut_light_path
 from enfilade_blender.materials.values import Output
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed
@@ -116,17 +117,16 @@ class Canvas:
         image = bpy.data.images.new(TARGET, size, size, alpha=True, float_buffer=True)
         image.colorspace_settings.name = "Non-Color"
         image.pixels.foreach_set(np.zeros(size * size * 4, np.float32))  # Blender clears to an alpha of 1
+        groups = set(bpy.data.node_groups)
         copy = material.copy()
+        cut_light_path(copy.node_tree)
         _wire(copy.node_tree, output, image, is_normal=is_normal)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
         bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=False)
         rgba = linear_pixels(image)
-        groups = [n.node_tree for n in copy.node_tree.nodes if n.type == "GROUP" and n.node_tree is not None]
         bpy.data.materials.remove(copy)
-        for group in groups:
-            if group.users == 0:
-                bpy.data.node_groups.remove(group)
+        bpy.data.batch_remove(set(bpy.data.node_groups) - groups)
         bpy.data.images.remove(image)
         return rgba[..., :3], rgba[..., 3] > 0.5
 

@@ -79,6 +79,8 @@ class Graph:
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
             first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
+            if (seen := self._seen_side(node, first, second, inner)) is not None:
+                return seen
             ior = self._fresnel(node.inputs[0], inner)
             if ior is not None and isinstance(second, Lobe) and second.kind == "glossy":
                 return Mix(Constant((0.5,)), first, second, ior, node.name)
@@ -170,6 +172,20 @@ class Graph:
             share = blend.number if isinstance(blend, Constant) else 0.5
             return 1.0 / max(1.0 - share, 1e-3)
         return None
+
+    def _seen_side(self, mix: Any, first: Shader, second: Shader, groups: tuple[Any, ...]) -> Shader | None:
+        """The side beside Transparent of a mix by the kind of ray alone; None of other mixes."""
+        is_clear, is_second_clear = (isinstance(s, Lobe) and s.kind == "transparent" for s in (first, second))
+        factor = follow(mix.inputs[0], groups)
+        if is_clear == is_second_clear or not isinstance(factor, Output):
+            return None
+        kinds = {output.node.type for output in upstream(factor)}
+        if "LIGHT_PATH" not in kinds or not kinds <= table.COLOUR_NODES | {"LIGHT_PATH"}:
+            return None
+        what = "a surface that is transparent for some rays is so for none"
+        effect = "the surface is seen, lights and casts shadows for all rays"
+        self._notes.add("approximated", self._owner, mix.name, what, effect)
+        return second if is_clear else first
 
     def _note_light_path(self, found: Output) -> None:
         what = f"{found.socket.name} is taken as 0"

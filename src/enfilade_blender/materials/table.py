@@ -131,6 +131,11 @@ INPUTS = (
         "another number, or 0",
     ),
     ("Light Path", "approximated", "0: all rays see one material"),
+    (
+        "Mix with Transparent by Light Path, as of unlit glTF materials",
+        "approximated",
+        "the other shader, for all rays",
+    ),
     ("Missing image", "approximated", "a mid grey"),
 )
 LIGHTS = (

@@ -21,6 +21,27 @@ def uncommon_materials(folder):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
+def kinds_of_rays(folder):
+    """Materials that depend on Light Path."""
+    new_file()
+    unlit, tree, mix = shader("unlit", "MixShader")
+    is_camera = node_of(tree, "LightPath").outputs["Is Camera Ray"]
+    clear, glow = node_of(tree, "BsdfTransparent"), node_of(tree, "Emission", Color=(1, 0.5, 0.2, 1))
+    fill(tree, mix, {0: is_camera, 1: clear, 2: glow})
+    shadowless, tree, mix = shader("shadowless", "MixShader")
+    path, most = node_of(tree, "LightPath"), node_of(tree, "Math")
+    most.operation = "MAXIMUM"
+    fill(tree, most, {0: path.outputs["Is Shadow Ray"], 1: path.outputs["Is Camera Ray"]})
+    fill(tree, mix, {0: most, 1: node_of(tree, "BsdfDiffuse"), 2: node_of(tree, "BsdfTransparent")})
+    by_ray, tree, node = shader("by ray", "BsdfDiffuse")
+    scaled = node_of(tree, "Math", Value=0.5)
+    scaled.operation = "ADD"
+    fill(tree, scaled, {1: node_of(tree, "LightPath").outputs["Is Camera Ray"]})
+    fill(tree, node, {"Color": scaled})
+    for number, material in enumerate((unlit, shadowless, by_ray)):
+        plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
 def _grey(x, _y):
     return np.full((*x.shape, 3), 0.8)
 
