@@ -23,6 +23,8 @@ from enfilade_blender.shapes import Shapes
 from enfilade_blender.visibility import seen_lamps
 from enfilade_blender.world import environment
 
+GLASS = {"dielectric", "roughdielectric", "thindielectric"}
+
 
 def export(job: Job) -> dict[str, Any]:
     """Write the scene's folder; content of ``import.json``.
@@ -56,7 +58,7 @@ def export(job: Job) -> dict[str, Any]:
         elements += emitters(lamp, identifiers, notes, is_seen=lamp.name in seen)
     elements += environment(selection, sun, job.out, notes)
     shapes.textures.remove_unused(elements)
-    write_scene(job.out / "scene.xml", [_integrator(selection, shapes.has_glass), *elements])
+    write_scene(job.out / "scene.xml", [_integrator(selection, shapes.kinds), *elements])
     counts = {
         "objects": len(evaluated.placed),
         "instances": evaluated.instances,
@@ -106,14 +108,17 @@ def _note_settings(scene: Any, notes: Notes) -> None:
         notes.add("not-carried", scene.name, "Frame Step", what, effect)
 
 
-def _integrator(selection: Selection, has_glass: bool) -> Element:
+def _integrator(selection: Selection, kinds: set[str]) -> Element:
     """A path tracer with the file's limit of bounces.
 
     Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
-    smaller one; glass needs further bounces.
+    smaller one; glass needs further bounces. Surfaces of `mask` that are passed count in Mitsuba's depth, but
+    have a limit of their own in Cycles, which is added. Lamps are passed too rarely for that.
     """
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
-    if has_glass:
+    if kinds & GLASS:
         bounces = min(cycles.max_bounces, bounces + 2)
+    if "mask" in kinds:
+        bounces += cycles.transparent_max_bounces
     return plugin("integrator", "path", max_depth=bounces + 2)

@@ -30,7 +30,6 @@ from enfilade_blender.records import Placed, Selection, View
 from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, reference
 
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
-GLASS = {"dielectric", "roughdielectric", "thindielectric"}
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
 BACK_OFFSET = 1e-4  # of the size of an open emitter: distance of its back
@@ -60,7 +59,8 @@ class Shapes:
     textures : Textures
     identifiers : Identifiers
         Of BSDFs, shapes and emitters.
-    has_glass : bool
+    kinds : set of str
+        Plugins of the BSDFs of visible surfaces, nested ones included.
     """
 
     def __init__(self, job: Job, selection: Selection, views: list[View], notes: Notes) -> None:
@@ -74,7 +74,7 @@ class Shapes:
         self._shared: dict[str, tuple[str, Surface]] = {}  # by names of materials
         self._bsdfs: list[Element] = []
         self._baked: list[str] = []  # ids of the BSDFs of one object
-        self.has_glass = False
+        self.kinds: set[str] = set()
         (job.out / "meshes").mkdir(exist_ok=True)
 
     @property
@@ -181,7 +181,8 @@ class Shapes:
             f"material {name}: {part.name}" if is_own else f"material {name}"
         )
         self._bsdfs.append(named(element, identifier))
-        self.has_glass |= any(e.get("type") in GLASS for e in element.iter("bsdf"))
+        if not surface.is_invisible:
+            self.kinds |= {nested.get("type") or "" for nested in element.iter("bsdf")}
         if is_own:
             self._baked.append(identifier)
         else:

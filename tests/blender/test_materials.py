@@ -9,6 +9,7 @@ import pytest
 
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
+from studies.blender.command import read_exr, render
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 NAME = "uncommon_materials"
@@ -96,3 +97,13 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert found["material by ray: by ray"].find(".//rgb").get("value") == "0.5 0.5 0.5"
     noted = {note["object"] for note in result["notes"] if "transparent for some rays" in note["what"]}
     assert noted == {"unlit", "shadowless"}
+
+
+def test_light_passes_several_cut_outs_as_in_cycles(blender):
+    (source,) = blender.make("leaves")
+    code, out, result = blender.job(source, "leaves")
+    assert code == 0, result
+    _, theirs, _ = blender.job(source, "leaves of cycles", task="cycles", spp=64, unbiased=True)
+    wanted = read_exr(theirs / "cycles-0001.exr").mean(axis=(0, 1))
+    # A floor of 0.5, less the edges of cards; their light alone would be 0.04. The noise is 1 %.
+    assert render(out, 64, 1).mean(axis=(0, 1)) == pytest.approx(wanted, rel=0.03)

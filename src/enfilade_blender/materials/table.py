@@ -172,6 +172,11 @@ OBJECTS = (
     ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
     ("Animated objects, lamps, materials and worlds", "not carried", "as in the first frame"),
     ("Gamma, curves and white balance of the view", "not carried", "left out"),
+    (
+        "Limits of bounces",
+        "approximated",
+        "`max_depth`: the larger of diffuse and glossy; 2 more with glass; all of transparency with `mask`",
+    ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from corpus.stage import fill, image, new_file, node_of, plane, principled, shader
+from corpus.stage import fill, image, new_file, node_of, picture, plane, principled, shader, world
 
 
 def uncommon_materials(folder):
@@ -40,6 +40,20 @@ def kinds_of_rays(folder):
     fill(tree, node, {"Color": scaled})
     for number, material in enumerate((unlit, shadowless, by_ray)):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
+def leaves(folder):
+    """Three cards, clear but for an edge, over a floor in even light."""
+    scene = new_file()
+    world((1.0, 1.0, 1.0))
+    scene.camera.location, scene.camera.rotation_euler = (0.05, 0.05, 5.0), (0.0, 0.0, 0.0)
+    scene.camera.data.lens = 200.0
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, shader("floor", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    edge = image("edge", _grey, 16, alpha=lambda x, _y: np.where(x < 0.05, 1.0, 0.0))
+    leaf, tree, bsdf = shader("leaf", "BsdfPrincipled", Roughness=1.0)
+    fill(tree, bsdf, {"Alpha": picture(tree, edge).outputs["Alpha"]})
+    for number in range(3):
+        plane(f"Leaf {number}", (0.0, 0.0, 0.3 + 0.2 * number), 3.0, leaf)
 
 
 def _grey(x, _y):
