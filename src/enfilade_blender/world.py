@@ -14,7 +14,7 @@ from enfilade_blender.image_files import F32, write_exr
 from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import linear_pixels
-from enfilade_blender.materials.stand_ins import cut_light_path
+from enfilade_blender.materials.stand_ins import put_stand_ins
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
@@ -37,7 +37,7 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
     if plain is not None:
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
-        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder, selection.frames[0])
+        image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder, selection.frames[0], notes)
         what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
         notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
     if sun is not None:
@@ -102,14 +102,14 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
     return r, g, b
 
 
-def _rendered(world: Any, width: int, folder: Path, frame: int) -> F32:
+def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) -> F32:
     """Radiance of a world at a frame, from north at the left edge over east, zenith on top."""
     images = [node.image for node in world.node_tree.nodes if node.type == "TEX_ENVIRONMENT" and node.image]
     width = min(max([width, *(image.size[0] for image in images)]), WIDTH_MAX)
     has_sky = any(node.type == "TEX_SKY" for node in world.node_tree.nodes)
     width = max(width, WIDTH_SUN) if has_sky else width
     scene = bpy.data.scenes.new("enfilade world")
-    scene.world = _for_light(world)
+    scene.world = _for_light(world, notes)
     scene.frame_set(frame)
     camera = bpy.data.cameras.new("enfilade world")
     camera.type = "PANO"
@@ -139,11 +139,14 @@ def _rendered(world: Any, width: int, folder: Path, frame: int) -> F32:
     return np.roll(pixels, -(width // 2), axis=1)
 
 
-def _for_light(world: Any) -> Any:
+def _for_light(world: Any, notes: Notes) -> Any:
     """A copy of a world as diffuse light sees it: no ray is one of the camera, which may see it."""
     copy = world.copy()
     copy.cycles_visibility.camera = True
-    cut_light_path(copy.node_tree)
+    for node in put_stand_ins(copy.node_tree):
+        name = node.image.name if node.image is not None else "none"
+        what, effect = f"the image {name} is missing", "a mid grey is in its place"
+        notes.add("approximated", world.name, node.name, what, effect)
     return copy
 
 

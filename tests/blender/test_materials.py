@@ -107,3 +107,14 @@ def test_light_passes_several_cut_outs_as_in_cycles(blender):
     wanted = read_exr(theirs / "cycles-0001.exr").mean(axis=(0, 1))
     # A floor of 0.5, less the edges of cards; their light alone would be 0.04. The noise is 1 %.
     assert render(out, 64, 1).mean(axis=(0, 1)) == pytest.approx(wanted, rel=0.03)
+
+
+def test_missing_images_are_grey_wherever_cycles_looks_them_up(blender):
+    code, out, result = blender.job(blender.make("missing_images")[0], "missing images")
+    assert code == 0, result
+    sky = np.array(mi.Bitmap(str(out / "textures" / "environment.exr")))
+    assert sky.reshape(-1, 3).mean(axis=0) == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
+    colour = ET.parse(out / "scene.xml").find(".//bsdf[@type='diffuse']/rgb").get("value")
+    assert [float(number) for number in colour.split()] == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
+    noted = [note["object"] for note in result["notes"] if "missing" in note["what"]]
+    assert noted == ["corrected", "World"]

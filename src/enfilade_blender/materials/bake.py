@@ -17,6 +17,8 @@ from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
 from enfilade_blender.materials.graph import upstream
+from enfilade_blender.materials.image_pixels import is_missing
+from enfilade_blender.materials.stand_ins import IMAGES
 from enfilade_blender.materials.table import OBJECT_DATA
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
@@ -186,6 +188,8 @@ def _of_mesh(value: Any, mesh: Mesh) -> Any:
 def _lost(found: Output, mesh: Mesh, copies: int) -> str:
     """What is approximated of an output that depends on the object; empty for others."""
     node, name = found.node, found.socket.name
+    if node.type in IMAGES and is_missing(node.image):
+        return "its image is missing, and is taken as a mid grey"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
     if node.type == "OBJECT_INFO" and name == "Location" and copies > 1:

@@ -12,7 +12,7 @@ import numpy as np
 
 from enfilade_blender.image_files import F32
 from enfilade_blender.materials.image_pixels import linear_pixels
-from enfilade_blender.materials.stand_ins import cut_light_path
+from enfilade_blender.materials.stand_ins import put_stand_ins
 from enfilade_blender.materials.values import Output
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed
@@ -119,7 +119,7 @@ class Canvas:
         image.pixels.foreach_set(np.zeros(size * size * 4, np.float32))  # Blender clears to an alpha of 1
         groups = set(bpy.data.node_groups)
         copy = material.copy()
-        cut_light_path(copy.node_tree)
+        put_stand_ins(copy.node_tree)
         _wire(copy.node_tree, output, image, is_normal=is_normal)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)

@@ -13,6 +13,11 @@ RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
 OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 
 
+def is_missing(image: Any) -> bool:
+    """Whether an image has no pixels: there is none, or no file of it."""
+    return image is None or not (image.has_data or (image.size[0] > 0 and len(image.pixels) > 0))  # loads it
+
+
 def image_colours(node: Any) -> F32:
     """Linear RGB of an image node (H, W, 3), the first row on top, as Cycles has it.
 

@@ -5,17 +5,25 @@ from __future__ import annotations
 
 from typing import Any
 
-BLACK = (0.0, 0.0, 0.0, 1.0)
+from enfilade_blender.materials.image_pixels import is_missing
+
+BLACK, GREY = (0.0, 0.0, 0.0, 1.0), (0.5, 0.5, 0.5, 1.0)
+IMAGES = ("TEX_IMAGE", "TEX_ENVIRONMENT")
 
 
-def cut_light_path(tree: Any) -> None:
-    """Replace the outputs of Light Path by 0, in copies of groups, too."""
+def put_stand_ins(tree: Any) -> list[Any]:
+    """Replace Light Path by 0 and missing images by grey, in copies of groups, too; nodes of such images."""
+    missing = []
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
-            cut_light_path(node.node_tree)
+            missing += put_stand_ins(node.node_tree)
         elif node.type == "LIGHT_PATH":
             _replace(tree, node, BLACK)
+        elif node.type in IMAGES and is_missing(node.image):
+            _replace(tree, node, GREY)
+            missing.append(node)
+    return missing
 
 
 def _replace(tree: Any, node: Any, colour: tuple[float, ...]) -> None:

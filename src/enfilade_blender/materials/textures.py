@@ -14,6 +14,7 @@ from enfilade_blender.materials.image_pixels import (
     RAW_SPACES,
     image_colours,
     is_as_stored,
+    is_missing,
     linear_pixels,
 )
 from enfilade_blender.materials.values import (
@@ -137,9 +138,7 @@ class Textures:
     def is_missing(self, value: ImageValue) -> bool:
         """Whether an image has no pixels; this is noted."""
         image = value.image
-        if image is not None and image.has_data:
-            return False
-        if image is not None and image.size[0] > 0 and len(image.pixels) > 0:  # loads it
+        if not is_missing(image):
             return False
         name = image.name if image is not None else "none"
         file = image.filepath if image is not None else ""

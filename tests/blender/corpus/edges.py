@@ -42,6 +42,25 @@ def kinds_of_rays(folder):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
+def missing_images(_folder):
+    """Images without a file: of the world, in a group, and below a colour correction."""
+    new_file()
+    lost = bpy.data.images.new("lost", 4, 4)
+    lost.source, lost.filepath = "FILE", "//gone/lost.png"
+    group = bpy.data.node_groups.new("panorama", "ShaderNodeTree")
+    group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    sky = node_of(group, "TexEnvironment")
+    sky.image = lost
+    fill(group, group.nodes.new("NodeGroupOutput"), {0: sky})
+    tree = world((1.0, 1.0, 1.0)).node_tree
+    node = node_of(tree, "Group")
+    node.node_tree = group
+    fill(tree, tree.nodes["Background"], {0: node})
+    corrected, tree, node = shader("corrected", "BsdfDiffuse")
+    fill(tree, node, {"Color": node_of(tree, "Invert", Color=lost)})
+    plane("Corrected", (0.0, 0.0, 0.0), 1.5, corrected)
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
