@@ -6,6 +6,7 @@ from xml.etree import ElementTree as ET
 import mitsuba as mi
 import numpy as np
 import pytest
+from PIL import Image
 
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
@@ -118,3 +119,17 @@ def test_missing_images_are_grey_wherever_cycles_looks_them_up(blender):
     assert [float(number) for number in colour.split()] == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
     noted = [note["object"] for note in result["notes"] if "missing" in note["what"]]
     assert noted == ["corrected", "World"]
+
+
+def test_pictures_that_mitsuba_reads_wrongly_are_written_anew(blender):
+    files = blender.folder / "files"
+    files.mkdir(exist_ok=True)
+    kinds = {"bmp": "P", "jpg": "CMYK", "tga": "P"}
+    for ending, mode in kinds.items():
+        Image.new("RGB", (8, 8), (153, 153, 153)).convert(mode).save(files / f"foreign.{ending}")
+    code, out, result = blender.job(blender.make("picture_files")[0], "picture files")
+    assert code == 0, result
+    copies = sorted((out / "textures").iterdir())
+    assert [file.suffix for file in copies] == [".png"] * len(kinds)
+    for file in copies:
+        assert np.array(mi.Bitmap(str(file)), float) == pytest.approx(153.0, abs=2.0)

@@ -28,7 +28,8 @@ from enfilade_blender.materials.values import (
 from enfilade_blender.notes import Notes
 from enfilade_blender.scene_xml import Element, Identifiers, colour, plugin
 
-READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
+READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+CMYK_DEPTH = 32  # bits of a pixel of a JPEG file, which Mitsuba reads with 8 and 24
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
 GREY = (0.5, 0.5, 0.5)  # of a missing image
@@ -221,7 +222,8 @@ class Textures:
 
         source = Path(bpy.path.abspath(image.filepath, library=image.library))
         suffix = source.suffix.lower()
-        if image.source != "FILE" or image.is_dirty or suffix not in READABLE:
+        is_cmyk = suffix in (".jpg", ".jpeg") and image.depth == CMYK_DEPTH
+        if image.source != "FILE" or image.is_dirty or suffix not in READABLE or is_cmyk:
             return ""
         file = f"textures/{self._names.unique(file_stem(name))}{suffix}"
         if image.packed_file is not None:

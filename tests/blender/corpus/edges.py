@@ -61,6 +61,14 @@ def missing_images(_folder):
     plane("Corrected", (0.0, 0.0, 0.0), 1.5, corrected)
 
 
+def picture_files(folder):
+    """A plane of each picture of the name foreign that is in the folder."""
+    new_file()
+    for number, file in enumerate(sorted(folder.glob("foreign.*"))):
+        material = principled(file.name, bpy.data.images.load(str(file)), Metallic=1.0)
+        plane(file.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
