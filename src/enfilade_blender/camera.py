@@ -30,7 +30,7 @@ def read_views(selection: Selection, notes: Notes) -> list[View]:
             effect = "there is no camera path of the file: give one"
             notes.add("not-carried", camera.name, "Camera", f"a camera of the kind {kind}", effect)
             return []
-        views.append(_view(camera, selection))
+        views.append(_view(camera, selection, notes))
     _note_lenses(views, selection, notes)
     return views
 
@@ -58,12 +58,16 @@ def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
     }
 
 
-def _view(camera: Any, selection: Selection) -> View:
+def _view(camera: Any, selection: Selection, notes: Notes) -> View:
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = camera.evaluated_get(graph)
-    place, rotation, _scale = evaluated.matrix_world.decompose()
+    place, rotation, scale = evaluated.matrix_world.decompose()
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = np.array(rotation.to_matrix()), np.array(place)
+    if scale[0] < 0.0:  # all are: Blender makes a rotation of a mirrored matrix by turning its axes round
+        pose[:3, 1:3] *= -1.0
+        what, effect = "its negative scale is left out", "the picture is not mirrored"
+        notes.add("not-carried", camera.name, "Scale", what, effect)
     width, height = selection.size
     render = selection.scene.render
     projection = np.array(

@@ -30,6 +30,7 @@ FILES = (
     "procedural",
     "emission",
     "lamps_in_view",
+    "mirrored_camera",
 )
 
 
@@ -104,6 +105,17 @@ def test_the_lens_shift_is_the_principal_point(exported):
     frame = json.loads((out / "camera_path.json").read_text())["camera_path"][0]
     # Vertical fit: the shift is in units of the sensor's height; x moves the picture left, y up.
     assert frame["principal_point"] == pytest.approx([0.5 - 0.15 * 96 / 128, 0.5 - 0.1], abs=1e-6)
+
+
+def test_a_mirrored_camera_looks_where_it_points(exported):
+    out, result = exported("mirrored_camera")
+    pose = np.array(json.loads((out / "camera_path.json").read_text())["camera_path"][0]["camera_to_world"])
+    forward = np.array([0.0, 5.2, -1.3]) / np.hypot(5.2, 1.3)  # of corpus.stage
+    assert -pose[:3, 2] == pytest.approx(forward, abs=1e-5)
+    assert np.linalg.det(pose[:3, :3]) == pytest.approx(1.0)
+    assert [what for name, what in notes(result, "not-carried") if name == "Camera"] == [
+        "its negative scale is left out"
+    ]
 
 
 def test_view_and_exposure_are_those_of_the_file(exported):

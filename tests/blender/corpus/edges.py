@@ -69,6 +69,12 @@ def picture_files(folder):
         plane(file.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
+def mirrored_camera(_folder):
+    scene = new_file()
+    scene.camera.scale = (1.0, -2.0, 1.0)
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
