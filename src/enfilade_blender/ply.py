@@ -82,6 +82,15 @@ class Mesh:
             colours={name: colour[:, ::-1] for name, colour in self.colours.items()},
         )
 
+    def mirrored(self, uv: str) -> npt.NDArray[np.bool_]:
+        """Triangles (N,) on which a UV map is mirrored, as seen from where the normals point."""
+        edges = np.diff(self.positions[self.triangles], axis=1)
+        along, across = np.moveaxis(np.diff(self.uvs[uv], axis=1), 1, 0)
+        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+        front = np.einsum("ij,ij->i", np.cross(edges[:, 0], edges[:, 1]), self.normals.sum(axis=1))
+        is_mirrored: npt.NDArray[np.bool_] = area * front < 0.0
+        return is_mirrored
+
     def is_closed(self) -> bool:
         """Whether every edge has two triangles, by positions."""
         _, merged = np.unique(self.positions, axis=0, return_inverse=True)

@@ -45,6 +45,17 @@ class _Part:
     placed: Placed
 
 
+@dataclass(frozen=True, eq=False)
+class _Material:
+    """A part's shader without procedural values, and the UV map and attribute of its mesh that it reads."""
+
+    shader: Shader
+    part: _Part
+    is_own: bool
+    uv: str | None
+    attribute: str | None
+
+
 class Shapes:
     """Writes meshes, and collects elements.
 
@@ -71,7 +82,7 @@ class Shapes:
         self._middles, self._owners = np.zeros((0, 3)), np.zeros(0, np.int64)
         self._bakery = Bakery(job, selection, views, self.textures, notes)
         self._shaders: dict[Any, Shader] = {}
-        self._shared: dict[str, tuple[str, Surface]] = {}  # by names of materials
+        self._surfaces: dict[Any, tuple[str, Surface]] = {}
         self._bsdfs: list[Element] = []
         self._baked: list[str] = []  # ids of the BSDFs of one object
         self.kinds: set[str] = set()
@@ -96,6 +107,8 @@ class Shapes:
                 total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
             )
             shapes += self._object(item, is_instanced=is_instanced)
+        used = {element.get("id") for shape in shapes for element in shape.iter("ref")}
+        self._bsdfs = [bsdf for bsdf in self._bsdfs if bsdf.get("id") in used]
         self._bsdfs = share_bsdfs(self._bsdfs, shapes, self._baked, self.textures, self._out)
         return [*self._bsdfs, *shapes]
 
@@ -111,18 +124,19 @@ class Shapes:
             shader, mesh, is_own = self._bakery.resolve(
                 self._shader(part.material), part.material, part.mesh, placed
             )
-            bsdf, surface, uv, attribute = self._bsdf(shader, part, mesh, is_own=is_own)
+            material = _Material(shader, part, is_own, *_maps(shader, mesh))
+            surface = self._surface(material)[1]
             if surface.is_invisible and not surface.emitted:
                 continue
             radiance = surface.radiance(self._context(part.material))
-            mesh = _with_maps(mesh, uv, attribute)
+            mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:
-                instanced.append(self._shape(name, mesh, bsdf, None, uv, attribute))
+                instanced += self._shapes_of(name, mesh, material, None)
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
-            elements.append(self._shape(name, mesh, bsdf, radiance, uv, attribute))
+            elements += self._shapes_of(name, mesh, material, radiance)
             if radiance is not None and not self._hides_its_back(part.mesh, placed):
-                elements.append(self._shape(f"{name} back", _back(mesh), bsdf, radiance, uv, attribute))
+                elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
 
     def _hides_its_back(self, mesh: Mesh, placed: Placed) -> bool:
@@ -144,11 +158,28 @@ class Shapes:
             copies.append(named(copy, self.identifiers.unique(placed.name)))
         return [group, *copies]
 
-    def _shape(
-        self, name: str, mesh: Mesh, bsdf: str, radiance: Any, uv: str | None, attribute: str | None
-    ) -> Element:
+    def _shapes_of(self, name: str, mesh: Mesh, material: _Material, radiance: Any) -> list[Element]:
+        """One shape; two where a normal map lies mirrored on some triangles.
+
+        Blender mirrors a normal map with its UV map, Mitsuba does not: its bitangent is the product of normal
+        and tangent.
+        """
+        identifier, surface = self._surface(material)
+        if material.uv is None or not any(e.get("type") == "normalmap" for e in surface.plain().iter("bsdf")):
+            return [self._shape(name, mesh, material, identifier, radiance)]
+        mirrored = mesh.mirrored(material.uv)
+        parts = []
+        if not mirrored.all():
+            parts.append(self._shape(name, mesh.select(~mirrored), material, identifier, radiance))
+        if mirrored.any():
+            identifier = self._surface(material, is_mirrored=True)[0]
+            name = f"{name} mirrored" if parts else name
+            parts.append(self._shape(name, mesh.select(mirrored), material, identifier, radiance))
+        return parts
+
+    def _shape(self, name: str, mesh: Mesh, material: _Material, bsdf: str, radiance: Any) -> Element:
         file = f"meshes/{self._files.unique(file_stem(name))}.ply"
-        write_ply(self._out / file, mesh, uv, attribute)
+        write_ply(self._out / file, mesh, material.uv, material.attribute)
         shape = plugin("shape", "ply", reference(bsdf), filename=file)
         if radiance is not None:
             shape.append(plugin("emitter", "area", radiance=radiance))
@@ -165,32 +196,28 @@ class Shapes:
             self._shaders[material.name_full] = shader
         return self._shaders[material.name_full]
 
-    def _bsdf(
-        self, shader: Shader, part: _Part, mesh: Mesh, *, is_own: bool
-    ) -> tuple[str, Surface, str | None, str | None]:
-        """Id of a BSDF, its surface, and the UV map and attribute of the mesh that it reads."""
-        uv, attribute = _maps(shader, mesh)
-        material = part.material
-        key = material.name_full if material else ""
-        if not is_own and key in self._shared:
-            return (*self._shared[key], uv, attribute)
-        surface = build(shader, self._context(material))
-        element = surface.element(self._context(material))
-        name = material.name if material else "no material"
-        identifier = self.identifiers.unique(
-            f"material {name}: {part.name}" if is_own else f"material {name}"
-        )
+    def _surface(self, of: _Material, *, is_mirrored: bool = False) -> tuple[str, Surface]:
+        """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""
+        material, part = of.part.material, of.part.name
+        key = material.name_full if material else "", is_mirrored, of if of.is_own else None
+        if key in self._surfaces:
+            return self._surfaces[key]
+        context = self._context(material, is_mirrored=is_mirrored)
+        surface = build(of.shader, context)
+        element = surface.element(context)
+        name = f"material {material.name if material else 'no material'}"
+        identifier = self.identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
         if not surface.is_invisible:
             self.kinds |= {nested.get("type") or "" for nested in element.iter("bsdf")}
-        if is_own:
+        if of.is_own:
             self._baked.append(identifier)
-        else:
-            self._shared[key] = identifier, surface
-        return identifier, surface, uv, attribute
+        self._surfaces[key] = identifier, surface
+        return identifier, surface
 
-    def _context(self, material: Any) -> Context:
-        return Context(material.name if material else "no material", self.textures, self._notes)
+    def _context(self, material: Any, *, is_mirrored: bool = False) -> Context:
+        owner = material.name if material else "no material"
+        return Context(owner, self.textures, self._notes, is_mirrored)
 
 
 def _parts(placed: Placed) -> Any:

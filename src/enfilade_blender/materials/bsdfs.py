@@ -44,11 +44,12 @@ ALMOST = 0.995  # weights above are 1, below the rest 0
 
 @dataclass(frozen=True)
 class Context:
-    """What all functions of this module need: the material's name, textures and notes."""
+    """What all functions of this module need: the material's name, textures and notes; how normals lie."""
 
     owner: str
     textures: Textures
     notes: Notes
+    is_mirrored: bool = False  # the UV map, below normal maps
 
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
@@ -246,12 +247,15 @@ def _is_void(value: Value, context: Context) -> bool:
 
 def _normal_texture(normal: NormalMap, context: Context) -> Element:
     value = normal.image
-    if abs(normal.strength - 1.0) < 1e-3 or not isinstance(value, ImageValue | Texture):
+    is_as_is = abs(normal.strength - 1.0) < 1e-3 and not context.is_mirrored
+    if is_as_is or not isinstance(value, ImageValue | Texture):
         return context.textures.colour(value)
     n = context.textures.pixels(value) * 2.0 - 1.0
+    n = n * np.array([1.0, -1.0 if context.is_mirrored else 1.0, 1.0])
     n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
     n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
-    return context.textures.rewritten(value, 0.5 * n + 0.5, f"normal {normal.strength:.3g}")
+    name = f"normal {normal.strength:.3g}{' mirrored' if context.is_mirrored else ''}"
+    return context.textures.rewritten(value, 0.5 * n + 0.5, name)
 
 
 def blend(

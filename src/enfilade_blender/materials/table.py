@@ -92,7 +92,11 @@ PRINCIPLED = (
         "mapped",
         "`area` emitter; meshes that are open, or around something, shine on both sides",
     ),
-    ("Normal: Normal Map, Bump of images", "mapped", "`normalmap`, `bumpmap`"),
+    (
+        "Normal: Normal Map, Bump of images",
+        "mapped",
+        "`normalmap`, `bumpmap`; where the UV map is mirrored, a shape and a map of their own",
+    ),
     (
         "Coat",
         "mapped",

@@ -75,6 +75,24 @@ def mirrored_camera(_folder):
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
 
 
+def mirrored_normals(_folder):
+    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection."""
+    new_file()
+    tilted = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
+    material, tree, bsdf = shader("tilted", "BsdfAnisotropic", Roughness=0.0)
+    fill(tree, bsdf, {"Normal": node_of(tree, "NormalMap", Color=tilted)})
+    for number, name in enumerate(("plain", "u", "v", "scale")):
+        board = plane(name, (2.0 * number, 0.0, 0.0), 1.0, material)
+        board.scale.x = -1.0 if name == "scale" else 1.0
+        for loop in board.data.uv_layers[0].uv:
+            u, v = loop.vector
+            loop.vector = (1.0 - u if name == "u" else u), (1.0 - v if name == "v" else v)
+    pair = plane("pair", (8.0, 0.0, 0.0), 1.0, material)
+    for vertex in pair.data.vertices:
+        vertex.co.x += 0.5
+    pair.modifiers.new("Mirror", "MIRROR")
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
