@@ -50,6 +50,16 @@ def test_a_colour_is_multiplied_by_an_alpha_that_is_not_used(made):
     assert found[0, [0, -1], 0] == pytest.approx([0.8, 0.4], abs=1e-2)
 
 
+def test_textured_glass_is_passed_twice(made):
+    out, elements, _ = made
+    glass = elements["material stained glass"]
+    assert glass.get("type") == "dielectric"
+    found = pixels(out, glass.find("texture[@name='specular_transmittance']"))
+    linear = ((found[0, [0, -1], 0] + 0.055) / 1.055) ** 2.4
+    wanted = np.array([(code / 1.055 + 0.055 / 1.055) ** 2.4 for code in (0.8, 0.4)])
+    assert linear == pytest.approx(np.sqrt(wanted), abs=0.01)
+
+
 def test_transparency_that_is_lost_is_noted(made):
     _, elements, notes = made
     assert "see-through" not in elements  # the shape is invisible

@@ -144,7 +144,7 @@ def is_zero(value: Value) -> bool:
 
 
 def glass_bsdf(
-    transmitted: Value, reflected: Value, roughness: Value, ior: float, context: Context
+    transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
 ) -> Element:
     """Glass of two tints; of rough glass, energy that single scattering loses is restored."""
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
@@ -152,7 +152,11 @@ def glass_bsdf(
     scale = 1.0 if not isinstance(alpha, float) else 1.0 / ggx.kept_energy(round(alpha, 3))
     tints: dict[str, Property] = {}
     for name, value in (("specular_transmittance", transmitted), ("specular_reflectance", reflected)):
-        tint = colour(value.colour, scale) if isinstance(value, Constant) else context.textures.colour(value)
+        tint: Property
+        if isinstance(value, Constant):
+            tint = colour(value.colour, scale)
+        else:
+            tint = value if isinstance(value, Element) else context.textures.colour(value)
         if tint != WHITE:
             tints[name] = tint
     return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)

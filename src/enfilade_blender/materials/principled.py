@@ -58,9 +58,9 @@ def _is_enamel(shader: Principled) -> bool:
 
 
 def _glass(shader: Principled, context: Context) -> Element:
-    tint = shader["Base Color"]
-    if isinstance(tint, Constant):  # twice through an interface is once through the colour
-        tint = Constant(tuple(max(c, 0.0) ** 0.5 for c in tint.colour))
+    tint = context.textures.root(
+        shader["Base Color"]
+    )  # twice through an interface is once through the colour
     return glass_bsdf(tint, Constant(WHITE), shader["Roughness"], shader.number("IOR"), context)
 
 

@@ -78,6 +78,14 @@ class Textures:
         image = white + (1.0 - white) * self.pixels(value)
         return self.rewritten(value, image, f"below {white:.3g}", raw=False)
 
+    def root(self, value: Value) -> Constant | Element:
+        """The square root of a colour."""
+        if isinstance(value, Constant):
+            return Constant(tuple(max(c, 0.0) ** 0.5 for c in value.colour))
+        if not self.has_pixels(value):
+            return self._texture(value)
+        return self.rewritten(value, np.sqrt(np.maximum(self.pixels(value), 0.0)), "root", raw=False)
+
     def number(self, value: Value) -> float | Element:
         """A number or a texture of numbers."""
         if isinstance(value, Constant):

@@ -11,9 +11,11 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    materials = [make(half) for make in (_cut_out, _see_through, _sheer_gloss, _bumpy_plastic)]
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic
+    materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
+        principled("stained glass", half, Transmission_Weight=1.0, Roughness=0.0),
         principled("faint glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=4.0, Alpha=0.25),
         principled("picture", bpy.data.images.load(str(folder / "picture.png"))),
     ]
