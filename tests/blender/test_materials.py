@@ -60,6 +60,15 @@ def test_textured_glass_is_passed_twice(made):
     assert linear == pytest.approx(np.sqrt(wanted), abs=0.01)
 
 
+def test_a_rewritten_image_is_looked_up_as_the_image(made):
+    _, elements, notes = made
+    texture = elements["material pixelated"].find(".//texture")
+    settings = {string.get("name"): string.get("value") for string in texture.iter("string")}
+    assert "times" in settings["filename"]
+    assert (settings["filter_type"], settings["wrap_mode"]) == ("nearest", "clamp")
+    assert "the extension Clip is taken as Extend" in notes["half"]
+
+
 def test_transparency_that_is_lost_is_noted(made):
     _, elements, notes = made
     assert "see-through" not in elements  # the shape is invisible

@@ -176,11 +176,7 @@ class Textures:
             stem = Path(key[0]).stem
             self._files[key] = self.write(f"{stem} {name}", image.astype(np.float32), raw=raw)
         raw = raw or self._files[key].endswith(".exr")
-        if isinstance(value, Texture):
-            return bitmap(self._files[key], raw=raw, wrap="repeat", matrix=FLIP)
-        node = value.output.node
-        matrix = FLIP @ np.array(value.matrix)
-        return bitmap(self._files[key], raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix)
+        return self._bitmap(value, self._files[key], raw=raw)
 
     def remove_unused(self, elements: list[Element]) -> None:
         """Delete files that no element names: baked textures of which only others were made."""
@@ -191,20 +187,26 @@ class Textures:
 
     def _texture(self, value: Value) -> Element | Any:
         if isinstance(value, Texture):
-            return bitmap(value.file, raw=value.raw, wrap="repeat", matrix=FLIP)
+            return self._bitmap(value, value.file, raw=value.raw)
         if isinstance(value, AttributeValue):
             return plugin("texture", "mesh_attribute", name="vertex_color")
         if isinstance(value, Procedural):
             raise TypeError("procedural values are baked before they are written")
         if not isinstance(value, ImageValue) or self.is_missing(value):
             return plugin("texture", "srgb", color=GREY)
+        file, raw = self._file(value)
+        return self._bitmap(value, file, raw=raw)
+
+    def _bitmap(self, value: ImageValue | Texture, file: str, *, raw: bool) -> Element:
+        """A file of a value's numbers, or of others, looked up as the value is."""
+        if isinstance(value, Texture):
+            return bitmap(file, raw=raw, wrap="repeat", matrix=FLIP)
         node = value.output.node
         if node.extension == "CLIP":
             effect = "beyond its border the image's last pixels continue"
             self._notes.add(
                 "approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect
             )
-        file, raw = self._file(value)
         matrix = FLIP @ np.array(value.matrix)
         smooth = node.interpolation != "Closest"
         return bitmap(file, raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix, smooth=smooth)

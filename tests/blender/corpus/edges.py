@@ -11,7 +11,7 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
@@ -136,4 +136,12 @@ def _bumpy_plastic(half):
     matt = node_of(tree, "BsdfDiffuse", Normal=node_of(tree, "Bump", Height=half))
     gloss = node_of(tree, "BsdfAnisotropic", Color=(1.0, 0.5, 0.5, 1), Roughness=0.2)
     fill(tree, mix, {0: node_of(tree, "Fresnel", IOR=1.5), 1: matt, 2: gloss})
+    return material
+
+
+def _pixelated(half):
+    """A rough plastic, whose colours are scaled, with an image without interpolation or repetition."""
+    material = principled("pixelated", half, Roughness=0.5)
+    texture = material.node_tree.nodes["Image Texture"]
+    texture.interpolation, texture.extension = "Closest", "CLIP"
     return material
