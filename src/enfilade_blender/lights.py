@@ -14,7 +14,7 @@ import numpy as np
 
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.mapping import spot_ramp
-from enfilade_blender.materials.values import Constant, Emission
+from enfilade_blender.materials.values import Constant, Emission, Procedural, Value
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Element, Identifiers, plugin
@@ -82,18 +82,48 @@ def _unnormalized(data: Any) -> float:
 
 
 def _node_colour(lamp: Lamp, notes: Notes) -> Colour:
-    """Factor of a light's nodes; 1 where they are more than an emission of constants, which is noted."""
+    """Factor of a light's nodes: an emission's colour and strength, each 1 where it is no constant."""
     data = lamp.data
     if not data.use_nodes or data.node_tree is None:
         return 1.0, 1.0, 1.0
     outputs = [node for node in data.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
     shader = Graph(lamp.name, notes).shader(outputs[0].inputs["Surface"], ()) if outputs else None
+    factors: list[Constant | None] = [None, None]
     if isinstance(shader, Emission):
-        colour, strength = shader.colour, shader.strength
-        if isinstance(colour, Constant) and isinstance(strength, Constant):
-            return _scaled(colour.colour, strength.number)
-    notes.add("not-carried", lamp.name, "Nodes", "its nodes are left out", "light has no pattern")
-    return 1.0, 1.0, 1.0
+        factors = [_constant(value, lamp, notes) for value in (shader.colour, shader.strength)]
+    if None in factors:
+        what, effect = "a pattern of its nodes is left out", "light is even, and may be brighter or darker"
+        notes.add("not-carried", lamp.name, "Nodes", what, effect)
+    colour, strength = (factor or Constant((1.0,)) for factor in factors)
+    return _scaled(colour.colour, strength.number)
+
+
+def _constant(value: Value, lamp: Lamp, notes: Notes) -> Constant | None:
+    """A constant, a black body of constant temperature, or the constant strength of Light Falloff."""
+    if isinstance(value, Constant) or not isinstance(value, Procedural):
+        return value if isinstance(value, Constant) else None
+    node, output = value.output.node, value.output.socket.name
+    if node.type == "BLACKBODY" and not node.inputs["Temperature"].is_linked:
+        return _blackbody(node.inputs["Temperature"].default_value)
+    if node.type == "LIGHT_FALLOFF" and not node.inputs["Strength"].is_linked:
+        if output != "Quadratic" or node.inputs["Smooth"].default_value > 0.0:
+            what, effect = "its falloff is quadratic", "it is brighter near the lamp, and darker far from it"
+            notes.add("approximated", lamp.name, node.name, what, effect)
+        return Constant((float(node.inputs["Strength"].default_value),))
+    return None
+
+
+def _blackbody(kelvin: float) -> Constant | None:
+    """Colour of a black body, as Blender has it from 4.5 on."""
+    import bpy
+
+    light = bpy.data.lights.new("enfilade", "POINT")
+    found = None
+    if hasattr(light, "use_temperature"):
+        light.use_temperature, light.temperature = True, kelvin
+        found = Constant(tuple(float(c) for c in light.temperature_color))
+    bpy.data.lights.remove(light)
+    return found
 
 
 def is_portal(lamp: Lamp) -> bool:

@@ -4,6 +4,7 @@ import json
 import shutil
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import mitsuba as mi
 import numpy as np
@@ -31,6 +32,7 @@ FILES = (
     "emission",
     "lamps_in_view",
     "mirrored_camera",
+    "lamp_nodes",
 )
 
 
@@ -158,6 +160,18 @@ def test_a_point_light_in_sight_has_no_radius(exported):
     assert [name for name, what in notes(result, "approximated") if "radius" in what] == ["Seen"]
     assert {"Inside the left sphere", "Behind the camera"} <= set(shapes(out))
     assert "Seen" not in shapes(out)
+
+
+def test_constants_of_a_lamps_nodes_are_kept(exported):
+    out, result = exported("lamp_nodes")
+    emitters = ET.parse(out / "scene.xml").getroot().findall("emitter[@type='point']")
+    found = [[float(c) for c in e.find("rgb").get("value").split()] for e in emitters]
+    watts = 10.0 / (4.0 * np.pi)
+    falloff, pattern = np.multiply([1.0, 0.5, 0.5], 50.0 * watts), np.full(3, 5.0 * watts)
+    warm = np.multiply([1.9351, 0.8035, 0.1917], 5.0 * watts)  # a world of this temperature, by Cycles
+    assert np.array(found) == pytest.approx(np.array([falloff, pattern, warm]), rel=1e-3)
+    assert notes(result, "approximated") == [("Falloff", "its falloff is quadratic")]
+    assert notes(result, "not-carried") == [("Pattern", "a pattern of its nodes is left out")]
 
 
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):

@@ -157,11 +157,12 @@ LIGHTS = (
     ("Area: square, rectangle, disk, ellipse", "mapped", "`rectangle` or `disk`; the camera sees it"),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
+    ("Nodes of lights: constants, black bodies, Light Falloff", "mapped", "a factor; falloff is quadratic"),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, light and shadow linking, nodes of lights but a plain emission",
+        "Spread, light and shadow linking, patterns of nodes of lights",
         "not carried",
         "light is distributed as without them",
     ),

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from corpus.stage import fill, image, new_file, node_of, picture, plane, principled, shader, world
+from corpus.stage import fill, image, light, new_file, node_of, picture, plane, principled, shader, world
 
 
 def uncommon_materials(folder):
@@ -93,6 +93,23 @@ def mirrored_normals(_folder):
     for vertex in pair.data.vertices:
         vertex.co.x += 0.5
     pair.modifiers.new("Mirror", "MIRROR")
+
+
+def lamp_nodes(_folder):
+    """Lamps whose nodes are more than numbers."""
+    new_file()
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
+    kinds = {
+        "Falloff": ("LightFalloff", "Linear", "Strength", {"Strength": 50.0}),
+        "Pattern": ("TexNoise", "Color", "Color", {}),
+        "Warm": ("Blackbody", "Color", "Color", {"Temperature": 2700.0}),
+    }
+    for number, (name, (kind, output, socket, inputs)) in enumerate(kinds.items()):
+        lamp = light("POINT", name, (float(number), 0.0, 3.0), 10.0, shadow_soft_size=0.0).data
+        lamp.use_nodes = True
+        emission = lamp.node_tree.nodes["Emission"]
+        fill(lamp.node_tree, emission, {"Color": (1.0, 0.5, 0.5, 1.0), "Strength": 5.0})
+        fill(lamp.node_tree, emission, {socket: node_of(lamp.node_tree, kind, **inputs).outputs[output]})
 
 
 def leaves(folder):
