@@ -15,8 +15,8 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
 
 IMPORTERS: dict[str, Callable[..., Any]] = {
-    ".glb": lambda file: bpy.ops.import_scene.gltf(filepath=file),
-    ".gltf": lambda file: bpy.ops.import_scene.gltf(filepath=file),
+    ".glb": lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False),
+    ".gltf": lambda file: bpy.ops.import_scene.gltf(filepath=file, import_pack_images=False),
     ".fbx": lambda file: bpy.ops.import_scene.fbx(filepath=file),
     ".obj": lambda file: bpy.ops.wm.obj_import(filepath=file),
     ".usd": lambda file: bpy.ops.wm.usd_import(filepath=file),

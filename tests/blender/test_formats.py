@@ -16,6 +16,20 @@ bpy.ops.export_scene.gltf(filepath=sys.argv[1], export_cameras=True, export_ligh
 bpy.ops.export_scene.fbx(filepath=sys.argv[2], bake_anim=True)
 """
 
+TEXTURED = """
+import sys, bpy
+material = bpy.data.objects["Cube"].data.materials[0]
+material.use_nodes = True
+picture = bpy.data.images.new("picture", 8, 8)
+picture.filepath_raw, picture.file_format = sys.argv[2], "PNG"
+picture.save()
+node = material.node_tree.nodes.new("ShaderNodeTexImage")
+node.image = picture
+bsdf = material.node_tree.nodes["Principled BSDF"]
+material.node_tree.links.new(node.outputs[0], bsdf.inputs["Base Color"])
+bpy.ops.export_scene.gltf(filepath=sys.argv[1], export_format="GLTF_SEPARATE", export_keep_originals=True)
+"""
+
 
 @pytest.fixture(scope="module")
 def imported(blender):
@@ -39,3 +53,18 @@ def test_normal_maps_without_an_image_are_not_baked(imported):
     _, out, result = imported[".fbx"]
     assert not [note for note in result["notes"] if note["kind"] == "baked"]
     assert not list(out.glob("textures/*"))
+
+
+def test_images_of_gltf_are_those_of_the_allowed_folders(blender):
+    folder, picture = blender.folder / "gltf", blender.folder / "apart.png"
+    folder.mkdir()
+    done = blender.run("-c", TEXTURED, folder / "textured.gltf", picture)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "../apart.png" in (folder / "textured.gltf").read_text()
+    _, out, result = blender.job(folder / "textured.gltf", "image apart")
+    assert any("outside the allowed folders" in note["what"] for note in result["notes"])
+    assert not list(out.glob("textures/*"))
+    allowed = [str(blender.folder)]
+    _, out, result = blender.job(folder / "textured.gltf", "image allowed", library_folders=allowed)
+    assert result["files"] == [str(picture)]
+    assert list(out.glob("textures/*"))
