@@ -43,8 +43,8 @@ def _arrays(data: Any) -> Mesh:
     for attribute in data.color_attributes:
         per_corner = attribute.domain == "CORNER"
         size = len(data.loops) if per_corner else len(data.vertices)
-        colour = _get(attribute.data, "color", np.float32, size * 4).reshape(-1, 4)[:, :3]
-        colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 3)
+        colour = _get(attribute.data, "color", np.float32, size * 4).reshape(-1, 4)
+        colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 4)
     active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
     active_colour = data.color_attributes.render_color_index if colours else -1
     return Mesh(

@@ -26,8 +26,8 @@ class Mesh:
         Unit normals of corners.
     uvs : dict of (N, 3, 2) float32
         Texture coordinates of corners by the name of the UV map; v points up.
-    colours : dict of (N, 3, 3) float32
-        Linear colours of corners by the name of the attribute.
+    colours : dict of (N, 3, 4) float32
+        Linear colours and alpha of corners by the name of the attribute.
     materials : (N,) int32
         Slots.
     active_uv : str
@@ -134,7 +134,7 @@ def write_ply(file: Path, mesh: Mesh, uv: str | None = None, colour: str | None 
         columns.append(mesh.uvs[uv].reshape(-1, 2))
         names += ["u", "v"]
     if colour is not None:
-        columns.append(mesh.colours[colour].reshape(-1, 3))
+        columns.append(mesh.colours[colour][..., :3].reshape(-1, 3))
         names += ["r", "g", "b"]
     corners = np.ascontiguousarray(np.concatenate(columns, axis=1), "<f4") + np.float32(0.0)  # no -0
     first, index = _distinct_rows(corners)

@@ -253,7 +253,7 @@ def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:
     if uv is not None:
         uvs.setdefault(uv, np.zeros((len(mesh), 3, 2), np.float32))
     if attribute is not None:
-        colours.setdefault(attribute, np.zeros((len(mesh), 3, 3), np.float32))
+        colours.setdefault(attribute, np.zeros((len(mesh), 3, 4), np.float32))
     return replace(mesh, uvs=uvs, colours=colours)
 
 

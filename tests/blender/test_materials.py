@@ -167,3 +167,14 @@ def test_normal_maps_are_mirrored_with_their_uv_maps(blender):
     found = half / np.linalg.norm(half, axis=1, keepdims=True)
     assert found[:, 1] == pytest.approx(tilts, abs=0.01)
     assert found[:, 2] == pytest.approx(0.8, abs=0.01)
+
+
+def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blender):
+    code, out, result = blender.job(blender.make("painted")[0], "painted")
+    assert code == 0, result
+    scene = ET.parse(out / "scene.xml").getroot()
+    opacity = scene.find(".//bsdf[@type='mask']/float[@name='opacity']").get("value")
+    assert float(opacity) == pytest.approx(0.25, abs=1e-3)
+    mixed = scene.findall("bsdf[@id='material both: both']//rgb")
+    colours = [[float(number) for number in colour.get("value").split()] for colour in mixed]
+    assert np.array(colours) == pytest.approx(np.array([[0.8, 0.1, 0.1], [0.1, 0.6, 0.1]]), abs=1e-3)

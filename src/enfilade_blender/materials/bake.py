@@ -70,7 +70,8 @@ class Bakery:
 
     def resolve(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> tuple[Shader, Mesh, bool]:
         """A shader without procedural values, its mesh, and whether it is this object's own."""
-        shader = replaced(shader, lambda value: _of_mesh(value, mesh))
+        read = {v.name or mesh.active_colour for v in values_of(shader) if isinstance(v, AttributeValue)}
+        shader = replaced(shader, lambda value: _of_mesh(value, mesh, has_several=len(read) > 1))
         self._note_lost(shader, material, mesh, placed)
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
         uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
@@ -179,10 +180,12 @@ class Bakery:
         return int(min(power, self._job.bake_px))
 
 
-def _of_mesh(value: Any, mesh: Mesh) -> Any:
-    """A value of a mesh: an attribute that is a UV map rather than a colour is baked."""
-    is_uv = isinstance(value, AttributeValue) and value.name in mesh.uvs and value.name not in mesh.colours
-    return Procedural(value.output) if is_uv else value
+def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
+    """A value of a mesh: attributes that are UV maps rather than a colour, or several, are baked."""
+    if not isinstance(value, AttributeValue):
+        return value
+    is_uv = value.name in mesh.uvs and value.name not in mesh.colours
+    return Procedural(value.output) if is_uv or has_several else value
 
 
 def _lost(found: Output, mesh: Mesh, copies: int) -> str:

@@ -145,9 +145,8 @@ def _data(mesh: Mesh) -> Any:
         layer = data.uv_layers.new(name=name)
         layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
         layer.active_render = name == mesh.active_uv
-    for name, colour in mesh.colours.items():
+    for name, rgba in mesh.colours.items():
         attribute = data.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
-        rgba = np.concatenate([colour, np.ones((count, 3, 1), np.float32)], axis=-1)
         attribute.data.foreach_set("color", np.ascontiguousarray(rgba, np.float32).ravel())
     data.update(calc_edges=True)
     data.normals_split_custom_set(mesh.normals.reshape(-1, 3))

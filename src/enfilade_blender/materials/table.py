@@ -116,7 +116,7 @@ INPUTS = (
         "mapped",
         "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
     ),
-    ("Colour attribute", "mapped", "`mesh_attribute`"),
+    ("Colour attribute", "mapped", "`mesh_attribute`; baked: its alpha, and several in one material"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
     (
         "Everything else: noise, ramps, Object and Generated coordinates",

@@ -112,6 +112,26 @@ def lamp_nodes(_folder):
         fill(lamp.node_tree, emission, {socket: node_of(lamp.node_tree, kind, **inputs).outputs[output]})
 
 
+def painted(_folder):
+    """Colour attributes: one by its alpha, and two in one material."""
+    new_file()
+    alpha, tree, bsdf = shader("alpha", "BsdfPrincipled", Roughness=1.0)
+    red = node_of(tree, "VertexColor")
+    red.layer_name = "Red"
+    fill(tree, bsdf, {"Base Color": red, "Alpha": red.outputs["Alpha"]})
+    both, tree, mix = shader("both", "MixShader")
+    fill(tree, mix, {0: 0.5})
+    for number, name in enumerate(("Red", "Green"), start=1):
+        paint = node_of(tree, "VertexColor")
+        paint.layer_name = name
+        fill(tree, mix, {number: node_of(tree, "BsdfDiffuse", Color=paint)})
+    for number, material in enumerate((alpha, both)):
+        data = plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material).data
+        for name, colour in (("Red", (0.8, 0.1, 0.1, 0.25)), ("Green", (0.1, 0.6, 0.1, 1.0))):
+            for corner in data.color_attributes.new(name, "FLOAT_COLOR", "CORNER").data:
+                corner.color = colour
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
