@@ -76,9 +76,25 @@ def _take_camera(notes: Notes) -> None:
         for other in cameras[1:]:
             what = f"the file has several cameras, of which {cameras[0].name} is used"
             notes.add("not-carried", other.name, "", what, "choose this one by blender.camera")
-    if scene.camera is not None and (animation := scene.camera.animation_data) and animation.action:
-        first, last = animation.action.frame_range
-        scene.frame_start, scene.frame_end = round(first), max(round(last), round(first))
+    if scene.camera is not None:
+        _take_frames(scene)
+
+
+def _take_frames(scene: Any) -> None:
+    """Frames of the animation of the camera, its lens and its parents; one without any.
+
+    Constraints, by which USD animates objects, have no frames of their own: its importer sets the scene's.
+    """
+    moving = [scene.camera]
+    while moving[-1].parent is not None:
+        moving.append(moving[-1].parent)
+    if any(obj.constraints for obj in moving):
+        return
+    animations = [data.animation_data for data in (*moving, scene.camera.data)]
+    ranges = [animation.action.frame_range for animation in animations if animation and animation.action]
+    first = round(min((begin for begin, _ in ranges), default=scene.frame_start))
+    scene.frame_start = first
+    scene.frame_end = max(round(max((end for _, end in ranges), default=first)), first)
 
 
 def _check_is_blend(file: Path) -> None:

@@ -1,5 +1,7 @@
 """Formats that Blender imports: their camera, frames and materials."""
 
+import json
+
 import pytest
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -16,6 +18,18 @@ bpy.ops.export_scene.gltf(filepath=sys.argv[1], export_cameras=True, export_ligh
 bpy.ops.export_scene.fbx(filepath=sys.argv[2], bake_anim=True)
 """
 
+RIG = """
+import sys, bpy
+camera, rig = bpy.data.objects["Camera"], bpy.data.objects.new("Rig", None)
+bpy.context.scene.collection.objects.link(rig)
+camera.parent = rig
+bpy.ops.export_scene.gltf(filepath=sys.argv[1], export_cameras=True)
+for frame in (3, 9):
+    rig.location.x = 0.1 * frame
+    rig.keyframe_insert("location", frame=frame)
+bpy.ops.export_scene.gltf(filepath=sys.argv[2], export_cameras=True)
+bpy.ops.wm.usd_export(filepath=sys.argv[3], export_animation=True)
+"""
 TEXTURED = """
 import sys, bpy
 material = bpy.data.objects["Cube"].data.materials[0]
@@ -47,6 +61,17 @@ def test_the_first_camera_and_its_frames_are_used(imported, suffix):
     first, last = result["frames"]
     assert last - first == 6
     assert (out / "camera_path.json").is_file()
+
+
+def test_the_frames_are_those_of_the_cameras_parents(blender):
+    files = [blender.folder / name for name in ("still.glb", "rig.glb", "rig.usdc")]
+    done = blender.run("-c", RIG, *files)
+    assert done.returncode == 0, done.stderr[-2000:]
+    counts = []
+    for file in files:
+        _, out, _ = blender.job(file, f"scene {file.name}")
+        counts.append(len(json.loads((out / "camera_path.json").read_text())["camera_path"]))
+    assert counts == [1, 7, 250]  # USD has the range of the scene
 
 
 def test_normal_maps_without_an_image_are_not_baked(imported):
