@@ -11,7 +11,7 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
-from enfilade_blender.lights import emitters, is_portal, note_seen, split_suns
+from enfilade_blender.lights import emitters, is_portal, note_blocked, note_seen, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
@@ -54,8 +54,11 @@ def export(job: Job) -> dict[str, Any]:
     seen = seen_lamps(lamps, sun, views, selection)
     note_seen(lamps, sun, seen, notes)
     identifiers = shapes.identifiers
+    made: dict[str, list[Element]] = {}
     for lamp in lamps:
-        elements += emitters(lamp, identifiers, notes, is_seen=lamp.name in seen)
+        made[lamp.name] = emitters(lamp, identifiers, notes, is_seen=lamp.name in seen)
+        elements += made[lamp.name]
+    note_blocked(made, notes, has_cut_outs="mask" in shapes.kinds)
     elements += environment(selection, sun, job.out, notes)
     shapes.textures.remove_unused(elements)
     write_scene(job.out / "scene.xml", [_integrator(selection, shapes.kinds), *elements])

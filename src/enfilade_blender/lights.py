@@ -22,6 +22,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, plugin
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
+DELTA = ("point", "spot", "directional")  # emitters that shadow rays alone reach
 CORNERS = ((-0.45, -0.45), (-0.45, 0.45), (0.45, -0.45), (0.45, 0.45))  # nearly, of an area light
 
 
@@ -182,6 +183,35 @@ def note_seen(lamps: list[Lamp], sun: Sun | None, seen: set[str], notes: Notes) 
             notes.add("approximated", lamp.name, "Light", "the camera sees the lamp", bright)
     if sun is not None and sun.name in seen:
         notes.add("approximated", sun.name, "Sun", "the camera sees the sun", bright)
+
+
+def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: bool) -> None:
+    """Note the lamps whose light is blocked where Cycles lets it pass: Mitsuba's shadow rays pass no surface.
+
+    Parameters
+    ----------
+    made
+        Elements of lamps by their names.
+    notes
+    has_cut_outs
+        Whether there are surfaces of `mask`.
+    """
+    has_shapes = any(element.tag == "shape" for elements in made.values() for element in elements)
+    for name, elements in made.items():
+        if not any(element.get("type") in DELTA for element in elements):
+            continue
+        if has_cut_outs:
+            what, effect = (
+                "transparent surfaces block its light",
+                "shadows of cut-outs are those of whole shapes",
+            )
+            notes.add("approximated", name, "Shadow", what, effect)
+        if has_shapes:
+            what, effect = (
+                "lamps that have a shape block its light",
+                "they cast shadows, as in Cycles they do not",
+            )
+            notes.add("approximated", name, "Shadow", what, effect)
 
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes, *, is_seen: bool = False) -> list[Element]:

@@ -8,7 +8,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade_blender.lights import emitters, faces_camera, is_portal, note_seen, points_of, split_suns
+from enfilade_blender.lights import (
+    emitters,
+    faces_camera,
+    is_portal,
+    note_blocked,
+    note_seen,
+    points_of,
+    split_suns,
+)
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, View
 from enfilade_blender.scene_xml import Identifiers, write_scene
@@ -99,6 +107,17 @@ def test_a_point_light_that_the_camera_would_see_has_no_radius():
         emitters(bulb, Identifiers(), notes, is_seen=is_seen)[0].get("type") for is_seen in (False, True)
     ]
     assert kinds == ["sphere", "point"]
+
+
+def test_lamps_whose_light_is_blocked_are_noted():
+    notes, names = Notes(), Identifiers()
+    lamps = [lamp("SPOT", "Spot"), lamp("SUN", "Sun"), lamp("POINT", "Bulb", shadow_soft_size=0.1)]
+    made = {one.name: emitters(one, names, notes) for one in lamps}
+    note_blocked({"Spot": made["Spot"]}, notes, has_cut_outs=False)
+    assert notes.to_list() == []
+    note_blocked(made, notes, has_cut_outs=True)
+    found = [(note["object"], note["what"].split()[0]) for note in notes.to_list()]
+    assert found == [(name, what) for name in ("Spot", "Sun") for what in ("transparent", "lamps")]
 
 
 def test_points_of_shapes():
