@@ -39,6 +39,7 @@ SETTINGS = {  # of a render of nothing
     "use_sequencer": False,
 }
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
+RAYS_OF_LAMPS = ("diffuse", "glossy", "transmission")
 
 
 class _Engine(bpy.types.RenderEngine):  # type: ignore[misc]
@@ -117,6 +118,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         matrix = np.array(instance.matrix_world, np.float64)
         if obj.type == "LIGHT":
             _note_linking(obj, notes)
+            _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
             result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))
         elif obj.type in NOT_CARRIED:
             what = f"{NOT_CARRIED[obj.type]} can't be exported"
@@ -193,12 +195,16 @@ def _note_linking(obj: Any, notes: Notes) -> None:
         notes.add("not-carried", obj.name, "Shadow linking", what, effect)
 
 
-def _note_object(obj: Any, notes: Notes) -> None:
-    _note_linking(obj, notes)
-    hidden = [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]
+def _note_rays(obj: Any, rays: tuple[str, ...], effect: str, notes: Notes) -> None:
+    hidden = [ray for ray in rays if not getattr(obj, f"visible_{ray}", True)]
     if hidden:
         what = f"hidden from {', '.join(hidden)} rays in Blender"
-        notes.add("not-carried", obj.name, "Ray visibility", what, "it is visible to all rays")
+        notes.add("not-carried", obj.name, "Ray visibility", what, effect)
+
+
+def _note_object(obj: Any, notes: Notes) -> None:
+    _note_linking(obj, notes)
+    _note_rays(obj, RAYS, "it is visible to all rays", notes)
     if getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False):
         notes.add("not-carried", obj.name, "Shadow catcher or holdout", "an ordinary object", "it is visible")
     for system in getattr(obj, "particle_systems", ()):

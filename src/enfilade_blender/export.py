@@ -40,7 +40,7 @@ def export(job: Job) -> dict[str, Any]:
     check_size(selection, job.limits)
     report_progress(0.05, "cameras")
     note_motion(selection, notes)
-    _note_settings(selection.scene, notes)
+    _note_settings(job, selection, notes)
     views = read_views(selection, notes)
     if views:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
@@ -95,9 +95,10 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
     }
 
 
-def _note_settings(scene: Any, notes: Notes) -> None:
-    """Note settings of the scene's view and frames that nothing carries."""
-    view = scene.view_settings
+def _note_settings(job: Job, selection: Selection, notes: Notes) -> None:
+    """Note settings of the scene's view, frames and view layers that nothing carries."""
+    scene = selection.scene
+    view, render = scene.view_settings, scene.render
     settings = {
         "Gamma": abs(view.gamma - 1.0) > 1e-4,
         "Curves": view.use_curve_mapping,
@@ -109,6 +110,18 @@ def _note_settings(scene: Any, notes: Notes) -> None:
     if scene.frame_step != 1:
         what, effect = f"its step of {scene.frame_step} is left out", "every frame is rendered"
         notes.add("not-carried", scene.name, "Frame Step", what, effect)
+    if render.use_border and render.use_crop_to_border:
+        what, effect = "its crop to the render region is left out", "the whole frame is rendered"
+        notes.add("not-carried", scene.name, "Render Region", what, effect)
+    layer = selection.view_layer
+    for name in ("material_override", "world_override"):  # Blender 4.2 has none of the world
+        if getattr(layer, name, None) is not None:
+            what, effect = f"its {name.replace('_', ' ')} is left out", "materials and world are the scene's"
+            notes.add("not-carried", layer.name, "Override", what, effect)
+    for other in scene.view_layers:
+        if other.use and other != layer and not job.view_layer:
+            what = f"of several view layers {layer.name} is used"
+            notes.add("not-carried", other.name, "", what, "choose this one by blender.view_layer")
 
 
 def _integrator(selection: Selection, kinds: set[str]) -> Element:

@@ -33,6 +33,7 @@ FILES = (
     "lamps_in_view",
     "mirrored_camera",
     "lamp_nodes",
+    "left_out",
 )
 
 
@@ -172,6 +173,24 @@ def test_constants_of_a_lamps_nodes_are_kept(exported):
     assert np.array(found) == pytest.approx(np.array([falloff, pattern, warm]), rel=1e-3)
     assert notes(result, "approximated") == [("Falloff", "its falloff is quadratic")]
     assert notes(result, "not-carried") == [("Pattern", "a pattern of its nodes is left out")]
+
+
+def test_settings_that_are_left_out_are_noted(exported):
+    _, result = exported("left_out")
+    assert {(note["object"], note["node"]) for note in result["notes"] if note["kind"] == "not-carried"} == {
+        ("No gloss", "Ray visibility"),
+        ("Scene", "Render Region"),
+        ("ViewLayer", "Override"),
+        ("Second", ""),
+        ("coated", "Principled BSDF: Coat Tint"),
+        ("coated", "Principled BSDF: Coat Normal"),
+    }
+
+
+def test_a_coat_is_even_over_a_bumpy_base(exported):
+    bsdf = ET.parse(exported("left_out")[0] / "scene.xml").find("bsdf[@id='material coated']")
+    kinds = [nested.get("type") for nested in bsdf.find("bsdf").findall("bsdf")]
+    assert kinds == ["normalmap", "conductor"]
 
 
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):

@@ -76,6 +76,7 @@ class Graph:
         if node.type == "BSDF_PRINCIPLED":
             names = (name for name in PRINCIPLED if name in node.inputs)
             inputs = {name: self.value(node.inputs[name], inner) for name in names}
+            self._note_coat_normal(node, inner)
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
             first, second = (self.shader(node.inputs[i], inner) for i in (1, 2))
@@ -186,6 +187,13 @@ class Graph:
         effect = "the surface is seen, lights and casts shadows for all rays"
         self._notes.add("approximated", self._owner, mix.name, what, effect)
         return second if is_clear else first
+
+    def _note_coat_normal(self, node: Any, groups: tuple[Any, ...]) -> None:
+        weight = node.inputs["Coat Weight"]
+        is_coated = weight.is_linked or weight.default_value > 0.0
+        if is_coated and isinstance(follow(node.inputs["Coat Normal"], groups), Output):
+            what, effect = "the normals of the coat are left out", "its reflections are even"
+            self._notes.add("not-carried", self._owner, f"{node.name}: Coat Normal", what, effect)
 
     def _note_light_path(self, found: Output) -> None:
         what = f"{found.socket.name} is taken as 0"

@@ -41,12 +41,13 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
         return blend(shader["Metallic"], plastic, lambda: _metal(shader, context), context)
 
     whole = blend(shader["Transmission Weight"], opaque, lambda: _glass(shader, context), context)
+    whole = with_normal(whole, shader.normal, context)  # which a coat has not
     if not is_enamel:
         whole = layered(whole, shader["Coat Weight"], coat_ior, coat_roughness, WHITE, context)
     tint = context.textures.mean(shader["Sheen Tint"])
     whole = layered(whole, shader["Sheen Weight"], SHEEN_IOR, SHEEN_ROUGHNESS, tint, context)
     _note_principled(shader, context)
-    return with_normal(whole, shader.normal, context)
+    return whole
 
 
 def _is_enamel(shader: Principled) -> bool:
@@ -54,7 +55,7 @@ def _is_enamel(shader: Principled) -> bool:
     roughness = shader["Roughness"]
     is_rough = isinstance(roughness, Constant) and roughness.number >= ENAMEL_ROUGHNESS
     is_plastic = is_zero(shader["Metallic"]) and is_zero(shader["Transmission Weight"])
-    return is_rough and is_plastic and is_one(shader["Coat Weight"])
+    return is_rough and is_plastic and is_one(shader["Coat Weight"]) and shader.normal is None
 
 
 def _glass(shader: Principled, context: Context) -> Element:
@@ -97,6 +98,8 @@ def _note_principled(shader: Principled, context: Context) -> None:
     if not is_metal and min(context.textures.mean(shader["Specular Tint"])) < ALMOST:
         what = "the tint of reflections is left out"
         note("not-carried", "Specular Tint", what, "reflections have the colour of the light")
+    if not is_zero(shader["Coat Weight"]) and min(context.textures.mean(shader["Coat Tint"])) < ALMOST:
+        note("not-carried", "Coat Tint", "the tint of the coat is left out", "what lies below is brighter")
     for name in ("IOR", "Specular IOR Level"):
         if not isinstance(shader[name], Constant):
             effect = "reflections have the same strength everywhere"

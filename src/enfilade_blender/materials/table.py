@@ -102,6 +102,7 @@ PRINCIPLED = (
         "mapped",
         "`roughplastic` over rough plastics; else `blendbsdf` with a `roughconductor` of k = 0",
     ),
+    ("Coat Tint, Coat Normal", "not carried", "the coat is clear and even"),
     ("Sheen", "approximated", "a rough dielectric layer"),
     ("Anisotropic", "mapped", "`alpha_u`, `alpha_v` of metals along the UV map; its rotation is not carried"),
     ("Specular Tint", "approximated", "on metals a colour at edges; else left out"),
@@ -190,6 +191,11 @@ OBJECTS = (
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),
+    (
+        "Overrides of the view layer, further view layers, crop to the render region",
+        "not carried",
+        "left out",
+    ),
 )
 
 

@@ -132,6 +132,21 @@ def painted(_folder):
                 corner.color = colour
 
 
+def left_out(_folder):
+    """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
+    scene = new_file()
+    light("AREA", "No gloss", (0.0, 2.0, 3.0), 10.0).visible_glossy = False
+    scene.render.use_border = scene.render.use_crop_to_border = True
+    scene.view_layers.new("Second")
+    scene.view_layers[0].material_override = principled("clay")
+    coat = {"Coat_Weight": 1.0, "Coat_Tint": (1.0, 0.1, 0.1, 1.0)}
+    material = principled("coated", Roughness=0.8, **coat)
+    tree, tilted = material.node_tree, image("tilt", _grey, 16, space="Non-Color")
+    normals = {name: node_of(tree, "NormalMap", Color=tilted) for name in ("Normal", "Coat Normal")}
+    fill(tree, tree.nodes["Principled BSDF"], normals)
+    plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
+
+
 def leaves(folder):
     """Three cards, clear but for an edge, over a floor in even light."""
     scene = new_file()
