@@ -128,6 +128,10 @@ class Shapes:
             surface = self._surface(material)[1]
             if surface.is_invisible and not surface.emitted:
                 continue
+            if material.uv is None and any(e.get("name") == "alpha_u" for e in surface.plain().iter()):
+                material = replace(
+                    material, uv=mesh.active_uv or None
+                )  # along which highlights are stretched
             radiance = surface.radiance(self._context(part.material))
             mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:
@@ -199,7 +203,7 @@ class Shapes:
     def _surface(self, of: _Material, *, is_mirrored: bool = False) -> tuple[str, Surface]:
         """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""
         material, part = of.part.material, of.part.name
-        key = material.name_full if material else "", is_mirrored, of if of.is_own else None
+        key = material.name_full if material else "", is_mirrored, of.part if of.is_own else None
         if key in self._surfaces:
             return self._surfaces[key]
         context = self._context(material, is_mirrored=is_mirrored)

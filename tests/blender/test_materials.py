@@ -69,6 +69,13 @@ def test_a_rewritten_image_is_looked_up_as_the_image(made):
     assert "the extension Clip is taken as Extend" in notes["half"]
 
 
+def test_brushed_metal_is_stretched_along_its_uv_map(made):
+    out, _, notes = made
+    assert b"property float u" in (out / "meshes" / "brushed.ply").read_bytes()
+    assert "the rotation is left out" in notes["brushed"]
+    assert "its anisotropy is left out" in notes["brushed by image"]
+
+
 def test_transparency_that_is_lost_is_noted(made):
     _, elements, notes = made
     assert "see-through" not in elements  # the shape is invisible

@@ -92,6 +92,8 @@ def _note_principled(shader: Principled, context: Context) -> None:
         if not is_zero(shader[name]):
             note("not-carried" if "left out" in what else "approximated", name, what, effect)
     is_metal = not is_zero(shader["Metallic"])
+    if not is_zero(shader["Anisotropic"]):
+        _note_anisotropic(shader, context)
     if is_metal and not isinstance(shader["Base Color"], Constant):
         what = "a metal's texture is its reflectance at all angles"
         note("approximated", "Base Color", what, "its edges are not brighter")
@@ -104,3 +106,16 @@ def _note_principled(shader: Principled, context: Context) -> None:
         if not isinstance(shader[name], Constant):
             effect = "reflections have the same strength everywhere"
             note("approximated", name, "a texture is left out", effect)
+
+
+def _note_anisotropic(shader: Principled, context: Context) -> None:
+    is_constant = all(isinstance(shader[name], Constant) for name in ("Anisotropic", "Roughness"))
+    if is_zero(shader["Metallic"]) or not is_constant:
+        what, effect = "its anisotropy is left out", "highlights are round"
+        context.notes.add("not-carried", context.owner, f"{shader.name}: Anisotropic", what, effect)
+        return
+    what, effect = "highlights are stretched along the UV map", "their direction differs from that of Tangent"
+    context.notes.add("approximated", context.owner, f"{shader.name}: Anisotropic", what, effect)
+    if not is_zero(shader["Anisotropic Rotation"]):
+        what, effect = "the rotation is left out", "highlights are stretched in another direction"
+        context.notes.add("not-carried", context.owner, f"{shader.name}: Anisotropic Rotation", what, effect)

@@ -14,7 +14,7 @@ PRINCIPLED = {  # inputs that are read, of which Blender 4.2 has not all; and nu
     "Subsurface Weight": 0.0, "Specular IOR Level": 0.5, "Specular Tint": 1.0, "Anisotropic": 0.0,
     "Transmission Weight": 0.0, "Coat Weight": 0.0, "Coat Roughness": 0.03, "Coat IOR": 1.5, "Coat Tint": 1.0,
     "Sheen Weight": 0.0, "Sheen Tint": 1.0, "Emission Color": 1.0, "Emission Strength": 0.0,
-    "Thin Film Thickness": 0.0,
+    "Thin Film Thickness": 0.0, "Anisotropic Rotation": 0.0,
 }  # fmt: skip
 
 

@@ -16,6 +16,8 @@ def uncommon_materials(folder):
     materials += [
         principled("premultiplied", half, Metallic=1.0),
         principled("stained glass", half, Transmission_Weight=1.0, Roughness=0.0),
+        principled("brushed", Metallic=1.0, Anisotropic=0.8, Anisotropic_Rotation=0.25),
+        principled("brushed by image", Metallic=1.0, Anisotropic=half),
         principled("faint glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=4.0, Alpha=0.25),
         principled("picture", bpy.data.images.load(str(folder / "picture.png"))),
     ]
