@@ -11,7 +11,7 @@ from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import Context
 from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
 from enfilade_blender.materials.textures import Textures, file_stem
-from enfilade_blender.materials.values import AttributeValue, Output
+from enfilade_blender.materials.values import AttributeValue, Constant, Output
 from enfilade_blender.notes import Notes
 
 
@@ -80,6 +80,11 @@ def test_file_names_are_short_enough_for_any_disk(letter):
 
 def test_file_names_lack_the_characters_that_mitsuba_reads():
     assert file_stem("cost $5: a/b.c") == "cost _5_ a_b_c"
+
+
+def test_the_number_of_a_colour_is_its_luminance():
+    numbers = [Constant(value).number for value in ((0.3,), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0))]
+    assert numbers == pytest.approx([0.3, 1.0, 0.7152], abs=1e-4)
 
 
 def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_path):

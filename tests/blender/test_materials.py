@@ -76,6 +76,13 @@ def test_brushed_metal_is_stretched_along_its_uv_map(made):
     assert "its anisotropy is left out" in notes["brushed by image"]
 
 
+def test_a_coloured_roughness_is_its_luminance(made):
+    out, elements, _ = made
+    found = pixels(out, elements["material green mirror"].find(".//texture[@name='alpha']"))
+    wanted = (0.7152 * np.array([0.2, 0.8])) ** 2
+    assert found.reshape(16, 16)[0, [0, -1]] == pytest.approx(wanted, abs=4e-3)
+
+
 def test_transparency_that_is_lost_is_noted(made):
     _, elements, notes = made
     assert "see-through" not in elements  # the shape is invisible

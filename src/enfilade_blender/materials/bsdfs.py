@@ -58,7 +58,7 @@ def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
         case "glossy":
             bsdf = conductor_bsdf(lobe.colour, lobe.roughness, {}, context, edge=None)
         case "glass":
-            ior = float(np.mean(context.textures.mean(lobe.ior)))
+            ior = Constant(context.textures.mean(lobe.ior)).number
             bsdf = glass_bsdf(lobe.colour, lobe.colour, lobe.roughness, ior, context)
         case "translucent":  # diffuse transmission alone: the thin principled BSDF without an interface
             thin = {"diff_trans": 2.0, "eta": NO_INTERFACE, "roughness": 0.5}
@@ -110,7 +110,7 @@ def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, 
     """Two roughnesses, and the share of the second; alpha is linear in between."""
     if not context.textures.has_pixels(roughness):
         return 0.5, 0.5, 0.5
-    pixels = context.textures.pixels(roughness).mean(axis=-1, keepdims=True)
+    pixels = context.textures.numbers(roughness)
     low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
     if high - low < 1e-2:
         return low, high, 0.5
@@ -198,14 +198,14 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
         alpha = min(max(roughness.number, 0.0), 1.0) ** 2
         return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
     if context.textures.has_pixels(roughness):
-        squared = np.maximum(context.textures.pixels(roughness).mean(axis=-1, keepdims=True) ** 2, ALPHA_MIN)
+        squared = np.maximum(context.textures.numbers(roughness) ** 2, ALPHA_MIN)
         return context.textures.rewritten(roughness, squared, "alpha")
     return 0.25
 
 
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:
     """An alpha; that of the mean roughness of a texture."""
-    return alpha if isinstance(alpha, float) else float(np.mean(context.textures.mean(roughness))) ** 2
+    return alpha if isinstance(alpha, float) else Constant(context.textures.mean(roughness)).number ** 2
 
 
 def layered(

@@ -127,7 +127,7 @@ def inverted(value: Value, context: Context) -> float | Element:
     if isinstance(value, Constant):
         return 1.0 - value.number
     if context.textures.has_pixels(value):
-        pixels = context.textures.pixels(value).mean(axis=-1, keepdims=True)
+        pixels = context.textures.numbers(value)
         return context.textures.rewritten(value, 1.0 - pixels, "inverted")
     return 0.5
 
@@ -199,7 +199,7 @@ def _cut_out(
 
 def _blended(first: Surface, second: Surface, mix: Mix, context: Context) -> Surface:
     factor = mix.factor if isinstance(mix.factor, Constant) else None
-    share = factor.number if factor else sum(context.textures.mean(mix.factor)) / 3.0
+    share = factor.number if factor else Constant(context.textures.mean(mix.factor)).number
     emitted = [replace(part, strength=part.strength * (1.0 - share)) for part in first.emitted]
     emitted += [replace(part, strength=part.strength * share) for part in second.emitted]
     if emitted and factor is None:
@@ -262,7 +262,7 @@ def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radianc
     context.notes.add(
         "approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect
     )
-    return (Radiance(colour, sum(context.textures.mean(strength)) / 3.0),)
+    return (Radiance(colour, Constant(context.textures.mean(strength)).number),)
 
 
 def is_zero_exactly(value: Value) -> bool:

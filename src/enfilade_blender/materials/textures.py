@@ -18,6 +18,7 @@ from enfilade_blender.materials.image_pixels import (
     linear_pixels,
 )
 from enfilade_blender.materials.values import (
+    LUMINANCE,
     AttributeValue,
     Constant,
     ImageValue,
@@ -98,8 +99,7 @@ class Textures:
             return value.number * scale
         if not self.has_pixels(value):
             return 0.5 * scale
-        grey = self.pixels(value).mean(axis=-1, keepdims=True)
-        return self.rewritten(value, grey * scale, f"grey times {scale:.3g}")
+        return self.rewritten(value, self.numbers(value) * scale, f"grey times {scale:.3g}")
 
     def mean(self, value: Value) -> tuple[float, float, float]:
         """Mean linear colour of a value; mid grey of a missing image or an attribute."""
@@ -119,6 +119,11 @@ class Textures:
         if value.output.socket.name == "Alpha":
             return np.repeat(linear_pixels(value.image)[..., 3:], 3, axis=-1)
         return image_colours(value.output.node)
+
+    def numbers(self, value: ImageValue | Texture) -> F32:
+        """Numbers of a texture (H, W, 1), the luminance of its colours."""
+        numbers: F32 = (self.pixels(value) @ np.array(LUMINANCE, np.float32))[..., None]
+        return numbers
 
     def stored(self, file: str, *, raw: bool) -> F32:
         """Linear values of a file of the scene, (H, W, 3), the first row on top."""

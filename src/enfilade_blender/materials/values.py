@@ -9,6 +9,7 @@ from typing import Any
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+LUMINANCE = (0.2126729, 0.7151522, 0.0721749)  # of linear Rec.709, in Cycles
 PRINCIPLED = {  # inputs that are read, of which Blender 4.2 has not all; and numbers in place of a texture
     "Base Color": 0.8, "Metallic": 0.0, "Roughness": 0.5, "IOR": 1.45, "Alpha": 1.0, "Diffuse Roughness": 0.0,
     "Subsurface Weight": 0.0, "Specular IOR Level": 0.5, "Specular Tint": 1.0, "Anisotropic": 0.0,
@@ -39,8 +40,10 @@ class Constant:
 
     @property
     def number(self) -> float:
-        """The number, or the mean of the colour."""
-        return sum(self.numbers) / len(self.numbers)
+        """The number, or the luminance of the colour, as Blender converts it."""
+        if len(self.numbers) == 1:
+            return self.numbers[0]
+        return sum(weight * c for weight, c in zip(LUMINANCE, self.colour, strict=True))
 
     @property
     def colour(self) -> tuple[float, float, float]:

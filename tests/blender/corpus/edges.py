@@ -18,6 +18,7 @@ def uncommon_materials(folder):
         principled("stained glass", half, Transmission_Weight=1.0, Roughness=0.0),
         principled("brushed", Metallic=1.0, Anisotropic=0.8, Anisotropic_Rotation=0.25),
         principled("brushed by image", Metallic=1.0, Anisotropic=half),
+        principled("green mirror", Metallic=1.0, Roughness=image("green", _green, 16, space="Non-Color")),
         principled("faint glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=4.0, Alpha=0.25),
         principled("picture", bpy.data.images.load(str(folder / "picture.png"))),
     ]
@@ -165,6 +166,10 @@ def leaves(folder):
 
 def _grey(x, _y):
     return np.full((*x.shape, 3), 0.8)
+
+
+def _green(x, _y):
+    return np.stack([0.0 * x, 0.2 + 0.6 * (x > 0.5), 0.0 * x], axis=-1)
 
 
 def _cut_out(half):
