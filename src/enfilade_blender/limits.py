@@ -31,7 +31,7 @@ def check_size(selection: Selection, limits: Limits) -> None:
             "reduce its copies, or raise the limit",
         )  # fmt: skip
     for obj in selection.scene.objects:
-        triangles = estimated_triangles(obj)
+        triangles = estimated_triangles(obj, selection.scene.render)
         if triangles > limits.triangles:
             raise ExportError(
                 f"it has {triangles} triangles after its modifiers, more than {limits.triangles}", obj.name,
@@ -39,16 +39,17 @@ def check_size(selection: Selection, limits: Limits) -> None:
             )  # fmt: skip
 
 
-def estimated_triangles(obj: Any) -> int:
-    """Triangles of a mesh after the modifiers that multiply them."""
+def estimated_triangles(obj: Any, render: Any) -> int:
+    """Triangles of a mesh after the modifiers that multiply them, and the scene's Simplify."""
     if obj.type != "MESH" or obj.hide_render:
         return 0
+    most = min(render.simplify_subdivision_render, MAX_LEVELS) if render.use_simplify else MAX_LEVELS
     count = 2 * len(obj.data.polygons)
     for modifier in obj.modifiers:
         if not modifier.show_render:
             continue
         if modifier.type in ("SUBSURF", "MULTIRES"):
-            count *= 4 ** min(modifier.render_levels, MAX_LEVELS)
+            count *= 4 ** min(modifier.render_levels, most)
         elif modifier.type == "ARRAY" and modifier.fit_type == "FIXED_COUNT":
             count *= modifier.count
     return count

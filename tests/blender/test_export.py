@@ -34,6 +34,7 @@ FILES = (
     "mirrored_camera",
     "lamp_nodes",
     "left_out",
+    "simplified",
 )
 
 
@@ -227,6 +228,15 @@ def test_a_cut_off_file_is_refused(blender, files, tmp_path, share):
 def test_limits_hold(blender, files, limit, word):
     code, _, error = blender.job(files["instances"], f"limit {word}", limits=limit)
     assert (code, word in error["what"]) == (3, True)
+
+
+def test_limits_count_levels_that_simplify_leaves(blender, files):
+    code, _, result = blender.job(files["simplified"], "limit simplified", limits={"triangles": 100})
+    assert (code, result["counts"]["triangles"]) == (0, 8)
+
+
+def test_normalized_coordinates_are_baked(exported):
+    assert [name for name, _ in notes(exported("simplified")[1], "baked")] == ["normalized, Soft"]
 
 
 def test_a_wrong_name_lists_the_right_ones(blender, files):

@@ -253,7 +253,8 @@ def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] 
         return node.uv_map, IDENTITY
     if node.type == "TEX_COORD" and found.socket.name == "UV" and not node.from_instancer:
         return "", IDENTITY
-    if node.type == "MAPPING" and not any(node.inputs[i].is_linked for i in (1, 2, 3)):
+    is_affine = node.type == "MAPPING" and node.vector_type != "NORMAL"
+    if is_affine and not any(node.inputs[i].is_linked for i in (1, 2, 3)):
         inner = uv_coordinates(node.inputs["Vector"], found.groups)
         if inner is None or not node.inputs["Vector"].is_linked:
             return None

@@ -4,7 +4,19 @@
 import bpy
 import numpy as np
 
-from corpus.stage import fill, image, light, new_file, node_of, picture, plane, principled, shader, world
+from corpus.stage import (
+    fill,
+    image,
+    light,
+    new_file,
+    node_of,
+    picture,
+    plane,
+    principled,
+    shader,
+    tiles,
+    world,
+)
 
 
 def uncommon_materials(folder):
@@ -148,6 +160,19 @@ def left_out(_folder):
     normals = {name: node_of(tree, "NormalMap", Color=tilted) for name in ("Normal", "Coat Normal")}
     fill(tree, tree.nodes["Principled BSDF"], normals)
     plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
+
+
+def simplified(_folder):
+    """A subdivision that Simplify lowers, below an image on normalized coordinates."""
+    scene = new_file()
+    scene.render.use_simplify, scene.render.simplify_subdivision_render = True, 1
+    material = principled("normalized", image("tiles", tiles, 16))
+    tree = material.node_tree
+    mapped = node_of(tree, "Mapping", Vector=node_of(tree, "TexCoord").outputs["UV"])
+    mapped.vector_type = "NORMAL"
+    fill(tree, tree.nodes["Image Texture"], {"Vector": mapped})
+    level = plane("Soft", (0.0, 0.0, 0.0), 4.0, material).modifiers.new("Subdivision", "SUBSURF")
+    level.render_levels = 10
 
 
 def leaves(folder):
