@@ -209,7 +209,7 @@ def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: 
         if has_shapes:
             what, effect = (
                 "lamps that have a shape block its light",
-                "they cast shadows, as in Cycles they do not",
+                "they cast shadows, which Cycles has not",
             )
             notes.add("approximated", name, "Shadow", what, effect)
 
