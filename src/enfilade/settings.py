@@ -257,13 +257,19 @@ class AntialiasSettings(Section):
     )
     support_still_px: float = option(3.0, "Spatial support at rest, pixels.", least=1.0, most=31.0)
     support_fast_px: float = option(
-        9.0, "Spatial support at the fast velocity, pixels of 1/28 degree.", least=1.0, most=31.0
+        3.0,
+        "Spatial support at the fast velocity, pixels of 1/28 degree (the paper's: 9).",
+        least=1.0,
+        most=31.0,
     )
     support_beyond_px: float = option(
-        11.0, "Spatial support beyond it, pixels of 1/28 degree.", least=1.0, most=31.0
+        3.0, "Spatial support beyond it, pixels of 1/28 degree (the paper's: 11).", least=1.0, most=31.0
     )
     fast_deg_s: float = option(16.0, "The fast velocity, deg/s.", least=0.1)
-    separate_shapes: bool = option(False, "Leave out samples of another surface along the flow (§5.3).")
+    separate_shapes: bool = option(
+        True,
+        "Leave out samples along the flow of another surface that moves otherwise (§5.3; the paper: no).",
+    )
 
 
 @dataclass(frozen=True)

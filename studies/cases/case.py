@@ -20,7 +20,7 @@ from enfilade.renderer import Renderer
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.scene.opener import Scene
-from enfilade.settings import SamplingSettings, Settings, ViewingSettings
+from enfilade.settings import AntialiasSettings, SamplingSettings, Settings, ViewingSettings
 from studies.cases.extent import PIXEL_M, Extent
 from studies.cases.noise_free import NoiseFreeRenderer
 from studies.cases.speed import mean_cost, path_costs
@@ -29,6 +29,7 @@ from studies.progress import Prefixed, counted
 from studies.scenes import write_scene
 from studies.versions import origin
 
+PAPER_FILTER = AntialiasSettings(support_fast_px=9.0, support_beyond_px=11.0, separate_shapes=False)  # §5.2
 PLAIN_SPP = 64  # rays a pixel of keyframes and references without noise
 EXTENT_FILE = "extent.json"
 
@@ -160,7 +161,9 @@ class Case:
     def _job(self, size: tuple[int, int], spp: int) -> Job:
         viewing = ViewingSettings(diagonal_m=math.hypot(*size) * PIXEL_M)
         path = load_path(self._scene.parent / "camera_path.json", size=size)
-        return Job(Scene(self._scene), path, Settings(viewing, SamplingSettings(spp=spp)), "paper")
+        return Job(
+            Scene(self._scene), path, Settings(viewing, SamplingSettings(spp=spp), PAPER_FILTER), "paper"
+        )
 
     @cached_property
     def _scene(self) -> Path:

@@ -6,6 +6,7 @@ results are compared with the reference: the same frame through a pixel filter.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from enfilade.methods.paper.support import spatial_support_px
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.settings import AntialiasSettings
-from studies.cases.case import Case
+from studies.cases.case import PAPER_FILTER, Case
 from studies.cases.visibility import score_in
 from studies.cases.windows import Windows
 from studies.progress import counted
@@ -94,7 +95,8 @@ def compare(
 
 def uniform(width_px: float, frames: int) -> AntialiasSettings:
     """Settings with the same support at all velocities."""
-    return AntialiasSettings(
+    return replace(
+        PAPER_FILTER,
         frames=frames,
         slow_frames=frames,
         specular_frames=frames,
@@ -106,7 +108,7 @@ def uniform(width_px: float, frames: int) -> AntialiasSettings:
 
 def _class(start: float, end: float, pixels_per_degree: float) -> dict[str, Any]:
     """Limits of a velocity class, and the supports of §5.2 at its centre."""
-    default, is_last = AntialiasSettings(), np.isinf(end)
+    default, is_last = PAPER_FILTER, np.isinf(end)
     middle = np.array([start + 1.0 if is_last else 0.5 * (start + end)], np.float32)
     return {
         "from_deg_s": start,

@@ -38,6 +38,7 @@ def _walk(frame, neighbours, direction, pixel, reach, least, separate_shapes):
         if distance > least[row, column] and travelled >= 0.5:
             return
         flow = interpolated(getattr(present.flow, direction), x, y)
+        opposite = getattr(following.flow, "forward" if direction == "backward" else "backward")
         x, y = x + flow[0], y + flow[1]
         travelled += math.hypot(*flow)
         if not (0 <= x < width and 0 <= y < height):
@@ -45,8 +46,10 @@ def _walk(frame, neighbours, direction, pixel, reach, least, separate_shapes):
         if separate_shapes:
             there = following.geometry
             there_depth = float(there.depth[int(y), int(x)])
-            if there.shape_index[int(y), int(x)] != shape_index or abs(there_depth - depth) > 0.05 * depth:
+            is_same = there.shape_index[int(y), int(x)] == shape_index
+            is_same &= abs(there_depth - depth) <= 0.05 * depth
+            if not is_same and distance * math.hypot(*(flow + opposite[int(y), int(x)])) >= 0.5:
                 return
-            depth = there_depth
+            depth = there_depth if is_same else depth
         yield distance, interpolated(following.color, x, y)
         present = following

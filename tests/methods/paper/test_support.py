@@ -11,7 +11,7 @@ from enfilade.records import Geometry, SurfaceClass
 from enfilade.settings import AntialiasSettings
 from enfilade.viewing import Viewing
 
-SETTINGS = AntialiasSettings()
+SETTINGS = AntialiasSettings(support_fast_px=9.0, support_beyond_px=11.0)
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, 1, 1)
 
 
@@ -46,6 +46,10 @@ def test_spatial_support(speed_deg_s, pixels):
 def test_spatial_support_rises_with_velocity(a, b):
     slow, fast = sorted((a, b))
     assert 3.0 <= support(slow) <= support(fast) <= 11.0
+
+
+def test_paths_over_the_pixel_need_no_more_at_any_velocity():
+    assert [support(v, AntialiasSettings()) for v in (0, 8, 16, 40)] == [3.0] * 4
 
 
 def test_spatial_support_follows_the_settings():

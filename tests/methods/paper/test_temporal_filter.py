@@ -20,7 +20,7 @@ from twins.trajectory import filtered
 
 H, W = 14, 18
 CAMERA = Camera(look_at((0, 0, 1), (0, 0, 0)), 50.0, W, H)
-SETTINGS = AntialiasSettings()
+SETTINGS = AntialiasSettings(separate_shapes=False)
 SEPARATED = AntialiasSettings(separate_shapes=True)
 
 

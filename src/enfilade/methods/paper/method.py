@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from enfilade.camera.path import Segment
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.denoise import why_no_denoiser
+from enfilade.methods.denoise import denoiser_name, why_no_denoiser
 from enfilade.methods.paper.inbetween import derive
 from enfilade.methods.paper.keyframe import MIN_SPP, trace_keyframe
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
@@ -75,6 +75,11 @@ class Paper(Method):
             )
         if why := why_no_denoiser():
             raise SettingsError(f"--method paper denoises its pixels. {why}")
+
+    def libraries(self, settings: Settings) -> Mapping[str, str]:
+        """The denoiser."""
+        del settings
+        return {"denoiser": denoiser_name()}
 
     def keyframes(self, analysis: Analysis) -> list[int]:
         """Initial keyframes (§4.2)."""

@@ -30,7 +30,10 @@ class TemporalLimits:
 
 
 def spatial_support_px(speed_deg_s: F32, pixels_per_degree: float, settings: AntialiasSettings) -> F32:
-    """Full width of the spatial filter, (H, W) pixels: linear from 3 to 9 up to 16 deg/s, then 11.
+    """Full width of the spatial filter, (H, W) pixels: linear up to 16 deg/s, then constant.
+
+    The paper's rises from 3 to 9 pixels, and is 11 beyond. It has one sample a pixel; here paths are
+    distributed over the pixel, and 3 pixels are the default at any velocity.
 
     The support at rest antialiases: it is three pixels on any display. The part that velocity adds is blur
     that the eye does not resolve, an angle: it is given in the paper's pixels, of which 28 make a degree.

@@ -17,6 +17,7 @@ from enfilade.records import F32, Flow, Geometry
 from enfilade.settings import AntialiasSettings
 
 SAME_SURFACE = 0.05  # largest relative change of depth from frame to frame on one surface
+BESIDE_PX = 0.5  # by which two surfaces move apart at most, while their mixture is that of the frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,8 @@ def filter_along_flow(
         for distance, following in enumerate(neighbours, start=1):
             # Advance to the next frame.
             flow = present.flow.forward if is_later else present.flow.backward
-            trajectories.step(flow, following, distance)
+            back = following.flow.backward if is_later else following.flow.forward
+            trajectories.step(flow, back, following.geometry, distance)
 
             # Accumulate its colours.
             w = trajectories.weight(distance)
@@ -122,8 +124,8 @@ class _Trajectories:
             height=height,
         )
 
-    def step(self, flow: F32, into: Slice, distance: int) -> None:
-        """Follow the flow into the next frame."""
+    def step(self, flow: F32, back: F32, into: Geometry, distance: int) -> None:
+        """Follow the flow into the next frame, of which `back` is the flow to this one."""
         # End at the reach, and slow trajectories where their samples cover the pixel.
         count = opaque(float(distance))
         is_wanted = (count <= self.weights.least) | (self.travelled < COVERED_PX)
@@ -139,7 +141,7 @@ class _Trajectories:
         is_inside = (self.x >= 0) & (self.x < self.width) & (self.y >= 0) & (self.y < self.height)
         self.is_open &= is_wanted & is_inside
         if self.weights.separate_shapes:
-            self._separate(into)
+            self._separate(into, step, lanes(back), count)
 
     def weight(self, distance: int) -> Any:
         """Gaussian weight of the frame at that distance, 0 where the trajectory has ended."""
@@ -151,13 +153,17 @@ class _Trajectories:
         """Evaluate everything so far, so that the step to the next frame is the same kernel."""
         dr.eval(self.x, self.y, self.travelled, self.depth, self.is_open, *values)
 
-    def _separate(self, into: Slice) -> None:
-        """End trajectories that meet another surface."""
+    def _separate(self, into: Geometry, step: Any, back: Any, count: Any) -> None:
+        """End trajectories that meet another surface, if that moves otherwise.
+
+        Surfaces that move alike stay beside each other: their mixture at an outline is antialiasing.
+        """
         column = UInt(dr.clip(self.x, 0, self.width - 1))
         row = UInt(dr.clip(self.y, 0, self.height - 1))
         lane = row * self.width + column
-        depth = dr.gather(Float, lanes(into.geometry.depth), lane)
-        is_same = dr.gather(UInt, lanes(into.geometry.shape_index), lane) == self.shape_index
+        depth = dr.gather(Float, lanes(into.depth), lane)
+        is_same = dr.gather(UInt, lanes(into.shape_index), lane) == self.shape_index
         is_same &= dr.abs(depth - self.depth) <= SAME_SURFACE * self.depth
-        self.is_open &= is_same
-        self.depth = depth
+        apart = count * dr.norm(step + dr.gather(Array2f, back, lane))
+        self.is_open &= is_same | (apart < BESIDE_PX)
+        self.depth = dr.select(is_same, depth, self.depth)
