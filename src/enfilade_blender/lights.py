@@ -201,17 +201,11 @@ def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: 
         if not any(element.get("type") in DELTA for element in elements):
             continue
         if has_cut_outs:
-            what, effect = (
-                "transparent surfaces block its light",
-                "shadows of cut-outs are those of whole shapes",
-            )
-            notes.add("approximated", name, "Shadow", what, effect)
+            effect = "shadows of cut-outs are those of whole shapes"
+            notes.add("approximated", name, "Shadow", "transparent surfaces block its light", effect)
         if has_shapes:
-            what, effect = (
-                "lamps that have a shape block its light",
-                "they cast shadows, which Cycles has not",
-            )
-            notes.add("approximated", name, "Shadow", what, effect)
+            effect = "they cast shadows, which Cycles has not"
+            notes.add("approximated", name, "Shadow", "lamps that have a shape block its light", effect)
 
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes, *, is_seen: bool = False) -> list[Element]:

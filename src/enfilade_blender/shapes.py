@@ -129,9 +129,8 @@ class Shapes:
             if surface.is_invisible and not surface.emitted:
                 continue
             if material.uv is None and any(e.get("name") == "alpha_u" for e in surface.plain().iter()):
-                material = replace(
-                    material, uv=mesh.active_uv or None
-                )  # along which highlights are stretched
+                # Highlights are stretched along the UV map.
+                material = replace(material, uv=mesh.active_uv or None)
             radiance = surface.radiance(self._context(part.material))
             mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:

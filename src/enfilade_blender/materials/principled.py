@@ -59,9 +59,8 @@ def _is_enamel(shader: Principled) -> bool:
 
 
 def _glass(shader: Principled, context: Context) -> Element:
-    tint = context.textures.root(
-        shader["Base Color"]
-    )  # twice through an interface is once through the colour
+    # Twice through an interface is once through the colour.
+    tint = context.textures.root(shader["Base Color"])
     return glass_bsdf(tint, Constant(WHITE), shader["Roughness"], shader.number("IOR"), context)
 
 
