@@ -147,3 +147,10 @@ def test_neighbours_and_rest_end_at_a_cut():
     assert path.neighbours(5) == (other, None)
     assert [path.static_frame(frame) for frame in range(6)] == [0, 1, 1, 3, 3, 5]
     assert [path.distance(frame) for frame in range(6)] == [0, 1, 1, 2, 2, 3]
+    assert not any(path.is_at_rest(frame) for frame in range(6))  # cut at frame 3
+
+
+def test_three_frames_of_a_pose_are_a_rest_and_two_are_slow_motion():
+    cameras = [Camera(look_at((x, 0, 1), (0, 0, 0)), 50.0, W, H) for x in (0, 0, 1, 1, 1, 2)]
+    path = CameraPath(tuple(cameras), tuple(range(6)), 24.0)
+    assert [path.is_at_rest(frame) for frame in range(6)] == [False, False, True, True, True, False]

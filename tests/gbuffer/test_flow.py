@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import image_flow
 from enfilade.records import Flow
+from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Plane
 from support.analytic_truth import first_hits, geometry_of, pixel_centres, projected, ray_directions
 from support.example_scenes import ball, room, room_walk, slide, wall
+from support.in_memory import walk_of
 
 PROMISED_PX = 1e-3
 
@@ -146,3 +149,17 @@ def test_points_that_fall_behind_the_camera_have_a_finite_flow():
     scene, camera = SCENES["room"]
     flow = image_flow(geometry_of(scene, camera), None, beside(camera, (0, 0, -4.5), (0, 0, 0)))
     assert np.isfinite(flow.forward).all()
+
+
+def test_a_walk_on_twos_moves_at_half_the_rate():
+    cameras = slide(4, step=0.2).cameras
+    twos = CameraPath(tuple(c for c in cameras for _ in range(2)), tuple(range(8)), 30.0)
+    rest = CameraPath((*cameras[:2], cameras[1], cameras[1]), tuple(range(4)), 30.0)
+    ones = CameraPath(cameras, tuple(range(4)), 15.0)
+    slow, steady, still = (
+        walk_of(path, AnalyticRenderer(wall())).view(frame).speed_deg_s
+        for path, frame in ((twos, 3), (ones, 1), (rest, 2))
+    )
+    np.testing.assert_allclose(slow, steady, rtol=1e-3)
+    assert slow.min() > 0.0
+    assert not still.any()

@@ -8,6 +8,8 @@ from functools import cached_property
 
 from enfilade.camera.pinhole import Camera
 
+REST = 3  # frames of one pose: the camera rests
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -97,6 +99,12 @@ class CameraPath:
     def distance(self, frame: int) -> int:
         """Distance along the path from the first frame, in distinct frames: repeated poses add nothing."""
         return bisect_right(self.distinct_frames, frame) - 1
+
+    def is_at_rest(self, frame: int) -> bool:
+        """Whether the pose of a frame is that of three frames or more: two are motion of half the rate."""
+        place = self.distance(frame)
+        following = [*self.distinct_frames[place + 1 : place + 2], len(self)][0]
+        return following - self.distinct_frames[place] >= REST
 
     def distinct_inbetweens(self, segment: Segment) -> list[int]:
         """In-betweens of a segment without those that repeat a pose."""

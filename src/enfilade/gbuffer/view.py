@@ -23,12 +23,21 @@ class View:
         Cameras of the neighbouring frames in the same shot; None at its ends.
     viewing
         Viewing conditions.
+    is_at_rest
+        Whether the frame is seen for as long as the camera stands still.
     """
 
     def __init__(
-        self, geometry: Geometry, previous: Camera | None, following: Camera | None, viewing: Viewing
+        self,
+        geometry: Geometry,
+        previous: Camera | None,
+        following: Camera | None,
+        viewing: Viewing,
+        *,
+        is_at_rest: bool = False,
     ) -> None:
         self.geometry = geometry
+        self._is_at_rest = is_at_rest
         self._neighbours = previous, following
         self._viewing = viewing
 
@@ -39,10 +48,8 @@ class View:
 
     @cached_property
     def speed_deg_s(self) -> F32:
-        """Speed of each pixel's pattern (§3.3), (H, W); 0 in frames next to a repeated pose."""
-        speed = self.flow.speed
-        if any(camera and camera.is_same_view(self.geometry.camera) for camera in self._neighbours):
-            speed = np.zeros_like(speed)  # the frame is seen for as long as the camera stands still
+        """Speed of each pixel's pattern (§3.3), (H, W); 0 while the camera rests."""
+        speed = np.zeros_like(self.flow.speed) if self._is_at_rest else self.flow.speed
         return self._viewing.velocity_deg_s(speed)
 
     @cached_property

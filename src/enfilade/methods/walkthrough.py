@@ -79,7 +79,8 @@ class Walkthrough:
     def _computed(self, frame: int) -> View:
         with self._timed("gbuffer"):
             geometry = find_geometry(self.renderer, self.path.cameras[frame])
-        return View(geometry, *self.path.neighbours(frame), self.viewing)
+        neighbours, is_at_rest = self.path.neighbours(frame), self.path.is_at_rest(frame)
+        return View(geometry, *neighbours, self.viewing, is_at_rest=is_at_rest)
 
     def random(self, frame: int, purpose: Purpose) -> RandomKey:
         """Key of the random numbers of a frame for a purpose."""
