@@ -34,7 +34,7 @@ FLAGS_OF_OTHER_PROGRAMS = {
 }
 BEGIN, END = "<!-- settings: written by tests/test_docs.py -->\n", "<!-- end of settings -->"
 SCENE = """<scene version="3.0.0">
-  <integrator type="path"><integer name="max_depth" value="4"/></integrator>
+  <integrator type="path"><integer name="max_depth" value="5"/></integrator>
   <shape type="rectangle">
     <transform name="to_world"><scale value="3"/><translate z="-4"/></transform>
     <bsdf type="diffuse"/>

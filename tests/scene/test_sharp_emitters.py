@@ -24,7 +24,9 @@ SKIES = {
     "sun and sky": '<emitter type="sunsky"><vector name="sun_direction" x="0.6" y="0.64" z="0.48"/>'
     '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>',
     "photographed": '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>',
-    "lamps": '<emitter type="directional"><vector name="direction" x="-1" y="-2" z="0.3"/>'
+    "lamps": '<emitter type="point"><rgb name="intensity" value="9"/>'
+    '<float name="sampling_weight" value="0"/></emitter>'
+    '<emitter type="directional"><vector name="direction" x="-1" y="-2" z="0.3"/>'
     '<rgb name="irradiance" value="2, 1, 1"/></emitter><emitter type="spot"><transform name="to_world">'
     '<lookat origin="1, 2, 0" target="0, 0, 0" up="0, 0, 1"/></transform>'
     f'<rgb name="intensity" value="3"/></emitter>{LAMP.format(0.4, -0.8, 0.5)}{AREA}',

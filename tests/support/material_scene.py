@@ -20,6 +20,7 @@ ROUGH = '<float name="alpha" value="0.25"/>'
 MATERIALS = {
     "diffuse": f'<bsdf type="diffuse">{TINT.format("reflectance")}</bsdf>',
     "plastic": f'<bsdf type="plastic">{TINT.format("diffuse_reflectance")}</bsdf>',
+    "pplastic": f'<bsdf type="pplastic">{ROUGH}{TINT.format("diffuse_reflectance")}</bsdf>',
     "roughplastic": f'<bsdf type="roughplastic">{ROUGH}{TINT.format("diffuse_reflectance")}</bsdf>',
     "conductor": '<bsdf type="conductor"/>',
     "roughconductor": f'<bsdf type="roughconductor">{ROUGH}</bsdf>',

@@ -61,8 +61,8 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     if integrator.hide_emitters:
         return "its integrator hides the emitters"
     max_depth, _ = _depths(integrator)
-    if max_depth < MAX_PATH_DEPTH:
-        return f"its paths end at depth {max_depth}, below {MAX_PATH_DEPTH}"
+    if max_depth <= MAX_PATH_DEPTH:
+        return f"its paths end at depth {max_depth}; {MAX_PATH_DEPTH + 1} is the least"
     plugin = PATH_TRACERS[integrator.class_name()]
     if plugin == "path":
         return ""

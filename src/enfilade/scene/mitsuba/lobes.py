@@ -22,7 +22,7 @@ from enfilade.arrays import PCG32, Bool, Float, UInt, UInt64
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
-WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured"}  # not split by a context
+WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked

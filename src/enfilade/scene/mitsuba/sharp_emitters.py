@@ -30,13 +30,14 @@ class SharpEmitters:
     def __init__(self, scene: Any) -> None:
         self._scene = scene
         emitters = scene.emitters()
+        weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
+        is_delta &= weights > 0.0  # Mitsuba never samples the others
         self._count = int(is_delta.sum())
         self._delta = lanes(np.flatnonzero(is_delta).astype(np.uint32)) if self._count else None
         self._sun = find_sun(scene.environment())
 
         # The intervals of the first random number in which the scene samples each emitter.
-        weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         pmf = weights / max(weights.sum(), 1e-30)
         self._first, self._pmf = (lanes(a.astype(np.float32)) for a in (np.cumsum(pmf) - pmf, pmf))
         soft = np.where(is_delta, 0.0, pmf)
