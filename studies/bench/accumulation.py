@@ -60,7 +60,7 @@ def accumulate(color: F32, view: View, previous: History, previous_view: View) -
     # Clip the history to the neighbourhood of the new image.
     mean = cv2.blur(color, (CLIP_SIDE, CLIP_SIDE))
     deviation = np.sqrt(np.maximum(cv2.blur(color * color, (CLIP_SIDE, CLIP_SIDE)) - mean * mean, 0.0))
-    history = _fetched(previous.color, x, y, cv2.INTER_CUBIC)  # bilinear reads blur from frame to frame
+    history = _fetched_sharply(previous.color, x, y)
     history = np.clip(history, mean - CLIP_SIGMAS * deviation, mean + CLIP_SIGMAS * deviation)
 
     # Blend.
@@ -81,6 +81,18 @@ def _shows_same(x: F32, y: F32, view: View, previous: View) -> Mask:
     is_same = there.shape_index[at] == here.shape_index
     same: Mask = is_inside & is_same & ((is_on_plane & is_aligned) | ~here.is_hit)
     return same
+
+
+def _fetched_sharply(image: F32, x: F32, y: F32) -> F32:
+    """An image read bicubically, limited to the pixels around.
+
+    Bilinear reads blur from frame to frame; bicubic ones overshoot beside lights.
+    """
+    around = np.ones((3, 3), np.uint8)
+    least, most = (np.asarray(of(image, around), np.float32) for of in (cv2.erode, cv2.dilate))
+    low, high = (_fetched(limit, x, y, cv2.INTER_NEAREST) for limit in (least, most))
+    limited: F32 = np.clip(_fetched(image, x, y, cv2.INTER_CUBIC), low, high)
+    return limited
 
 
 def _fetched(image: F32, x: F32, y: F32, interpolation: int) -> F32:

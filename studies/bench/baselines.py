@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +10,20 @@ import numpy as np
 from enfilade.images import exact_fps
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.denoise import denoise, why_no_denoiser
+from enfilade.methods.denoise import denoise, denoiser_name, why_no_denoiser
 from enfilade.methods.reference import Reference
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U8, Frame, Provenance
 from enfilade.renderer import Renderer
-from enfilade.settings import KeyframeSettings, LimitSettings, Section, TraceSettings, ViewingSettings, option
+from enfilade.settings import (
+    KeyframeSettings,
+    LimitSettings,
+    Section,
+    Settings,
+    TraceSettings,
+    ViewingSettings,
+    option,
+)
 from studies.bench.accumulation import History, accumulate
 from studies.bench.guides import Guides
 from studies.bench.interpolate import interpolate, why_no_interpolation
@@ -51,6 +59,7 @@ class Denoised(Method):
     """Path tracing of every frame, denoised; accumulated over time before or after on request."""
 
     name = "denoised"
+    revision = 2
     settings = (*Reference.settings, DenoiserSettings, ViewingSettings)
     passes = (
         Pass("history", History, reads=("history",)),
@@ -59,6 +68,11 @@ class Denoised(Method):
 
     def __init__(self) -> None:
         self._guides: tuple[Renderer, Guides] | None = None
+
+    def libraries(self, settings: Settings) -> Mapping[str, str]:
+        """The denoiser."""
+        del settings
+        return {"denoiser": denoiser_name()}
 
     def tasks(self, analysis: Analysis) -> Iterable[Task]:
         """One task a frame, and one for its history."""

@@ -41,9 +41,9 @@ from studies.bench import colorvideovdp
 from studies.bench.baselines import why_missing
 from studies.bench.configurations import FAMILIES, Configuration
 from studies.bench.measures import QUALITIES
-from studies.bench.measuring import available, measure, windows_of_run
+from studies.bench.measuring import GAUSSIAN_OF_BOX, available, measure, windows_of_run
 from studies.bench.ratios import ratios
-from studies.bench.references import FILTERS, References
+from studies.bench.references import References
 from studies.bench.windows import Window, draw_windows, windows_of
 from studies.progress import Prefixed
 from studies.versions import machine, origin, package_versions
@@ -130,8 +130,8 @@ def bench(
     references = References(place.store, job, windows)
     prepared_s = time.monotonic() - started
     runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
-    floors = {kind.value: runs.floor(kind) for kind in FILTERS}
-    rows = [runs.row(one, floors[one.pixel_filter.value]) for one in chosen]
+    floor = runs.floor()
+    rows = [runs.row(one, floor) for one in chosen]
     found = {
         **origin(),
         "machine": machine(),
@@ -146,7 +146,7 @@ def bench(
         "reference": {
             "spp": min(references.spp(frame) for frame in range(len(job.path))),
             "wall_s": prepared_s,  # of this call; short where the store has them
-            "noise_floor": floors,
+            "noise_floor": floor,
         },
         "measures": {name: {"title": QUALITIES[name].title, "unit": QUALITIES[name].unit} for name in names},
         "left_out": left_out,
@@ -202,7 +202,7 @@ class _Bench:
         self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
         self._references, self._windows = references, windows
 
-    def row(self, one: Configuration, floors: dict[str, list[float]]) -> dict[str, Any]:
+    def row(self, one: Configuration, floor: dict[str, list[float]]) -> dict[str, Any]:
         """Render and measure a configuration; return its row of the result."""
         run = self._folder / "configurations" / one.name
         self._render(one, run)
@@ -217,18 +217,18 @@ class _Bench:
             "origin": read_json(self._folder / "costs" / f"{one.name}.json")["origin"],
             "scores": {name: QUALITIES[name].score(values[name]) for name in self._names},
             "values": values,
-            "undecided": undecided(values, floors),
+            "undecided": undecided(values, floor),
         }
 
-    def floor(self, pixel_filter: SampleFilter) -> dict[str, list[float]]:
+    def floor(self) -> dict[str, list[float]]:
         """Values of one half of the references against the other, by measures that contain their noise."""
-        found = self._values(f"noise floor, {pixel_filter.value}", None, pixel_filter)
+        found = self._values("noise floor, gaussian", None, SampleFilter.GAUSSIAN)
         return {name: values for name, values in found.items() if QUALITIES[name].has_noise}
 
     def _values(self, name: str, run: Path | None, pixel_filter: SampleFilter) -> dict[str, list[float]]:
         """Values by measure and window; read from their file if they are there, else measured."""
         frames = range(len(self._job.path))
-        identity = {
+        identity: dict[str, Any] = {
             "run": run and RunFolder.read(run).digest(),
             "windows": [asdict(window) for window in self._windows],
             "references": [self._references.folder.name, *map(self._references.spp, frames)],
@@ -236,6 +236,8 @@ class _Bench:
             "metering": self._job.settings[MetricSettings].metering.value,
             "versions": [package_versions(), colorvideovdp.version()],
         }
+        if pixel_filter is not SampleFilter.GAUSSIAN:
+            identity["filter"] = list(GAUSSIAN_OF_BOX)
         file = self._folder / "scores" / f"{name}.json"
         found: dict[str, Any] = read_json(file) if file.is_file() else {}
         if found.get("identity") != identity:
@@ -243,10 +245,10 @@ class _Bench:
         wanted = [m for m in self._names if run is not None or QUALITIES[m].has_noise]
         if missing := [m for m in wanted if m not in found["values"]]:
             with watch(quiet=self._quiet) as monitor:
-                source = windows_of_run(run, self._job.path, self._windows) if run else None
+                path, windows = self._job.path, self._windows
+                source = windows_of_run(run, path, windows, pixel_filter) if run else None
                 found["values"] |= measure(
-                    source, pixel_filter, self._references, self._windows, self._job, missing,
-                    Prefixed(monitor, name),
+                    source, self._references, windows, self._job, missing, Prefixed(monitor, name)
                 )  # fmt: skip
             write_json(file, found)
         return {m: found["values"][m] for m in wanted}

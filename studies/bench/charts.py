@@ -106,11 +106,8 @@ def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
                 label, (point.cpu_s, sign * point.error), color=style["color"], fontsize=5.5,
                 xytext=(3, 3), textcoords="offset points", zorder=5,
             )  # fmt: skip
-    for floor in found["reference"]["noise_floor"].values():
-        if name in floor:
-            ax.axhline(
-                quality.score(floor[name]), color=FLOOR, linewidth=1.0, linestyle=(0, (1, 3)), zorder=1
-            )
+    if (floor := found["reference"]["noise_floor"].get(name)) is not None:
+        ax.axhline(quality.score(floor), color=FLOOR, linewidth=1.0, linestyle=(0, (1, 3)), zorder=1)
     _axes(ax, is_more_better=quality.is_more_better)
 
 

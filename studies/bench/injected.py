@@ -96,7 +96,7 @@ def main() -> None:
         return images
 
     names = available((), job)[0]
-    arguments_of = (SampleFilter.GAUSSIAN, references, windows, job)
+    arguments_of = (references, windows, job)
     floor = measure(None, *arguments_of, [name for name in names if QUALITIES[name].has_noise], Silence())
     print("error", *names, sep="\t")
     print("floor", *(score_text(name, floor[name]) if name in floor else "" for name in names), sep="\t")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import scipy.ndimage
 
 from enfilade.camera.path import CameraPath
 from enfilade.comparison.measures import display_pair
@@ -24,6 +25,9 @@ from studies.bench import colorvideovdp
 from studies.bench.measures import QUALITIES, WindowPair, open_measure
 from studies.bench.references import ReferenceFrame, References
 from studies.bench.windows import Window
+
+# Of each axis. Variances, square pixels: 1/12 of a box, .2433 of the Gaussian that ends at three deviations.
+GAUSSIAN_OF_BOX = (0.08, 0.84, 0.08)
 
 
 def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]:
@@ -49,20 +53,38 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
 Source = Callable[[int], Sequence[F32]]  # from a frame to its windows, (S, S, 3) linear
 
 
-def windows_of_run(run: Path, path: CameraPath, windows: Sequence[Window]) -> Source:
-    """The windows of the frames of a run folder."""
+def frame_of_run(run: RunFolder, number: int, pixel_filter: SampleFilter) -> F32:
+    """A frame, (H, W, 3) linear, with the Gaussian pixel filter of the references."""
+    image = np.asarray(read_exr(run.file_of(FRAMES, number))["RGB"], np.float32)
+    return image if pixel_filter is SampleFilter.GAUSSIAN else gaussian_of_box(image)
+
+
+def gaussian_of_box(image: F32) -> F32:
+    """An image of box-filtered pixels (H, W, 3), filtered to the variance of the Gaussian pixel filter.
+
+    A box alone has sharper edges. Errors against references of such edges are larger: they could not be
+    compared with errors against the Gaussian ones.
+    """
+    for axis in (0, 1):
+        image = scipy.ndimage.convolve1d(image, GAUSSIAN_OF_BOX, axis=axis, mode="nearest")
+    return image
+
+
+def windows_of_run(
+    run: Path, path: CameraPath, windows: Sequence[Window], pixel_filter: SampleFilter
+) -> Source:
+    """The windows of the frames of a run folder, with the Gaussian pixel filter of the references."""
     held = RunFolder.read(run)
 
     def read(frame: int) -> list[F32]:
-        image = read_exr(held.file_of(FRAMES, path.numbers[frame]))["RGB"]
-        return [np.ascontiguousarray(window.crop(image), np.float32) for window in windows]
+        image = frame_of_run(held, path.numbers[frame], pixel_filter)
+        return [np.ascontiguousarray(window.crop(image)) for window in windows]
 
     return read
 
 
 def measure(
     source: Source | None,
-    pixel_filter: SampleFilter,
     references: References,
     windows: Sequence[Window],
     job: Job,
@@ -75,8 +97,6 @@ def measure(
     ----------
     source
         The windows of each frame; None for the first half of the references, denoised, against the second.
-    pixel_filter
-        Of the references.
     references, windows
     job
         Camera path and viewing conditions.
@@ -99,7 +119,7 @@ def measure(
         monitor.progress("measures", frame, len(job.path))
         reference = references.read(frame)
         tests = None if source is None else source(frame)
-        for index, pair in enumerate(_pairs(tests, reference, pixel_filter, viewing, exposure_ev)):
+        for index, pair in enumerate(_pairs(tests, reference, viewing, exposure_ev)):
             for one in opened[index].values():
                 one.add(pair)
             if "cvvdp" in names:
@@ -114,12 +134,11 @@ def measure(
 def _pairs(
     tests: Sequence[F32] | None,
     reference: ReferenceFrame,
-    pixel_filter: SampleFilter,
     viewing: Viewing,
     exposure_ev: float,
 ) -> Iterator[WindowPair]:
     """The windows of a frame, each with its reference."""
-    halves, denoised = reference.halves[pixel_filter], reference.denoised[pixel_filter]
+    halves, denoised = (of[SampleFilter.GAUSSIAN] for of in (reference.halves, reference.denoised))
     for index, flow in enumerate(reference.flows):
         test, wanted = denoised[:2, index] if tests is None else (tests[index], denoised[2, index])
         pair = display_pair(test, wanted, viewing, exposure_ev=exposure_ev)

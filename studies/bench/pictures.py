@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.images import read_exr
 from enfilade.kernels.tone import srgb_encode
-from enfilade.methods.base import FRAMES
 from enfilade.records import F32
 from enfilade.reports.charts import INK, Figure, save
 from enfilade.runs.folder import RunFolder
 from enfilade.settings import SampleFilter
 from studies.bench.charts import STYLES
+from studies.bench.measuring import frame_of_run
 from studies.bench.references import References
 from studies.bench.tables import score_text
 from studies.bench.windows import windows_of
@@ -51,9 +50,8 @@ def plot_crops(found: Mapping[str, Any], references: References, folder: Path, f
     images = []
     for row in rows:
         run = RunFolder.read(folder / "configurations" / row["name"])
-        images.append(
-            displayed(read_exr(run.file_of(FRAMES, found["frames"][middle]))["RGB"].astype(np.float32))
-        )
+        kind = SampleFilter(row["pixel_filter"])
+        images.append(displayed(frame_of_run(run, found["frames"][middle], kind)))
     size = (PANEL_IN * (len(rows) + 1), 2 * PANEL_IN * len(windows) + 0.5)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     axes = figure.subplots(2 * len(windows), len(rows) + 1, squeeze=False)
@@ -61,13 +59,13 @@ def plot_crops(found: Mapping[str, Any], references: References, folder: Path, f
         ax.set_axis_off()
     for index, window in enumerate(windows):
         above, below = axes[2 * index], axes[2 * index + 1]
-        means = {kind: displayed(of[2, index]) for kind, of in reference.denoised.items()}
-        above[0].imshow(means[SampleFilter.GAUSSIAN], interpolation="nearest")
+        mean = displayed(reference.denoised[SampleFilter.GAUSSIAN][2, index])
+        above[0].imshow(mean, interpolation="nearest")
         text = f"↑ {window.kind}\n{AMPLIFICATION:g} × difference →"
         below[0].text(0.5, 0.5, text, fontsize=8, color=INK, ha="center", va="center")
-        for column, (row, image) in enumerate(zip(rows, images, strict=True), start=1):
+        for column, image in enumerate(images, start=1):
             crop = window.crop(image)
-            difference = 0.5 + np.float32(AMPLIFICATION) * (crop - means[SampleFilter(row["pixel_filter"])])
+            difference = 0.5 + np.float32(AMPLIFICATION) * (crop - mean)
             above[column].imshow(crop, interpolation="nearest")
             below[column].imshow(np.clip(difference, 0.0, 1.0), interpolation="nearest")
     axes[0, 0].set_title(f"reference, frame {found['frames'][middle]}", fontsize=7, color=INK)

@@ -40,9 +40,9 @@ def _configurations(found: Mapping[str, Any]) -> Table:
         )
         table.add_row(row["name"], *map(number_text, cells), *marked)
     table.add_section()
-    for kind, floor in found["reference"]["noise_floor"].items():
-        texts = (score_text(name, floor[name]) if name in floor else "" for name in measures)
-        table.add_row(f"noise floor, {kind}", "", "", "", "", *texts)
+    floor = found["reference"]["noise_floor"]
+    texts = (score_text(name, floor[name]) if name in floor else "" for name in measures)
+    table.add_row("noise floor", "", "", "", "", *texts)
     table.caption = (
         f"means of {len(found['windows'])} windows; references of {found['reference']['spp']} paths in two "
         "halves; floor: one half against the other; *: error less than a third above it, not decided"

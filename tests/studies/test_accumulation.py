@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enfilade.gbuffer import positions
-from studies.bench.accumulation import MAX_FRAMES, History, accumulate
+from studies.bench.accumulation import MAX_FRAMES, History, _fetched_sharply, accumulate
 from support.closed_room import opened_room, room_path
 from support.in_memory import walk_of
 
@@ -52,3 +52,13 @@ def test_a_surface_that_came_closer_is_not_the_same(walk):
     history = History(color, np.ones(color.shape[:2], np.float32))
     found = accumulate(color, walk.view(1), history, other)
     assert (found.count[walk.view(1).geometry.is_hit] == 1.0).mean() > 0.9
+
+
+def test_history_does_not_overshoot_beside_lights():
+    image = np.full((12, 12, 3), 0.3, np.float32)
+    image[4:8, 4:8] = 50.0
+    y, x = np.mgrid[:12, :12].astype(np.float32)
+    read = _fetched_sharply(image, x + np.float32(0.3), y)
+    assert read.min() >= np.float32(0.3)
+    assert read.max() <= 50.0
+    assert 5.0 < read[5, 3, 0] < 25.0  # three tenths of the way into the light

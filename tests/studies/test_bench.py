@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
+from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
 from enfilade.methods.denoise import why_no_denoiser
 from enfilade.monitor import Silence
 from enfilade.runs.render import render
@@ -27,7 +28,7 @@ from studies.bench.baselines import DenoiserSettings
 from studies.bench.bench import Place, bench, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
-from studies.bench.measuring import available
+from studies.bench.measuring import available, gaussian_of_box
 from studies.bench.tables import bench_tables
 from support.console import as_text
 from support.example_scenes import room_walk
@@ -89,8 +90,7 @@ def test_more_paths_score_better_and_scores_near_the_noise_floor_are_undecided(h
     for name in MEASURES:
         errors = [QUALITIES[name].error(rows[row]["values"][name]) for row in ("traced-1", "traced-4")]
         assert errors[0] > errors[1]
-    for floor in found["reference"]["noise_floor"].values():
-        assert set(floor) == {"aqm"}  # the others do not contain the noise of the reference
+    assert set(found["reference"]["noise_floor"]) == {"aqm"}  # others do not contain the references' noise
 
 
 @pytest.mark.parametrize(
@@ -150,6 +150,19 @@ def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
         available(("ssim",), job)
     with pytest.raises(SettingsError, match="no flip"):
         available(("flip",), job)
+
+
+def test_filtered_boxes_have_the_variance_of_the_gaussian_filter():
+    image = np.zeros((9, 9, 3), np.float32)
+    image[4, 4] = 1.0
+    found = gaussian_of_box(image)[..., 0].astype(np.float64)
+    assert found.sum() == pytest.approx(1.0)
+    x = np.arange(9) - 4.0
+    box = 1.0 / 12.0
+    ends = np.linspace(-GAUSSIAN_RADIUS_PX, GAUSSIAN_RADIUS_PX, 10_001)
+    weights = np.exp(-0.5 * np.square(ends / GAUSSIAN_SIGMA_PX))
+    wanted = np.average(np.square(ends), weights=weights)
+    assert (found.sum(axis=0) * x**2).sum() + box == pytest.approx(wanted, rel=0.01)
 
 
 def test_a_single_frame_has_no_changes_to_measure(tmp_path):
