@@ -53,31 +53,25 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
 Source = Callable[[int], Sequence[F32]]  # from a frame to its windows, (S, S, 3) linear
 
 
-def frame_of_run(run: RunFolder, number: int, pixel_filter: SampleFilter) -> F32:
-    """A frame, (H, W, 3) linear, with the Gaussian pixel filter of the references."""
+def frame_of_run(run: RunFolder, number: int, *, is_filtered: bool) -> F32:
+    """A frame, (H, W, 3) linear; a box-filtered one may be filtered to a Gaussian."""
     image = np.asarray(read_exr(run.file_of(FRAMES, number))["RGB"], np.float32)
-    return image if pixel_filter is SampleFilter.GAUSSIAN else gaussian_of_box(image)
+    return gaussian_of_box(image) if is_filtered else image
 
 
 def gaussian_of_box(image: F32) -> F32:
-    """An image of box-filtered pixels (H, W, 3), filtered to the variance of the Gaussian pixel filter.
-
-    A box alone has sharper edges. Errors against references of such edges are larger: they could not be
-    compared with errors against the Gaussian ones.
-    """
+    """An image of box-filtered pixels (H, W, 3), filtered to the variance of the Gaussian pixel filter."""
     for axis in (0, 1):
         image = scipy.ndimage.convolve1d(image, GAUSSIAN_OF_BOX, axis=axis, mode="nearest")
     return image
 
 
-def windows_of_run(
-    run: Path, path: CameraPath, windows: Sequence[Window], pixel_filter: SampleFilter
-) -> Source:
-    """The windows of the frames of a run folder, with the Gaussian pixel filter of the references."""
+def windows_of_run(run: Path, path: CameraPath, windows: Sequence[Window], *, is_filtered: bool) -> Source:
+    """The windows of the frames of a run folder; see :func:`frame_of_run`."""
     held = RunFolder.read(run)
 
     def read(frame: int) -> list[F32]:
-        image = frame_of_run(held, path.numbers[frame], pixel_filter)
+        image = frame_of_run(held, path.numbers[frame], is_filtered=is_filtered)
         return [np.ascontiguousarray(window.crop(image)) for window in windows]
 
     return read
@@ -90,6 +84,8 @@ def measure(
     job: Job,
     names: Sequence[str],
     monitor: Monitor,
+    *,
+    pixel_filter: SampleFilter = SampleFilter.GAUSSIAN,
 ) -> dict[str, list[float]]:
     """Measure frames in all windows, each frame read once.
 
@@ -103,6 +99,8 @@ def measure(
     names
         Names of measures.
     monitor
+    pixel_filter
+        Of the references.
 
     Returns
     -------
@@ -119,7 +117,7 @@ def measure(
         monitor.progress("measures", frame, len(job.path))
         reference = references.read(frame)
         tests = None if source is None else source(frame)
-        for index, pair in enumerate(_pairs(tests, reference, viewing, exposure_ev)):
+        for index, pair in enumerate(_pairs(tests, reference, pixel_filter, viewing, exposure_ev)):
             for one in opened[index].values():
                 one.add(pair)
             if "cvvdp" in names:
@@ -134,11 +132,12 @@ def measure(
 def _pairs(
     tests: Sequence[F32] | None,
     reference: ReferenceFrame,
+    pixel_filter: SampleFilter,
     viewing: Viewing,
     exposure_ev: float,
 ) -> Iterator[WindowPair]:
     """The windows of a frame, each with its reference."""
-    halves, denoised = (of[SampleFilter.GAUSSIAN] for of in (reference.halves, reference.denoised))
+    halves, denoised = (of[pixel_filter] for of in (reference.halves, reference.denoised))
     for index, flow in enumerate(reference.flows):
         test, wanted = denoised[:2, index] if tests is None else (tests[index], denoised[2, index])
         pair = display_pair(test, wanted, viewing, exposure_ev=exposure_ev)

@@ -50,8 +50,8 @@ def plot_crops(found: Mapping[str, Any], references: References, folder: Path, f
     images = []
     for row in rows:
         run = RunFolder.read(folder / "configurations" / row["name"])
-        kind = SampleFilter(row["pixel_filter"])
-        images.append(displayed(frame_of_run(run, found["frames"][middle], kind)))
+        is_box = SampleFilter(row["pixel_filter"]) is SampleFilter.BOX
+        images.append(displayed(frame_of_run(run, found["frames"][middle], is_filtered=is_box)))
     size = (PANEL_IN * (len(rows) + 1), 2 * PANEL_IN * len(windows) + 0.5)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     axes = figure.subplots(2 * len(windows), len(rows) + 1, squeeze=False)
