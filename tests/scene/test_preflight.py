@@ -24,6 +24,7 @@ def checked(file, max_depth=0, **limits):
 
 def test_it_reports_why_lobes_are_inseparable(scene):
     assert checked(scene(BALL)) == ""
+    assert checked(scene(BALL), max_depth=4) == "its paths end at depth 4; 5 is the least"
     assert checked(scene(BALL), max_depth=3) == "its paths end at depth 3; 5 is the least"
 
 

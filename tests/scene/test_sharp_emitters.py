@@ -25,6 +25,7 @@ SKIES = {
     '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>',
     "photographed": '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>',
     "lamps": '<emitter type="point"><rgb name="intensity" value="9"/>'
+    '<point name="position" x="0.7" y="1" z="0.8"/>'
     '<float name="sampling_weight" value="0"/></emitter>'
     '<emitter type="directional"><vector name="direction" x="-1" y="-2" z="0.3"/>'
     '<rgb name="irradiance" value="2, 1, 1"/></emitter><emitter type="spot"><transform name="to_world">'

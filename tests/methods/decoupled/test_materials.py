@@ -36,7 +36,7 @@ def test_without_a_cache_every_material_keeps_its_energy(materials):
         for number in np.unique(shape_index[shape_index > 0])
     }
     assert set(MATERIALS) < set(errors)
-    # Of 17 shapes one exceeds four standard errors once in 1000 runs.
+    # Of 18 shapes one exceeds four standard errors once in 1000 runs.
     assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
 
 
