@@ -201,7 +201,7 @@ def edges(labels):
 
 
 def test_a_share_of_the_foreground_is_not_moved_into_the_open_background():
-    # A dark post before a white wall. Its width is one at which pixels along its sides have centres on the wall.
+    # A dark post before a white wall, so wide that pixels with centres on the wall show a part of it.
     post = Quad((-0.29, -5, 0), (0.58, 0, 0), (0, 10, 0), Material((0.05, 0.05, 0.05)))
     wall = Plane((0, 0, -6), (0, 0, 1), Material((0.8, 0.8, 0.8)))
     scene = AnalyticScene((wall, post), ambient=(1, 1, 1), light=(0, 0, 0))
