@@ -71,11 +71,11 @@ def measured(folder: Path, arguments: argparse.Namespace) -> tuple[list[float], 
     cache = shot.shading_cache(frame)
     times: list[float] = []
 
-    def radiance(rays, rng):
-        dr.eval(rays, rng)
+    def radiance(rays, sampler):
+        dr.eval(rays, sampler)
         dr.sync_thread()
         begin = time.perf_counter()
-        found = integrator.diffuse_radiance(cache, rays, rng, pixel_angle=path.cameras[frame].pixel_angle)
+        found = integrator.diffuse_radiance(cache, rays, sampler, pixel_angle=path.cameras[frame].pixel_angle)
         dr.eval(found)
         dr.sync_thread()
         times.append(time.perf_counter() - begin)

@@ -16,11 +16,9 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 from drjit.auto.ad import (
-    PCG32,
     Array2f,
     Array3f,
     Array3f16,
-    Array4f,
     Bool,
     Float,
     Float16,
@@ -32,11 +30,9 @@ from drjit.auto.ad import (
 )
 
 __all__ = [
-    "PCG32",
     "Array2f",
     "Array3f",
     "Array3f16",
-    "Array4f",
     "Bool",
     "Float",
     "Float64",

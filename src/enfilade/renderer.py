@@ -324,7 +324,7 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_diffuse(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
         Of a Lambertian surface this is irradiance over pi.
@@ -332,7 +332,7 @@ class LobeRenderer(Renderer, Protocol):
         Parameters
         ----------
         point
-        rng : PCG32
+        sampler : PaddedSobolSampler
         path_depth
             Path segments from the camera to the surface, 1 to ``MAX_PATH_DEPTH``. They count where the scene
             limits the length of paths.
@@ -344,17 +344,17 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_specular(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """Estimate the radiance scattered by the specular lobes; see :meth:`estimate_diffuse`."""
         ...
 
-    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
         """Estimate the light of emitters with sharp shadows that the diffuse lobe reflects.
 
         Parameters
         ----------
         point
-        rng : PCG32
+        sampler : PaddedSobolSampler
 
         Returns
         -------
@@ -363,27 +363,27 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """Sample a direction of the diffuse lobe, divided by the albedo.
 
         Parameters
         ----------
         point
-        rng : PCG32
+        sampler : PaddedSobolSampler
         soft_only
             Leave out emitters that cast sharp shadows: :meth:`sharp_light`.
         """
         ...
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
+        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """Sample a direction of the specular lobes.
 
         Parameters
         ----------
         point
-        rng : PCG32
+        sampler : PaddedSobolSampler
         choice : Float
             Selects the lobe, in [0, 1), transmission last; random by default.
         branch : UInt

@@ -8,16 +8,16 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera.pinhole import Camera
 from enfilade.errors import SettingsError
-from enfilade.kernels.random import streams
+from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import pinhole_directions
 from enfilade.kernels.replay import padded, recorded
 from enfilade.records import F32, SurfaceClass
 from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
-SIDE = 4  # strata along each side of a pixel: 16 rays
+RAYS = 16  # a pixel
 BOUNCES = 6  # reflections and transmissions, before a path ends
 SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
@@ -71,28 +71,28 @@ class Guides:
                 "take first-hit"
             )
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-        step = max(chunk // SIDE**2, 1)
+        step = max(chunk // RAYS, 1)
         random = RandomKey(seed, frame, Purpose.GUIDE)
         batches = []
         for first in range(0, len(pixels), step):
-            rays, rng = _stratified_rays(camera, pixels[first : first + step], random)
-            albedo, normal, is_sharp = self._first(rays, rng)
+            rays, sampler = _stratified_rays(camera, pixels[first : first + step], random)
+            albedo, normal, is_sharp = self._first(rays, sampler)
             if is_followed:
-                self._follow(albedo, normal, is_sharp, rays, rng)
-            sums = [np.array(dr.block_sum(v, SIDE * SIDE)) for v in (*albedo, *normal)]
-            batches.append(np.stack(sums) / np.float32(SIDE * SIDE))
+                self._follow(albedo, normal, is_sharp, rays, sampler)
+            sums = [np.array(dr.block_sum(v, RAYS)) for v in (*albedo, *normal)]
+            batches.append(np.stack(sums) / np.float32(RAYS))
         found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
         albedo_image = np.clip(found[..., :3], 0.0, 1.0)
         return np.ascontiguousarray(albedo_image), np.ascontiguousarray(found[..., 3:])
 
-    def _first(self, rays: Rays, rng: Any) -> tuple[Any, Any, Any]:
+    def _first(self, rays: Rays, sampler: Any) -> tuple[Any, Any, Any]:
         """Albedo and normal of the first surfaces, and whether they are sharp."""
         hit = self._renderer.surfaces(rays)
         found = *_guides_of(hit), _is_sharp(hit)
-        dr.eval(found, rays, rng)
+        dr.eval(found, rays, sampler)
         return found
 
-    def _follow(self, albedo: Any, normal: Any, is_sharp: Any, rays: Rays, rng: Any) -> None:
+    def _follow(self, albedo: Any, normal: Any, is_sharp: Any, rays: Rays, sampler: Any) -> None:
         """Replace the guides of sharp surfaces by those of the surfaces behind."""
         lane = dr.arange(UInt, dr.width(is_sharp))
         throughput = dr.full(Array3f, 1, dr.width(is_sharp))
@@ -104,11 +104,11 @@ class Guides:
                 return
             chosen, is_real = padded(active)
             lane, throughput = dr.gather(UInt, lane, chosen), dr.gather(Array3f, throughput, chosen)
-            rays, rng = dr.gather(Rays, rays, chosen), dr.gather(PCG32, rng, chosen)
-            dr.eval(lane, throughput, rays, rng)
+            rays, sampler = dr.gather(Rays, rays, chosen), dr.gather(PaddedSobolSampler, sampler, chosen)
+            dr.eval(lane, throughput, rays, sampler)
 
             # Reflect or transmit them, and find the next surfaces.
-            rays, rng, factor, next_albedo, next_normal, is_sharp = self._extend(rays, rng)
+            rays, sampler, factor, next_albedo, next_normal, is_sharp = self._extend(rays, sampler)
             throughput *= factor
 
             # Add their albedo, and take their normal.
@@ -119,30 +119,27 @@ class Guides:
             is_sharp &= is_real
             dr.eval(albedo, normal, is_sharp, throughput)
 
-    def _extend_kernel(self, rays: Rays, rng: Any) -> tuple[Any, ...]:
+    def _extend_kernel(self, rays: Rays, sampler: Any) -> tuple[Any, ...]:
         """Scatter paths at a sharp surface, and find the next one."""
         assert isinstance(self._renderer, LobeRenderer)  # noqa: S101  (`__init__`)
-        rng = PCG32(rng)
+        sampler = sampler.fork(0)
         point = self._renderer.intersect(rays, opaque_only=True)
-        sample = self._renderer.sample_specular(point, rng)
+        sample = self._renderer.sample_specular(point, sampler)
         hit = self._renderer.intersect(sample.rays, sample.bounce).surfaces
         throughput = Array3f(dr.select(sample.is_alive, sample.throughput, 0))
-        return sample.rays, rng, throughput, *_guides_of(hit), Bool(_is_sharp(hit) & sample.is_alive)
+        return sample.rays, sampler, throughput, *_guides_of(hit), Bool(_is_sharp(hit) & sample.is_alive)
 
 
 def _stratified_rays(camera: Camera, pixels: npt.NDArray[np.uint32], random: RandomKey) -> tuple[Rays, Any]:
-    """One ray for each stratum of each pixel, in neighbouring lanes, and their random generators."""
-    count = SIDE * SIDE
-    lane = dr.arange(UInt, len(pixels) * count)
-    slot = lane // count
-    stratum = lane - slot * count
+    """Stratified rays through each pixel, in neighbouring lanes, and their samplers."""
+    lane = dr.arange(UInt, len(pixels) * RAYS)
+    slot = lane // RAYS
     pixel = dr.gather(UInt, lanes(pixels), slot)
-    rng = streams(pixel, stratum, random)
+    sampler = samplers(pixel, lane - slot * RAYS, random)
     row = pixel // opaque(camera.width)
-    inside = Array2f(stratum % SIDE, stratum // SIDE) + Array2f(rng.next_float32(), rng.next_float32())
-    at = Array2f(pixel - row * opaque(camera.width), row) + inside / SIDE
+    at = Array2f(pixel - row * opaque(camera.width), row) + sampler.next_2d()
     direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    return Rays(vector3(camera.eye), direction), rng
+    return Rays(vector3(camera.eye), direction), sampler
 
 
 def _guides_of(hit: Surfaces) -> tuple[Any, Any]:

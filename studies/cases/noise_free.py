@@ -70,7 +70,7 @@ class NoiseFreeRenderer:
             random=random,
         )
 
-    def _radiance(self, rays: Rays, _rng: Any) -> Any:
+    def _radiance(self, rays: Rays, _sampler: Any) -> Any:
         # Shade the first surface.
         direct, hit = self._shaded(rays)
         is_mirror = hit.is_hit & (hit.surface == opaque(int(SurfaceClass.MIRROR), UInt))

@@ -6,8 +6,8 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from enfilade.arrays import Float, UInt, lanes
-from enfilade.kernels.random import PrefixedRng, stratified, stratified4, streams
+from enfilade.arrays import lanes
+from enfilade.kernels.random import one_sequence, samplers
 from enfilade.renderer import RandomKey
 
 COUNT = 1 << 16
@@ -16,8 +16,8 @@ LIMIT = 5 / math.sqrt(COUNT)  # five standard errors of a correlation of nothing
 
 def draw(pixel, path=0, *, seed=0, frame=0, purpose=0, draws=2):
     pixel, path = np.broadcast_arrays(np.asarray(pixel, np.uint32), np.asarray(path, np.uint32))
-    rng = streams(lanes(pixel.ravel()), lanes(path.ravel()), RandomKey(seed, frame, purpose))
-    return np.stack([np.array(rng.next_float32()) for _ in range(draws)])
+    sampler = samplers(lanes(pixel.ravel()), lanes(path.ravel()), RandomKey(seed, frame, purpose))
+    return np.stack([np.array(sampler.next_1d()) for _ in range(draws)])
 
 
 PIXELS = np.arange(COUNT)
@@ -44,7 +44,6 @@ def test_they_are_uniform():
 OTHERS = {
     "next pixel": {"pixel": PIXELS + 1},
     "pixel below": {"pixel": PIXELS + 1920},
-    "next path": {"path": 1},
     "path 64": {"path": 64},
     "next seed": {"seed": 1},
     "far seed": {"seed": 2**32 - 1},
@@ -73,9 +72,10 @@ def test_draws_of_one_stream_are_not_correlated():
 
 def test_neighbouring_pixels_are_not_correlated_over_paths():
     # A mean over few paths must not form a pattern in the image.
-    means = np.mean([draw(np.arange(4096), path)[0] for path in range(16)], axis=0)
+    means = np.mean([draw(np.arange(4096), path)[0] for path in range(16)], axis=0, dtype=float)
     assert abs(np.corrcoef(means[:-1], means[1:])[0, 1]) < 5 / math.sqrt(4095)
-    assert means.var() == pytest.approx(1 / 12 / 16, rel=5 * math.sqrt(2 / 4096))
+    # One path in each of 16 strata: at most a 256th of the variance of independent paths, 1 / 12 / 16.
+    assert means.var() < 1.1 / 12 / 16**3
 
 
 def test_frames_and_purposes_do_not_run_into_each_other():
@@ -94,22 +94,34 @@ def test_seeds_are_not_compiled_into_the_kernel():
     assert not compiled
 
 
-def squares(pixels, paths):
+def squares(pixels, paths, dimension=0):
     """Points of the paths of some pixels, (2, pixels, paths)."""
     pixel, path = np.indices((pixels, paths), np.uint32).reshape(2, -1)
-    points = np.array(stratified(lanes(pixel), lanes(path), RandomKey(0, 0, 0)))
-    return points.reshape(2, pixels, paths).astype(float)
+    sampler = samplers(lanes(pixel), lanes(path), RandomKey(3, 1, 2))
+    for _ in range(dimension):
+        sampler.next_1d()
+    return np.array(sampler.next_2d()).reshape(2, pixels, paths).astype(float)
 
 
-@pytest.mark.parametrize("paths", [16, 64, 256])
-def test_the_paths_of_a_pixel_are_stratified(paths):
+@pytest.mark.parametrize("dimension", [0, 1, 7])
+@pytest.mark.parametrize("paths", [4, 16, 256])
+def test_every_elementary_interval_has_one_path_of_a_pixel(paths, dimension):
+    x, y = squares(64, paths, dimension)
+    bits = paths.bit_length() - 1
+    for columns in (2**k for k in range(bits + 1)):
+        cell = np.floor(x * columns) * (paths // columns) + np.floor(y * (paths // columns))
+        np.testing.assert_array_equal(np.sort(cell, axis=1), np.tile(np.arange(paths), (64, 1)))
+
+
+@pytest.mark.parametrize("paths", [12, 100])
+def test_any_number_of_paths_is_stratified(paths):
     """Error of the share of a pixel left of a tilted edge: far below that of independent points."""
     x, y = squares(64, paths)
     errors = ((x + 0.37 * y) < 0.6).mean(axis=1) - (0.6 - 0.37 / 2)
     assert np.sqrt(np.mean(np.square(errors))) < 0.6 * math.sqrt(0.24 / paths)
 
 
-def test_each_path_alone_is_uniform_over_the_pixel():
+def test_each_path_alone_is_uniform_over_the_square():
     points = squares(2048, 8)[:, :, 5].T
     assert points.min() >= 0.0
     assert points.max() < 1.0
@@ -118,24 +130,20 @@ def test_each_path_alone_is_uniform_over_the_pixel():
     assert abs(np.corrcoef(points.T)[0, 1]) < limit
 
 
-def test_the_paths_of_a_pixel_are_stratified_in_four_dimensions():
-    use = RandomKey(3, 1, 2)
-    pixel, path = np.repeat(np.arange(64, dtype=np.uint32), 64), np.tile(np.arange(64, dtype=np.uint32), 64)
-    points = np.stack([np.array(x) for x in stratified4(lanes(pixel), lanes(path), use)])
-    assert points.min() >= 0.0
-    assert points.max() < 1.0
-    # Integrals of smooth functions: the mean over a pixel's paths errs far less than that of random points.
-    means = np.cos(2 * np.pi * points).reshape(4, 64, 64).mean(axis=2)
-    assert (means.std(axis=1) < 0.25 * math.sqrt(0.5 / 64)).all()
-    # Each path by itself is uniform.
-    first = points.reshape(4, 64, 64)[:, :, 0]
-    assert (np.abs(first.mean(axis=1) - 0.5) < 5 * math.sqrt(1 / 12 / 64)).all()
+def test_pairs_of_dimensions_are_not_correlated():
+    # Means over the paths of a pixel of the product of two numbers. Successive paths lie in opposite halves
+    # in all dimensions, so that their products are alike: as many as half of the paths are independent.
+    a, b = squares(1024, 16), squares(1024, 16, dimension=1)
+    products = ((a - 0.5) * (b - 0.5)).mean(axis=2)
+    assert abs(products.mean()) < 5 / 12 / math.sqrt(products.size * 16)
+    assert products.std() < 1 / 12 / math.sqrt(8)
 
 
-def test_given_numbers_lead():
-    pixel = lanes(np.arange(8, dtype=np.uint32))
-    rng, alone = (streams(pixel, UInt(0), RandomKey(1, 2, 3)) for _ in "ab")
-    prefixed = PrefixedRng([Float(0.25), Float(0.5)], rng)
-    assert np.array(prefixed.next_float32()).tolist() == [0.25]
-    assert np.array(prefixed.next_float32()).tolist() == [0.5]
-    np.testing.assert_array_equal(np.array(prefixed.next_float32()), np.array(alone.next_float32()))
+def test_a_fork_draws_numbers_of_its_own():
+    sampler = one_sequence(COUNT)
+    same, other = sampler.fork(0), sampler.fork(5)
+    numbers = [np.array(of.next_1d()) for of in (sampler, same, other)]
+    np.testing.assert_array_equal(numbers[0], numbers[1])
+    assert abs(np.corrcoef(numbers[0], numbers[2])[0, 1]) < LIMIT
+    # Drawing from one does not advance the other.
+    np.testing.assert_array_equal(np.array(sampler.next_1d()), np.array(same.next_1d()))

@@ -5,11 +5,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade.arrays import PCG32, Array3f, Float, UInt, rows
+from enfilade.arrays import Array3f, Float, UInt, rows
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.images import write_exr
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.kernels.random import Discrete
+from enfilade.kernels.random import Discrete, one_sequence
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.scene.mitsuba.sun import find_sun
@@ -93,7 +93,7 @@ def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):
         '<rgb name="irradiance" value="2, 1, 1"/></emitter>',
     )
     rays = Rays(Array3f([0.0, 1.0, 1.5], 0.1, 0.0), Array3f(0.0, -1.0, 0.0) + dr.zeros(Array3f, 3))
-    found = rows(renderer.sharp_light(renderer.intersect(rays), PCG32(3)))
+    found = rows(renderer.sharp_light(renderer.intersect(rays), one_sequence(3)))
     assert np.allclose(found[1:], np.array([2.0, 1.0, 1.0]) / np.pi, rtol=1e-5)
     assert not found[0].any()  # inside the cube
 

@@ -13,6 +13,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
+from drjit.auto import PCG32, UInt64
 
 from enfilade.arrays import Array3f, Float, UInt
 from enfilade.camera.pinhole import Camera
@@ -92,8 +93,10 @@ class AnalyticRenderer:
             random=random,
         )
 
-    def _noisy(self, rays: Rays, rng: Any) -> Any:
-        """Radiance along rays, with noise."""
+    def _noisy(self, rays: Rays, sampler: Any) -> Any:
+        """Radiance along rays, with noise that is independent from path to path."""
+        state, sequence = UInt64(sampler.seed), UInt64(sampler.path)
+        rng = PCG32(size=1, initstate=state, initseq=sequence)
         radiance = self._radiance(rays.origin, rays.direction)
         radiance *= 1 + self._scene.noise * (-dr.log(1 - rng.next_float32()) - 1)
         is_lost = rng.next_float32() < self._scene.nan_share

@@ -17,10 +17,10 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
     """Diffuse and specular radiance together."""
     integrator = integrator_of(renderer)
 
-    def radiance(rays, rng, qmc_point):
+    def radiance(rays, sampler):
         at = {"pixel_angle": PIXEL_ANGLE}
-        diffuse = integrator.diffuse_radiance(irradiance, rays, rng, **at).layers[0]
-        specular = integrator.specular_radiance(irradiance, rays, rng, qmc_point, **at)
+        diffuse = integrator.diffuse_radiance(irradiance, rays, sampler, **at).layers[0]
+        specular = integrator.specular_radiance(irradiance, rays, sampler, **at)
         return diffuse + sum(specular.layers)
 
     return estimated(radiance, camera, spp, **more)[0]
@@ -29,8 +29,8 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
 def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **more) -> list[Shading]:
     """Irradiance by final gathering, direct and indirect."""
 
-    def radiance(rays, rng, qmc_point):
-        return integrator_of(renderer).final_gather(irradiance, rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE)
+    def radiance(rays, sampler):
+        return integrator_of(renderer).final_gather(irradiance, rays, sampler, pixel_angle=PIXEL_ANGLE)
 
     return estimated(radiance, camera, spp, layers=2, **more)
 
@@ -46,7 +46,6 @@ def estimated(
         pixel_filter=pixel_filter,
         random=RandomKey(2, 0, Purpose.DIFFUSE),
         layers=layers,
-        is_stratified=True,
     )
     estimate.add(spp)
     return estimate.shadings

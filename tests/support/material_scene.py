@@ -106,14 +106,13 @@ def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> li
     estimate = Estimate(
         camera,
         pixels_of(camera),
-        lambda rays, rng, qmc_point: integrator_of(renderer).specular_radiance(
-            IrradianceCache(), rays, rng, qmc_point, pixel_angle=PIXEL_ANGLE
+        lambda rays, sampler: integrator_of(renderer).specular_radiance(
+            IrradianceCache(), rays, sampler, pixel_angle=PIXEL_ANGLE
         ),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(2, 0, Purpose.SPECULAR),
         layers=2,
-        is_stratified=True,
     )
     estimate.add(spp)
     return estimate.shadings
@@ -126,7 +125,7 @@ def traced_irradiance(
     estimate = Estimate(
         camera,
         pixels_of(camera),
-        lambda rays, rng: Samples(renderer.estimate_diffuse(renderer.intersect(rays), rng)),
+        lambda rays, sampler: Samples(renderer.estimate_diffuse(renderer.intersect(rays), sampler)),
         chunk=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(3, 0, Purpose.IRRADIANCE),

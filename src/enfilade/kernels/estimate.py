@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Float, Float64, UInt, lanes, opaque, rows
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.random import stratified, stratified4, streams
+from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
@@ -49,8 +49,8 @@ class Estimate:
     pixels : (N,) uint32
         Flat indices ``y * width + x``.
     radiance
-        Maps camera rays (:class:`Rays` of any length of direction) and a generator (PCG32) each to the
-        radiance along them, an Array3f or :class:`Samples`. Called once for each chunk.
+        Maps camera rays (:class:`Rays` of any length of direction) and their :class:`PaddedSobolSampler` to
+        the radiance along them, an Array3f or :class:`Samples`. Called once for each chunk.
     chunk
         Paths in flight at once. It changes no random number.
     pixel_filter
@@ -59,9 +59,6 @@ class Estimate:
         Key of the random numbers.
     layers
         Number of layers of the samples.
-    is_stratified
-        Whether ``radiance`` receives an Array4f as a third argument: quasi-Monte Carlo points in [0, 1)^4,
-        a sequence for each pixel.
     """
 
     def __init__(
@@ -74,7 +71,6 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
-        is_stratified: bool = False,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
@@ -82,7 +78,6 @@ class Estimate:
         self._chunk = chunk
         self._filter = pixel_filter
         self._random = random
-        self._is_stratified = is_stratified
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
         size = max(len(pixels), 1)  # Dr.Jit can't compare empty arrays with a number
@@ -107,11 +102,11 @@ class Estimate:
                 # Generate camera rays, `count` neighbouring lanes a pixel.
                 part = chosen[start : start + step]
                 pixel, path = _numbered(self._pixels[part], first, count)
-                rng = streams(pixel, path, self._random)
-                more = (stratified4(pixel, path, self._random),) if self._is_stratified else ()
+                sampler = samplers(pixel, path, self._random)
+                rays = self._rays(pixel, sampler)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
-                found = self._radiance(self._rays(pixel, path), rng, *more)
+                found = self._radiance(rays, sampler)
                 for total, value in zip(self._sums, _summed(found, count), strict=True):
                     dr.scatter_add(total, Float64(value), lanes(part), mode=dr.ReduceMode.NoConflicts)
                 dr.eval(self._sums)
@@ -153,15 +148,17 @@ class Estimate:
         """Pixels that have a marked path, (N,)."""
         return np.array(self._sums[1] > 0.0)[: len(self._pixels)]
 
-    def _rays(self, pixel: Any, path: Any) -> Rays:
+    def _rays(self, pixel: Any, sampler: PaddedSobolSampler) -> Rays:
         """Camera rays of paths, distributed by the pixel filter."""
         at = pixel_centres(self._camera, pixel)
         match self._filter:
             case PixelFilter.BOX:
-                at += box_offsets(stratified(pixel, path, self._random))
+                at += box_offsets(sampler.next_2d())
             case PixelFilter.GAUSSIAN:
-                sample_point = stratified(pixel, path, self._random)
-                at += gaussian_offsets(sample_point, sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
+                offsets = gaussian_offsets(
+                    sampler.next_2d(), sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX
+                )
+                at += offsets
         return camera_rays(self._camera, at)
 
 

@@ -1,13 +1,12 @@
 """Random numbers as a function of seed, frame, purpose, pixel and path: not of order, chunk or worker.
 
-A counter-based generator (Philox, Salmon et al. 2011) turns this key into the initial state of a cheap
-sequential one (PCG32, O'Neill 2014) for each path.
+A counter-based generator (Philox, Salmon et al. 2011) turns this key into the scrambling of a Sobol sequence
+for each pixel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -15,85 +14,112 @@ import numpy as np
 import numpy.typing as npt
 from drjit.auto.ad import Philox4x32
 
-from enfilade.arrays import PCG32, Array2f, Array4f, Float, UInt, UInt64, lanes, opaque
+from enfilade.arrays import Array2f, Float, UInt, UInt64, lanes, opaque
 from enfilade.renderer import RandomKey
 
-WHOLE_PIXEL = 0xFFFFFFFF  # in place of the path: the offset that all paths of a pixel share in two dimensions
-WHOLE_PIXEL_4 = 0xFFFFFFFE  # the same in four dimensions
 BELOW_ONE = 1.0 - 2.0**-24  # the largest float32 below one
-R2 = (3242174889, 2447445414)  # 2**32 over powers of the plastic number, the root of x^3 = x + 1
-R4 = (3679390609, 3152041523, 2700274806, 2313257605)  # 2**32 over powers of the root of x^5 = x + 1
 
 
-def streams(pixel: Any, path: Any, random: RandomKey) -> Any:
-    """Independent random number generators, one a lane; PCG32.
+@dataclass
+class PaddedSobolSampler:
+    """A sequence of points for each pixel, in as many dimensions as its paths need; one point a lane.
+
+    Pairs of dimensions are (0, 2)-sequences: the first two dimensions of Sobol's, nested uniformly scrambled
+    (Owen 1995) by the hash function of Laine and Karras (2011), in an order that is shuffled likewise (Burley
+    2020). Each number is uniform by itself, pairs are independent of each other, and the points of the first
+    paths of a pixel cover the square evenly. As of pbrt-v4's sampler of this name.
+
+    Attributes
+    ----------
+    path : UInt
+        Index of the path in its pixel.
+    seed : UInt
+        Of the pixel, or of the use that is made of its paths.
+    dimension : UInt
+        Next pair of dimensions.
+    """
+
+    path: Any
+    seed: Any
+    dimension: Any
+
+    def next_1d(self) -> Any:
+        """Draw a number in [0, 1); Float."""
+        return self.next_2d()[0]
+
+    def next_2d(self) -> Any:
+        """Draw a point of [0, 1)^2; Array2f."""
+        seed = _hashed(self.seed ^ _hashed(self.dimension))
+        self.dimension = self.dimension + 1  # a copy may share the array
+        index = _scrambled(dr.brev(self.path), seed)
+        # Both dimensions of the sequence reverse the bits of the index; in the second they are mixed before.
+        x = _scrambled(index, _hashed(seed + 1))
+        y = _scrambled(_pascal(index), _hashed(seed + 2))
+        return Array2f(Float(x >> 8), Float(y >> 8)) * 2.0**-24  # a float holds 24 bits
+
+    def fork(self, salt: Any) -> PaddedSobolSampler:
+        """A copy that draws numbers of its own.
+
+        Parameters
+        ----------
+        salt : UInt or int
+            Tells copies apart; 0 has the numbers of the original.
+        """
+        return replace(self, seed=self.seed ^ UInt(salt))
+
+
+def one_sequence(count: int, seed: int = 0) -> PaddedSobolSampler:
+    """Points of a single sequence, one a lane."""
+    return PaddedSobolSampler(
+        path=dr.arange(UInt, count),
+        seed=dr.opaque(UInt, seed, count),
+        dimension=dr.opaque(UInt, 0, count),
+    )
+
+
+def samplers(pixel: Any, path: Any, random: RandomKey) -> PaddedSobolSampler:
+    """A sampler for each path.
 
     Parameters
     ----------
     pixel, path : UInt
         Flat index of the pixel, and index of the path in that pixel.
     random
+        Key of the random numbers.
     """
-    a, b, c, d = _philox(pixel, path, random)
-    high = UInt64(1 << 32)
-    return PCG32(size=1, initstate=UInt64(a) * high + UInt64(b), initseq=UInt64(c) * high + UInt64(d))
-
-
-def stratified(pixel: Any, path: Any, random: RandomKey) -> Any:
-    """A Cranley-Patterson rotated R2 sequence for each pixel: points of the unit square, Array2f in [0, 1).
-
-    Each point is uniform by itself, and the points of any run of paths cover the square evenly
-    (Roberts 2018; Cranley and Patterson 1976).
-
-    Parameters
-    ----------
-    pixel, path, random
-        As of :func:`streams`.
-    """
-    a, b, _, _ = _philox(pixel, UInt(WHOLE_PIXEL), random)
-    return Array2f(_unit(a + path * UInt(R2[0])), _unit(b + path * UInt(R2[1])))
-
-
-def stratified4(pixel: Any, path: Any, random: RandomKey) -> Any:
-    """A Cranley-Patterson rotated R4 sequence for each pixel: Array4f in [0, 1); see :func:`stratified`."""
-    starts = _philox(pixel, UInt(WHOLE_PIXEL_4), random)
-    return Array4f(*(_unit(start + path * UInt(step)) for start, step in zip(starts, R4, strict=True)))
-
-
-class PrefixedRng:
-    """A random number generator whose first numbers are given.
-
-    Parameters
-    ----------
-    numbers : sequence of Float
-        In [0, 1).
-    rng : PCG32
-        Draws the numbers after them.
-    """
-
-    def __init__(self, numbers: Iterable[Any], rng: Any) -> None:
-        self._numbers = iter(numbers)
-        self._rng = rng
-
-    def next_float32(self, active: Any = True) -> Any:
-        """Draw a number in [0, 1); Float."""
-        number = next(self._numbers, None)
-        return self._rng.next_float32(active) if number is None else number
-
-
-def _unit(bits: Any) -> Any:
-    """32 random bits as a number in [0, 1), of which a float holds 24; Float."""
-    return Float(bits >> 8) * 2.0**-24
-
-
-def _philox(pixel: Any, path: Any, random: RandomKey) -> Any:
-    """Four times 32 random bits a lane."""
-    return Philox4x32(
+    seed = Philox4x32(
         seed=UInt64(opaque(random.seed)),
         counter_0=pixel,
-        counter_1=path,
+        counter_1=UInt(0),
         counter_2=opaque(((random.frame & 0xFFFFFF) << 8) | int(random.purpose)),
-    ).next_uint32x4()
+    ).next_uint32x4()[0]
+    return PaddedSobolSampler(path, seed, dr.opaque(UInt, 0, dr.width(path)))
+
+
+def _scrambled(reversed_bits: Any, seed: Any) -> Any:
+    """Nested uniform scrambling of numbers that are given with their bits in reverse; UInt.
+
+    Each bit is flipped by a hash of those above it. The constants are those of pbrt-v4, by Vegdahl.
+    """
+    bits = reversed_bits ^ (reversed_bits * UInt(0x3D20ADEA))
+    bits = (bits + seed) * ((seed >> 16) | 1)
+    bits = bits ^ (bits * UInt(0x05526C56))
+    bits = bits ^ (bits * UInt(0x53A22864))
+    return dr.brev(bits)
+
+
+def _pascal(index: Any) -> Any:
+    """Product of Pascal's matrix modulo 2 and the bits of an index (Ahmed 2024); UInt."""
+    for shift, mask in ((16, 0xFFFF0000), (8, 0xFF00FF00), (4, 0xF0F0F0F0), (2, 0xCCCCCCCC), (1, 0xAAAAAAAA)):
+        index = index ^ ((index & UInt(mask)) >> shift)
+    return index
+
+
+def _hashed(bits: Any) -> Any:
+    """An integer hash (Wellons 2018); UInt."""
+    bits = (bits ^ (bits >> 16)) * UInt(0x21F0AAAD)
+    bits = (bits ^ (bits >> 15)) * UInt(0xD35A2D97)
+    return bits ^ (bits >> 15)
 
 
 @dataclass(frozen=True)

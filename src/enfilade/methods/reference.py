@@ -18,7 +18,7 @@ class Reference(Method):
     """Path tracing."""
 
     name = "reference"
-    revision = 2
+    revision = 3
     settings = (TraceSettings, SamplingSettings, ReferenceSettings)
     passes = (Pass(FRAMES, Frame),)
 

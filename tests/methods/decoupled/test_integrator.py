@@ -187,10 +187,10 @@ def test_other_scenes_may_be_open(tmp_path):
     camera = front_camera(24, 18)
 
     def lobes(renderer):
-        def radiance(rays, rng, _):
+        def radiance(rays, sampler):
             point = renderer.intersect(rays)
-            diffuse = point.surfaces.albedo * sum(renderer.estimate_diffuse(point, rng))
-            return diffuse + sum(renderer.estimate_specular(point, rng))
+            diffuse = point.surfaces.albedo * sum(renderer.estimate_diffuse(point, sampler))
+            return diffuse + sum(renderer.estimate_specular(point, sampler))
 
         return estimated(radiance, camera, spp=4)[0].color
 

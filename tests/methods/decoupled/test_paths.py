@@ -3,14 +3,15 @@
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, UInt, rows
+from enfilade.arrays import Array3f, UInt, rows
+from enfilade.kernels.random import one_sequence
 from enfilade.methods.decoupled.paths import Contributions, compact, joined, merged, spawn
 from enfilade.renderer import Bounce, Branch, Rays
 
 
 def made(count, first):
     origin = Array3f(np.arange(3 * count, dtype=np.float32).reshape(count, 3).T + first)
-    path = spawn(Rays(origin, Array3f(0, 0, 1) + dr.zeros(Array3f, count)), PCG32(count), spread=first)
+    path = spawn(Rays(origin, Array3f(0, 0, 1) + dr.zeros(Array3f, count)), one_sequence(count), spread=first)
     return path, (UInt(np.arange(count) + first), Bounce(origin, origin.x, origin.x > 5.0))
 
 
@@ -21,8 +22,8 @@ def test_trees_are_joined_lane_by_lane():
     assert np.array(path.rays.origin.x).tolist() == [1, 4, 7, 10, 13, 20]
     assert np.array(path.spread).tolist() == [1, 1, 1, 10, 10, 20]
     assert np.array(bounce.is_delta).tolist() == [False, False, True, True, True, True]
-    states = np.concatenate([np.array(p.rng.state) for p, _ in parts])
-    assert np.array(path.rng.state).tolist() == states.tolist()
+    states = np.concatenate([np.array(p.sampler.path) for p, _ in parts])
+    assert np.array(path.sampler.path).tolist() == states.tolist()
     assert path.bounce is None
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from enfilade.arrays import PCG32
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled import Decoupled
 from enfilade.methods.decoupled.paths import spawn
@@ -82,7 +82,7 @@ def test_paths_along_virtual_images_end_at_the_surfaces_that_they_show(tmp_path,
     shown = np.flatnonzero(geometry.shape_index > IN_VIRTUAL_IMAGE)
     assert len(shown) > 50
     rays = camera_rays(camera, pixel_centres(camera))
-    path = images.seen_along(spawn(rays, PCG32(geometry.shape_index.size), 0.0), CHOICES[image])
+    path = images.seen_along(spawn(rays, one_sequence(geometry.shape_index.size), 0.0), CHOICES[image])
     is_active = np.array(path.is_active)
     lane = np.array(path.lane)[is_active]
     assert set(shown) <= set(lane)

@@ -7,12 +7,12 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import PCG32, Array3f, Bool
+from enfilade.arrays import Array3f, Bool
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 
 __all__ = ["CacheQuery", "query_further", "query_view"]
 
-STREAM_SALT = 0x9E3779B97F4A7C15  # makes the jitter of lookups independent of the path's random numbers
+STREAM_SALT = 0x9E3779B9  # makes the jitter of lookups independent of the path's random numbers
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,13 @@ def query_view(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
     return _reflected(query, *cache.lookup_in_view(query.position, query.normal, query.shape_index))
 
 
-def query_further(cache: IrradianceCache, query: CacheQuery, rng: Any, jitter: Any) -> tuple[Any, Any]:
+def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitter: Any) -> tuple[Any, Any]:
     """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
     reflected, is_miss = _reflected(query, *cache.lookup(query.position, query.normal, query.shape_index))
     if cache.hash_grid:
         # Jitter the position, so that many lookups interpolate.
-        rng = PCG32(rng)
-        rng.state ^= STREAM_SALT
-        offset = Array3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+        sampler = sampler.fork(STREAM_SALT)
+        offset = Array3f(*sampler.next_2d(), sampler.next_1d())
         offset = 0.5 + jitter * (offset - 0.5)
 
         # Look up where the images miss.

@@ -155,8 +155,8 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
     estimate = Estimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, rng: shot.integrator.diffuse_radiance(
-            cache, rays, rng, pixel_angle=light_camera(camera).pixel_angle
+        lambda rays, sampler: shot.integrator.diffuse_radiance(
+            cache, rays, sampler, pixel_angle=light_camera(camera).pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.GAUSSIAN,

@@ -39,14 +39,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         specular = Estimate(
             camera,
             np.flatnonzero(pixels).astype(np.uint32),
-            lambda rays, rng, qmc_point, known=known: shot.integrator.specular_radiance(
-                known, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
+            lambda rays, sampler, known=known: shot.integrator.specular_radiance(
+                known, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
             ),
             chunk=chunk,
             pixel_filter=PixelFilter.BOX,
             random=random,
             layers=SPECULAR_AOVS,
-            is_stratified=True,
         )
         specular.add(SPECULAR_SPP)
         paths, dropped = paths + specular.paths, dropped + specular.dropped
@@ -55,14 +54,13 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     gathered = Estimate(
         geometry.camera,
         np.flatnonzero(geometry.has_diffuse).astype(np.uint32),
-        lambda rays, rng, qmc_point: shot.integrator.final_gather(
-            cache, rays, rng, qmc_point, parts.append, pixel_angle=camera.pixel_angle
+        lambda rays, sampler: shot.integrator.final_gather(
+            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
         ),
         chunk=chunk,
         pixel_filter=PixelFilter.CENTRE,
         random=walk.random(frame, Purpose.PREPASS_HASH_GRID),
         layers=2,
-        is_stratified=True,
     )
     gathered.add(GATHER_SPP)
 

@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Array3f, Array4f, Float, UInt, opaque, rows
+from enfilade.arrays import Array3f, Float, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
 from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
@@ -91,7 +91,7 @@ class Integrator:
         self,
         cache: IrradianceCache,
         rays: Rays,
-        rng: Any,
+        sampler: Any,
         *,
         pixel_angle: float,
     ) -> Samples:
@@ -102,8 +102,7 @@ class Integrator:
         cache
         rays
             From the camera, one a lane.
-        rng : PCG32
-            One generator a lane.
+        sampler : PaddedSobolSampler
         pixel_angle
             Of the camera, radians.
 
@@ -112,7 +111,7 @@ class Integrator:
         Samples
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
-        vertex = self._kernels.see(cache, spawn(rays, rng, ENTRY_PX * pixel_angle))
+        vertex = self._kernels.see(cache, spawn(rays, sampler, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
         for found, lane in self._missed_light(cache, deferred):
@@ -123,8 +122,7 @@ class Integrator:
         self,
         cache: IrradianceCache,
         rays: Rays,
-        rng: Any,
-        qmc_point: Any,
+        sampler: Any,
         on_miss: OnMiss | None = None,
         *,
         pixel_angle: float,
@@ -136,10 +134,7 @@ class Integrator:
         cache
         rays
             From the camera, one a lane.
-        rng : PCG32
-            One generator a lane.
-        qmc_point : Array4f
-            Quasi-Monte Carlo point in [0, 1)^4: chooses the first lobe and its direction.
+        sampler : PaddedSobolSampler
         on_miss
             Receives the irradiance that was not cached and had to be estimated.
         pixel_angle
@@ -151,16 +146,15 @@ class Integrator:
             Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
             surfaces), and transmission straight through clear surfaces.
         """
-        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
-        return Samples(self._reflected(cache, path, qmc_point, on_miss))
+        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
+        return Samples(self._reflected(cache, path, on_miss))
 
     def specular_radiance_at_edges(
         self,
         aovs: UploadedImage,
         cache: IrradianceCache,
         rays: Rays,
-        rng: Any,
-        qmc_point: Any,
+        sampler: Any,
         *,
         pixel_angle: float,
     ) -> Samples:
@@ -170,26 +164,25 @@ class Integrator:
         ----------
         aovs
             Both AOVs of the surfaces at pixel centres, without the pixels whose values are to be traced.
-        cache, rays, rng, qmc_point, pixel_angle
+        cache, rays, sampler, pixel_angle
             As of :meth:`specular_radiance`.
 
         Returns
         -------
         Samples
         """
-        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
+        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         *found, is_missing = self._kernels.see_aovs(aovs, path)
         missing = compact(path, dr.compress(is_missing))
         if not dr.width(missing.lane):
             return Samples(tuple(found))
-        traced = self._reflected(cache, missing, qmc_point, count=dr.width(path.lane))
+        traced = self._reflected(cache, missing, count=dr.width(path.lane))
         return Samples(tuple(have + more for have, more in zip(found, traced, strict=True)))
 
     def _reflected(
         self,
         cache: IrradianceCache,
         path: Path,
-        qmc_point: Any,
         on_miss: OnMiss | None = None,
         count: int | None = None,
     ) -> tuple[Any, ...]:
@@ -200,9 +193,7 @@ class Integrator:
         # Bounce off the visible surface: all paths, then the other branch at clear interfaces.
         onward = []
         while dr.width(path.lane):
-            ahead, path = self._bounce(
-                light, cache, path, deferred, dr.gather(Array4f, qmc_point, path.lane), transmitted_at=count
-            )
+            ahead, path = self._bounce(light, cache, path, deferred, transmitted_at=count)
             onward.append(ahead)
 
         # Follow the paths that meet another specular lobe.
@@ -216,8 +207,7 @@ class Integrator:
         self,
         cache: IrradianceCache,
         rays: Rays,
-        rng: Any,
-        qmc_point: Any,
+        sampler: Any,
         on_miss: OnMiss | None = None,
         *,
         pixel_angle: float,
@@ -226,10 +216,8 @@ class Integrator:
 
         Parameters
         ----------
-        cache, rays, rng, on_miss, pixel_angle
+        cache, rays, sampler, on_miss, pixel_angle
             As of :meth:`specular_radiance`.
-        qmc_point : Array4f
-            Quasi-Monte Carlo point in [0, 1)^4: chooses a point on an emitter, and a direction.
 
         Returns
         -------
@@ -237,14 +225,11 @@ class Integrator:
             Two layers: by light straight from emitters, without those that cast sharp shadows; and by all
             other.
         """
-        dr.eval(qmc_point)  # see `spawn`
-        path = spawn(rays, rng, ENTRY_PX * pixel_angle)
-        direct, vertex = self._kernels.gather(cache, path, qmc_point, True)
+        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
+        direct, vertex = self._kernels.gather(cache, path, True)
         return self._gathered(cache, path, direct, vertex, on_miss)
 
-    def final_gather_of(
-        self, cache: IrradianceCache, path: Path, qmc_point: Any, on_miss: OnMiss, count: int
-    ) -> Samples:
+    def final_gather_of(self, cache: IrradianceCache, path: Path, on_miss: OnMiss, count: int) -> Samples:
         """The same at the next surfaces of paths, with all emitters.
 
         Parameters
@@ -253,15 +238,12 @@ class Integrator:
             As of :meth:`specular_radiance`.
         path
             On their way to the surfaces; at most one a lane.
-        qmc_point : Array4f
-            As of :meth:`final_gather`, by lane.
         count
             Number of lanes.
         """
-        qmc_point = dr.gather(Array4f, qmc_point, path.lane)
         lane, path = path.lane, replace(path, lane=dr.arange(UInt, dr.width(path.lane)))
-        dr.eval(qmc_point, path)
-        direct, vertex = self._kernels.gather(cache, path, qmc_point, False)
+        dr.eval(path)
+        direct, vertex = self._kernels.gather(cache, path, False)
         found = self._gathered(cache, path, direct, vertex, on_miss)
         layers = tuple(dr.zeros(Array3f, count) for _ in found.layers)
         for target, layer in zip(layers, found.layers, strict=True):
@@ -318,7 +300,7 @@ class Integrator:
             Offset of the lanes that receive transmission through clear surfaces.
         """
         while dr.width(path.lane):
-            path = merged(self._bounce(light, cache, path, deferred, None, transmitted_at))
+            path = merged(self._bounce(light, cache, path, deferred, transmitted_at))
 
     def _bounce(
         self,
@@ -326,7 +308,6 @@ class Integrator:
         cache: IrradianceCache,
         path: Path,
         deferred: _Deferred,
-        qmc_point: Any,
         transmitted_at: int,
     ) -> tuple[Path, Path]:
         """Extend all paths by one bounce off a specular lobe.
@@ -335,8 +316,6 @@ class Integrator:
         ----------
         light, cache, path, deferred, transmitted_at
             As of :meth:`_trace_specular`.
-        qmc_point : Array4f or None
-            Of the first bounce, by path: chooses the lobe and its direction. None: pseudorandom.
 
         Returns
         -------
@@ -346,14 +325,11 @@ class Integrator:
             Paths at clear interfaces, whose other branch is left to follow.
         """
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
-        jitter = 0.0 if qmc_point is None else JITTER
-        dr.eval(qmc_point)
+        jitter = 0.0 if path.bounce else JITTER
 
         # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-        direct, is_split, is_end, vertex = self._kernels.extend(
-            cache, path, qmc_point, opaque(transmitted_at)
-        )
-        add = light.add if qmc_point is None else light.add_once
+        direct, is_split, is_end, vertex = self._kernels.extend(cache, path, opaque(transmitted_at))
+        add = light.add if path.bounce else light.add_once
         add(direct, path.lane)
         add(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex, jitter)
@@ -402,7 +378,9 @@ class Integrator:
 
         # Query the cache.
         if cache.images or cache.hash_grid:
-            found, is_miss = self._kernels.query_further(cache, missed.query, missed.path.rng, missed.jitter)
+            found, is_miss = self._kernels.query_further(
+                cache, missed.query, missed.path.sampler, missed.jitter
+            )
             contributions.append((found, missed.path.lane))
 
         # Path trace what is still missing.

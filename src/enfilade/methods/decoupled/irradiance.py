@@ -46,14 +46,11 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     estimate = Estimate(
         camera,
         np.flatnonzero(where).astype(np.uint32),
-        lambda rays, rng, qmc_point: shot.integrator.final_gather(
-            cache, rays, rng, qmc_point, pixel_angle=pixel_angle
-        ),
+        lambda rays, sampler: shot.integrator.final_gather(cache, rays, sampler, pixel_angle=pixel_angle),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
         random=walk.random(frame, Purpose.IRRADIANCE),
         layers=2,
-        is_stratified=True,
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     layers = [shading.to_image(where) for shading in estimate.shadings]

@@ -7,8 +7,7 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import PCG32, Array3f, Bool, UInt64
-from enfilade.kernels.random import PrefixedRng
+from enfilade.arrays import Array3f, Bool
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_view
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
@@ -31,10 +30,10 @@ ENTRY_LOBE_WIDTH = 0.25
 ENTRY_GATHER_WIDTH = 0.2
 BELOW_TOTAL = 1.0 - 2.0**-16  # probability below which a reflection is not total; GPUs round one to less
 AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
-BRANCH_SALT = 0x2545F4914F6CDD1D  # gives the branches of a path random numbers of their own
-SHARP_SALT = 0xD1342543DE82EF95  # makes shadow rays independent of the path's random numbers
-ROULETTE_SALT = 0x9FB21C651E98DF25  # likewise Russian roulette
-ESTIMATE_SALT = 0xAF251AF3B0F025B5  # likewise the paths that estimate irradiance
+BRANCH_SALT = 0x2545F491  # gives the branches of a path random numbers of their own
+SHARP_SALT = 0xD1342543  # makes shadow rays independent of the path's random numbers
+ROULETTE_SALT = 0x9FB21C65  # likewise Russian roulette
+ESTIMATE_SALT = 0xAF251AF3  # likewise the paths that estimate irradiance
 
 
 @dataclass(frozen=True)
@@ -129,9 +128,7 @@ class PathKernels:
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         sharp: tuple[Any, ...] = ()
         if cache.is_soft:
-            rng = PCG32(path.rng)
-            rng.state ^= SHARP_SALT
-            sharp = (self._renderer.sharp_light(point, rng),)
+            sharp = (self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT)),)
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
@@ -150,7 +147,6 @@ class PathKernels:
         self,
         cache: IrradianceCache,
         path: Path,
-        qmc_point: Any,
         transmitted_at: Any,
     ) -> tuple[Any, Any, Any, Vertex]:
         """Scatter off a specular lobe at the next surface, and intersect the one after.
@@ -158,14 +154,11 @@ class PathKernels:
         Returns the radiance of next-event estimates, whether the path has another branch, whether it has as
         many bounces as are followed, and the vertex.
         """
-        rng = PCG32(path.rng)
-        rng.state ^= BRANCH_SALT * UInt64(path.branch)
+        sampler = path.sampler.fork(BRANCH_SALT * path.branch)
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        sample = self._renderer.sample_specular(
-            point, rng if qmc_point is None else PrefixedRng(qmc_point, rng), branch=path.branch
-        )
+        sample = self._renderer.sample_specular(point, sampler, branch=path.branch)
 
         # Extend the path; a broad lobe widens it.
         lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
@@ -176,7 +169,7 @@ class PathKernels:
             throughput=Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
-            rng=rng,
+            sampler=sampler,
             bounces=path.bounces + 1,
             branch=path.branch,
         )
@@ -189,18 +182,16 @@ class PathKernels:
         direct = Array3f(path.throughput * sample.direct)
         return direct, Bool(is_split), Bool(is_end), vertex
 
-    def _gather(
-        self, cache: IrradianceCache, path: Path, qmc_point: Any, is_visible: bool
-    ) -> tuple[Any, Vertex]:
+    def _gather(self, cache: IrradianceCache, path: Path, is_visible: bool) -> tuple[Any, Vertex]:
         """Scatter off the diffuse lobe of the next surface, and intersect the one after.
 
         A visible surface is that of the G-buffer, and emitters with sharp shadows are left out.
         """
-        rng = PCG32(path.rng)
+        sampler = path.sampler.fork(0)
 
         # Intersect, and sample the diffuse lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=is_visible)
-        sample = self._renderer.sample_diffuse(point, PrefixedRng(qmc_point, rng), soft_only=is_visible)
+        sample = self._renderer.sample_diffuse(point, sampler, soft_only=is_visible)
 
         # Extend the path.
         extended = Path(
@@ -210,7 +201,7 @@ class PathKernels:
             throughput=Array3f(dr.select(sample.is_alive, sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, ENTRY_GATHER_WIDTH),
-            rng=rng,
+            sampler=sampler,
             bounces=path.bounces + 1,
             branch=path.branch,
         )
@@ -233,28 +224,26 @@ class PathKernels:
         Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
         a finite ``--max-depth`` does not cut it shorter behind several mirrors.
         """
-        rng = PCG32(path.rng)
-        rng.state ^= ESTIMATE_SALT
+        sampler = path.sampler.fork(ESTIMATE_SALT)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        direct, indirect = self._renderer.estimate_diffuse(point, rng, path_depth=2 if path.bounce else 1)
+        direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth=2 if path.bounce else 1)
         irradiance = Array3f(direct + indirect)
         return Array3f(path.throughput * point.surfaces.albedo), irradiance, _keys(point, path)
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
-        rng = PCG32(path.rng)
+        sampler = path.sampler.fork(0)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        direct, indirect = self._renderer.estimate_specular(point, rng, path_depth=MAX_PATH_DEPTH)
+        direct, indirect = self._renderer.estimate_specular(point, sampler, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))
 
 
 def _surviving(path: Path, point: ShadingPoint) -> Any:
     """Throughput of the paths that go on from specular lobes at their next surface; Array3f."""
-    rng = PCG32(path.rng)
-    rng.state ^= ROULETTE_SALT
+    sampler = path.sampler.fork(ROULETTE_SALT)
     after = dr.max(dr.abs(path.throughput)) * point.specular_albedo
     survival = dr.clip(ROULETTE_GAIN * after, MIN_SURVIVAL, 1.0)
-    is_onward = point.has_specular & (rng.next_float32() < survival)
+    is_onward = point.has_specular & (sampler.next_1d() < survival)
     return Array3f(dr.select(is_onward, path.throughput / survival, 0.0))
 
 

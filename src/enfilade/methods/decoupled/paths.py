@@ -9,7 +9,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, Array3f, Float, UInt, lanes, opaque
+from enfilade.arrays import Array3f, Float, UInt, lanes, opaque
+from enfilade.kernels.random import PaddedSobolSampler
 from enfilade.kernels.replay import padded
 from enfilade.renderer import Bounce, Branch, Rays, ShadingPoint
 
@@ -30,7 +31,7 @@ class Path:
     throughput : Array3f
     width, spread : Float
         Width of the path at the ray's origin, scene units, and its growth by unit of length.
-    rng : PCG32
+    sampler : PaddedSobolSampler
     bounces : UInt
         Made so far.
     branch : UInt
@@ -43,7 +44,7 @@ class Path:
     throughput: Any
     width: Any
     spread: Any
-    rng: Any
+    sampler: Any
     bounces: Any
     branch: Any
 
@@ -62,9 +63,9 @@ class Path:
         return replace(self, branch=dr.opaque(UInt, int(branch), count)) if count else self
 
 
-def spawn(rays: Rays, rng: Any, spread: float) -> Path:
+def spawn(rays: Rays, sampler: Any, spread: float) -> Path:
     """Camera paths, one a ray."""
-    count = dr.width(rng.state)
+    count = dr.width(sampler.seed)
     path = Path(
         lane=dr.arange(UInt, count),
         rays=Rays(rays.origin + dr.zeros(Array3f, count), rays.direction),
@@ -72,7 +73,7 @@ def spawn(rays: Rays, rng: Any, spread: float) -> Path:
         throughput=dr.opaque(Array3f, 1.0, count),
         width=dr.opaque(Float, 0.0, count),
         spread=dr.opaque(Float, spread, count),
-        rng=rng,
+        sampler=sampler,
         bounces=dr.opaque(UInt, 0, count),
         branch=dr.opaque(UInt, int(Branch.REFLECTED), count),
     )
@@ -93,7 +94,7 @@ def compact(path: Path, chosen: Any) -> Path:
         throughput=dr.select(is_real, dr.gather(Array3f, path.throughput, index), 0.0),
         width=dr.gather(Float, path.width, index),
         spread=dr.gather(Float, path.spread, index),
-        rng=dr.gather(PCG32, path.rng, index),
+        sampler=dr.gather(PaddedSobolSampler, path.sampler, index),
         bounces=dr.gather(UInt, path.bounces, index),
         branch=dr.gather(UInt, path.branch, index),
     )
@@ -127,11 +128,6 @@ def _joined(parts: Sequence[Any], targets: Sequence[Any], count: int) -> Any:
         return None
     if isinstance(first, tuple):
         return tuple(_joined(of, targets, count) for of in zip(*parts, strict=True))
-    if isinstance(first, PCG32):
-        found = PCG32(first)
-        found.state = _joined([p.state for p in parts], targets, count)
-        found.inc = _joined([p.inc for p in parts], targets, count)
-        return found
     if is_dataclass(first):
         kind: Any = type(first)
         return kind(*(_joined([getattr(p, f.name) for p in parts], targets, count) for f in fields(first)))

@@ -34,8 +34,8 @@ def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Outp
     estimate = Estimate(
         geometry.camera,
         np.flatnonzero(where).astype(np.uint32),
-        lambda rays, rng: Samples(
-            renderer.estimate_diffuse(renderer.intersect(rays, opaque_only=True), rng, path_depth=2)
+        lambda rays, sampler: Samples(
+            renderer.estimate_diffuse(renderer.intersect(rays, opaque_only=True), sampler, path_depth=2)
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,

@@ -148,9 +148,9 @@ class _FrameRays:
         Returns images of both AOVs, and the numbers of rays and of those that were not finite.
         """
 
-        def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
+        def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance(
-                self.cache, rays, rng, qmc_point, pixel_angle=self._pixel_angle
+                self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
         found = self._estimate(pixels, pixel_filter, purpose, radiance)
@@ -160,9 +160,9 @@ class _FrameRays:
     def looked_up(self, pixels: Mask, aovs: Any) -> Estimate:
         """An estimate of pixels, (H, W), by lookups of uploaded AOVs, without rays yet."""
 
-        def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
+        def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance_at_edges(
-                aovs, self.cache, rays, rng, qmc_point, pixel_angle=self._pixel_angle
+                aovs, self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
         return self._estimate(pixels, PixelFilter.GAUSSIAN, Purpose.SPECULAR_EDGES, radiance)
@@ -180,5 +180,4 @@ class _FrameRays:
             pixel_filter=pixel_filter,
             random=self.shot.walk.random(self.frame, purpose),
             layers=SPECULAR_AOVS,
-            is_stratified=True,
         )

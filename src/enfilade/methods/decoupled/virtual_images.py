@@ -13,8 +13,9 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import PCG32, Array3f, Bool, Float, UInt, lanes, rows
+from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, rows
 from enfilade.camera.pinhole import Camera
+from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.paths import Path, compact, merged, spawn
@@ -60,7 +61,7 @@ class VirtualImages:
         shape_index = np.tile(geometry.shape_index.ravel(), 2)
         normal = np.tile(geometry.normal.reshape(-1, 3), (2, 1))
         rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(lane % count)))
-        path = spawn(rays, PCG32(len(lane)), spread=0.0)
+        path = spawn(rays, one_sequence(len(lane)), spread=0.0)
         path = compact(path, path.lane)
         choice = Float(dr.select(dr.gather(UInt, lanes(lane), path.lane) < count, REFLECT, TRANSMIT))
         length = np.ones(2 * count, np.float32)  # of the path, in distances of the first surface
@@ -138,10 +139,12 @@ class VirtualImages:
             Whether the following surface may form another one.
         """
         # Scatter.
-        rng = PCG32(path.rng)
+        sampler = path.sampler.fork(0)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
-        sample = self._renderer.sample_specular(point, rng, choice)
-        ahead = replace(path, rays=sample.rays, bounce=sample.bounce, width=path.width_at(point), rng=rng)
+        sample = self._renderer.sample_specular(point, sampler, choice)
+        ahead = replace(
+            path, rays=sample.rays, bounce=sample.bounce, width=path.width_at(point), sampler=sampler
+        )
 
         # Intersect.
         surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces

@@ -12,8 +12,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import PCG32, lanes
+from enfilade.arrays import lanes
 from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import denoise_light
 from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
@@ -58,14 +59,14 @@ def _gather(
     """Entries of a virtual image, one list a level, the number of paths, and of those not finite."""
     cache, camera, walk = shot.prepass_cache(frame), virtual.camera, shot.walk
 
-    def seen_along(rays: Rays, rng: Any) -> Path:
-        return shot.virtual_images.seen_along(spawn(rays, rng, ENTRY_PX * camera.pixel_angle), choice)
+    def seen_along(rays: Rays, sampler: Any) -> Path:
+        return shot.virtual_images.seen_along(spawn(rays, sampler, ENTRY_PX * camera.pixel_angle), choice)
 
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
     if not len(pixels):
         return [], 0, 0
-    path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), PCG32(len(pixels)))
+    path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return [], 0, 0
     keys, is_missing = shot.integrator.entries_of(cache, path)
@@ -76,9 +77,9 @@ def _gather(
     pixels = pixels[lane[chosen]]
 
     # Gather their irradiance.
-    def radiance(rays: Rays, rng: Any, qmc_point: Any) -> Samples:
-        path = seen_along(rays, rng)
-        return shot.integrator.final_gather_of(cache, path, qmc_point, on_miss, dr.width(rng.state))
+    def radiance(rays: Rays, sampler: Any) -> Samples:
+        path = seen_along(rays, sampler)
+        return shot.integrator.final_gather_of(cache, path, on_miss, dr.width(sampler.seed))
 
     estimate = Estimate(
         camera,
@@ -88,7 +89,6 @@ def _gather(
         pixel_filter=PixelFilter.CENTRE,
         random=walk.random(frame, Purpose.VIRTUAL_IMAGES),
         layers=2,
-        is_stratified=True,
     )
     estimate.add(SPP)
 

@@ -6,7 +6,7 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import Array3f, UInt, image, opaque
-from enfilade.kernels.random import stratified
+from enfilade.kernels.random import samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, pixel_centres
 from enfilade.methods.denoise import denoise
 from enfilade.methods.walkthrough import Walkthrough
@@ -71,7 +71,7 @@ def find_guides(walk: Walkthrough, frame: int, purpose: Purpose, *, spp: int) ->
     albedo, normal = dr.zeros(Array3f, dr.width(pixel)), dr.zeros(Array3f, dr.width(pixel))
     count = max(spp, MIN_GUIDE_RAYS)
     for ray in range(count):
-        offset = box_offsets(stratified(pixel, opaque(ray), random))
+        offset = box_offsets(samplers(pixel, opaque(ray), random).next_2d())
         hit = walk.renderer.surfaces(camera_rays(camera, at + offset))
         albedo += dr.select(hit.is_hit, hit.albedo, 0)
         normal += dr.select(hit.is_hit, hit.normal, 0)

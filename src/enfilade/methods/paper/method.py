@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 4
+    revision = 5
     settings = (
         TraceSettings,
         SamplingSettings,

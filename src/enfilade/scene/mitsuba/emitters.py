@@ -5,8 +5,8 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Array3f, lanes, rows
-from enfilade.kernels.random import R2
+from enfilade.arrays import Array3f, rows
+from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Emitters
 from enfilade.scene.mitsuba.merge import MergedScene
 
@@ -19,9 +19,7 @@ def find_emitters(merged: MergedScene) -> Emitters:
     numbered = zip(merged.sources, merged.scene.shapes(), strict=True)
     shapes = [(int(source[0]), shape) for source, shape in numbered if shape.is_emitter()]
     count = int(np.clip(MAX_POINTS // max(len(shapes), 1), *POINTS))
-    sample_points = mi.Point2f(
-        *(lanes(np.mod(step / 2**32 * np.arange(count), 1.0).astype(np.float32)) for step in R2)
-    )
+    sample_points = mi.Point2f(one_sequence(count).next_2d())
     points = [rows(Array3f(shape.sample_position(0.0, sample_points).p)) for _, shape in shapes]
     return Emitters(
         np.concatenate([np.zeros((0, 3), np.float32), *points]),

@@ -18,7 +18,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import PCG32, Bool, Float, UInt, UInt64
+from enfilade.arrays import Bool, Float, UInt
+from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
@@ -115,10 +116,10 @@ class Lobes:
         lambert, lambert_pdf = _lambert(si, wo, self.albedo(si, bsdf, active & is_whole))
         return dr.select(is_whole, lambert, value), dr.select(is_whole, lambert_pdf, pdf)
 
-    def sample_diffuse(self, si: Any, bsdf: Any, rng: Any, active: Any) -> tuple[Any, Any, Any]:
+    def sample_diffuse(self, si: Any, bsdf: Any, sampler: Any, active: Any) -> tuple[Any, Any, Any]:
         """Direction, density and weight of a sample of the diffuse lobe."""
         is_whole = _of(self._whole, si, bsdf)
-        second, first = mi.Point2f(rng.next_float32(), rng.next_float32()), rng.next_float32()
+        second, first = mi.Point2f(sampler.next_2d()), sampler.next_1d()
         sample, weight = bsdf.sample(self._diffuse, si, first, second, active & ~is_whole)
         up = _cosine_direction(si, second)
         albedo = self.albedo(si, bsdf, active & is_whole)
@@ -139,7 +140,7 @@ class Lobes:
         return _of(self._clear, si, bsdf)
 
     def sample_specular(
-        self, si: Any, bsdf: Any, rng: Any, choice: Any = None, branch: Any = None
+        self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, Any, Any, Any]:
         """Direction, density, weight of a sample, and whether it is of a delta lobe.
 
@@ -150,11 +151,11 @@ class Lobes:
         interface has its own weight: what is reflected, or transmitted.
         """
         is_whole = _of(self._whole, si, bsdf)
-        first, second = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        first, second = sampler.next_1d(), mi.Point2f(sampler.next_2d())
         is_masked = is_whole & _of(self._lambertian, si, bsdf)
         albedo = self.albedo(si, bsdf, is_whole)
         share = _bsdf_share(albedo)
-        by_bsdf = is_masked | (rng.next_float32() < share)
+        by_bsdf = is_masked | (sampler.next_1d() < share)
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
         if branch is not None:
@@ -181,16 +182,16 @@ class Lobes:
 
     def _mean_specular_albedo(self, scene: Any) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
-        rng = PCG32(size=ALBEDO_SAMPLES, initstate=UInt64(ALBEDO_SEED))
+        sampler = one_sequence(ALBEDO_SAMPLES, ALBEDO_SEED)
         box = scene.bbox()
 
         def random_point() -> Any:
-            return box.min + mi.Vector3f(*(rng.next_float32() for _ in range(3))) * box.extents()
+            return box.min + mi.Vector3f(*sampler.next_2d(), sampler.next_1d()) * box.extents()
 
         start, end = random_point(), random_point()
         si = scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
         bsdf = si.bsdf()
-        _, pdf, weight, _ = self.sample_specular(si, bsdf, rng)
+        _, pdf, weight, _ = self.sample_specular(si, bsdf, sampler)
         value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)
         entry = _albedo_entry(_number(bsdf), si.wi.z)
         dr.eval(value, entry)

@@ -159,27 +159,27 @@ class MitsubaRenderer:
             native=si,
         )
 
-    def estimate_diffuse(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_diffuse(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
-        return self._transport.estimate(self._transport.sample_diffuse(point, rng), rng, path_depth)
+        return self._transport.estimate(self._transport.sample_diffuse(point, sampler), sampler, path_depth)
 
-    def estimate_specular(self, point: ShadingPoint, rng: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_specular(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
-        return self._transport.estimate(self._transport.sample_specular(point, rng), rng, path_depth)
+        return self._transport.estimate(self._transport.sample_specular(point, sampler), sampler, path_depth)
 
-    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
-        return self._transport.sharp_light(point, rng)
+        return self._transport.sharp_light(point, sampler)
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
-        return self._transport.sample_diffuse(point, rng, soft_only=soft_only)
+        return self._transport.sample_diffuse(point, sampler, soft_only=soft_only)
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
+        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
-        return self._transport.sample_specular(point, rng, choice, branch)
+        return self._transport.sample_specular(point, sampler, choice, branch)
 
     def _intersect(
         self, rays: Rays, active: Any = True, null_transmittance: float | None = NULL_GBUFFER
@@ -232,34 +232,36 @@ class MitsubaRenderer:
         )
         return si, distance
 
-    def _continued_radiance(self, rays: Rays, rng: Any, path_depth: int, active: Any) -> Any:
+    def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> Any:
         """Radiance along rays that continue paths of a depth."""
-        return self._radiance(rays, rng, self._continued[path_depth - 1], active)
+        return self._radiance(rays, sampler, self._continued[path_depth - 1], active)
 
-    def _radiance(self, rays: Rays, rng: Any, integrator: Any = None, active: Any = True) -> Any:
+    def _radiance(self, rays: Rays, sampler: Any, integrator: Any = None, active: Any = True) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
-        self._sampler.rng = rng
+        self._sampler.sampler = sampler
         integrator = integrator or self._integrator
         radiance, _, _ = integrator.sample(
             self._scene, self._sampler, mi.RayDifferential3f(ray), self._medium, active
         )
         # Keep nothing that holds NumPy's memory: it can't be freed while a kernel is recorded.
-        self._sampler.rng = None
+        self._sampler.sampler = None
         return radiance
 
 
 def _lane_sampler() -> Any:
-    """A Mitsuba sampler that draws from our generators, one a lane."""
+    """A Mitsuba sampler that draws from ours, one a lane."""
 
     class LaneSampler(mi.Sampler):
         def __init__(self) -> None:
             super().__init__(mi.Properties())
-            self.rng: Any = None
+            self.sampler: Any = None
 
         def next_1d(self, active: Any = True) -> Any:
-            return self.rng.next_float32(active)
+            del active  # all paths of a pixel draw as often
+            return self.sampler.next_1d()
 
         def next_2d(self, active: Any = True) -> Any:
-            return mi.Point2f(self.rng.next_float32(active), self.rng.next_float32(active))
+            del active
+            return mi.Point2f(self.sampler.next_2d())
 
     return LaneSampler()

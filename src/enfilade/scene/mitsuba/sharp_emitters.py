@@ -55,7 +55,7 @@ class SharpEmitters:
         sun = self._sun and self._sun.state
         return self._delta, sun, self._first, self._pmf, self._soft_share, self._soft
 
-    def estimate(self, si: Any, rng: Any, evaluate: Callable[[Any], Any], active: Any) -> Any:
+    def estimate(self, si: Any, sampler: Any, evaluate: Callable[[Any], Any], active: Any) -> Any:
         """Radiance that a surface reflects of the light of sharp emitters.
 
         Up to :data:`SHADOW_RAYS` emitters have a shadow ray each. More are divided into groups with one
@@ -65,7 +65,7 @@ class SharpEmitters:
         Parameters
         ----------
         si : mitsuba.SurfaceInteraction3f
-        rng : PCG32
+        sampler : PaddedSobolSampler
         evaluate
             The BSDF times the cosine, by incident direction in world space.
         active : Bool
@@ -81,23 +81,23 @@ class SharpEmitters:
         for group in range(groups):
             chosen, chosen_weight, total, target = Array3f(0), Float(0), Float(0), mi.Point3f(0)
             for candidate in range(candidates):
-                within = (candidate + rng.next_float32()) / candidates
+                within = (candidate + sampler.next_1d()) / candidates
                 number = dr.minimum(UInt((group + within) * size), self._count - 1)
                 index = dr.gather(UInt, self._delta, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
-                square = mi.Point2f(rng.next_float32(), rng.next_float32())
+                square = mi.Point2f(sampler.next_2d())
                 sample, radiance = emitter.sample_direction(si, square, active)
                 contribution = Array3f(evaluate(sample.d) * radiance) * (size / candidates)
                 weight = dr.dot(contribution, Array3f(*REC709_LUMINANCE))
                 total += weight
-                is_taken = rng.next_float32() * total < weight
+                is_taken = sampler.next_1d() * total < weight
                 chosen = dr.select(is_taken, contribution, chosen)
                 chosen_weight = dr.select(is_taken, weight, chosen_weight)
                 target = dr.select(is_taken, sample.p, target)
             chosen *= dr.select(chosen_weight > 0.0, total / chosen_weight, 0.0)
             found += self._unoccluded(si, target, chosen, active & (chosen_weight > 0.0))
         if self._sun is not None:
-            direction, radiance = self._sun.sample(rng)
+            direction, radiance = self._sun.sample(sampler)
             target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
             contribution = Array3f(evaluate(direction) * radiance)
             found += self._unoccluded(si, target, contribution, active & (dr.max(contribution) > 0.0))

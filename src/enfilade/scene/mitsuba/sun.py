@@ -54,12 +54,13 @@ class Sun:
         limit = self.extent * local.z
         return (local.z > 0.0) & (dr.abs(local.x) < limit) & (dr.abs(local.y) < limit)
 
-    def sample(self, rng: Any) -> tuple[Any, Any]:
+    def sample(self, sampler: Any) -> tuple[Any, Any]:
         """A direction on the map (Vector3f), and its radiance over its density (Color3f)."""
-        texel, across, pmf = self.texels.sample(rng.next_float32())
+        sample_point = sampler.next_2d()
+        texel, across, pmf = self.texels.sample(sample_point.x)
         row = texel // TEXELS
         x = (Float(texel - row * TEXELS) + across) * (2.0 / TEXELS) - 1.0
-        y = (Float(row) + rng.next_float32()) * (2.0 / TEXELS) - 1.0
+        y = (Float(row) + sample_point.y) * (2.0 / TEXELS) - 1.0
         direction = mi.Vector3f(x * self.extent, y * self.extent, 1.0)
         cosine = dr.rsqrt(dr.squared_norm(direction))
         direction = self.frame.to_world(direction * cosine)

@@ -50,9 +50,9 @@ class LightTransport:
             emitted = dr.select(~si.is_valid() & self.sharp_emitters.is_sun(-si.wi), 0.0, emitted)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
 
-    def estimate(self, sample: BsdfSample, rng: Any, path_depth: int) -> tuple[Any, Any]:
+    def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
-        found = self._radiance(sample.rays, rng, path_depth, sample.is_alive)
+        found = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
         ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
         si = self._scene.ray_intersect(ray, sample.is_alive)
 
@@ -63,7 +63,7 @@ class LightTransport:
         indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
-    def sharp_light(self, point: ShadingPoint, rng: Any) -> Any:
+    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
         si, albedo = point.native, point.surfaces.albedo
         active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
@@ -73,15 +73,15 @@ class LightTransport:
             value, _ = self._lobes.eval_diffuse(si, bsdf, si.to_local(direction), active)
             return _divided(value, albedo)
 
-        return self.sharp_emitters.estimate(si, rng, evaluate, active)
+        return self.sharp_emitters.estimate(si, sampler, evaluate, active)
 
-    def sample_diffuse(self, point: ShadingPoint, rng: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         si, albedo = point.native, point.surfaces.albedo
         active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         bsdf = si.bsdf()
-        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, rng, active, albedo, soft_only)
-        wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, rng, active)
+        direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, sampler, active, albedo, soft_only)
+        wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, sampler, active)
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
@@ -93,17 +93,17 @@ class LightTransport:
         )
 
     def sample_specular(
-        self, point: ShadingPoint, rng: Any, choice: Any = None, branch: Any = None
+        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         si = point.native
         bsdf = si.bsdf()
-        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, rng, choice, branch)
+        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, sampler, choice, branch)
         # Total reflection has a density of one, and no other branch.
         is_split = point.has_specular & self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
         has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
-        direct = self._next_event(si, bsdf, self._lobes.eval_specular, rng, has_glossy)
+        direct = self._next_event(si, bsdf, self._lobes.eval_specular, sampler, has_glossy)
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
@@ -119,13 +119,13 @@ class LightTransport:
         si: Any,
         bsdf: Any,
         evaluate: Any,
-        rng: Any,
+        sampler: Any,
         active: Any,
         albedo: Any = None,
         soft_only: bool = False,
     ) -> Any:
         """Radiance of a lobe from one sampled point on the emitters, MIS-weighted, divided by the albedo."""
-        sample_point = mi.Point2f(rng.next_float32(), rng.next_float32())
+        sample_point = mi.Point2f(sampler.next_2d())
         if soft_only:
             emitter, radiance = self.sharp_emitters.sample_soft(si, sample_point, active)
         else:
