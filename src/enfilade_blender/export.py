@@ -11,16 +11,16 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
-from enfilade_blender.lights import emitters, is_portal, note_blocked, note_seen, split_suns
+from enfilade_blender.lights import emitters, is_portal, note_blocked, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.open_file import files_used, open_source
 from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
-from enfilade_blender.scene_xml import Element, plugin, write_scene
+from enfilade_blender.scene_xml import LAMP, Element, named, plugin, write_scene
 from enfilade_blender.shapes import Shapes
-from enfilade_blender.visibility import seen_lamps
+from enfilade_blender.visibility import note_sun
 from enfilade_blender.world import environment
 
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
@@ -51,13 +51,9 @@ def export(job: Job) -> dict[str, Any]:
     elements = shapes.write(evaluated.placed)
     report_progress(0.9, "lights")
     lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
-    seen = seen_lamps(lamps, sun, views, selection)
-    note_seen(lamps, sun, seen, notes)
-    identifiers = shapes.identifiers
-    made: dict[str, list[Element]] = {}
-    for lamp in lamps:
-        made[lamp.name] = emitters(lamp, identifiers, notes, is_seen=lamp.name in seen)
-        elements += made[lamp.name]
+    note_sun(sun, views, selection, notes)
+    made = {lamp.name: emitters(lamp, shapes.identifiers, notes) for lamp in lamps}
+    elements += [named(plugin("bsdf", "null"), LAMP), *(one for of in made.values() for one in of)]
     note_blocked(made, notes, has_cut_outs="mask" in shapes.kinds)
     elements += environment(selection, sun, job.out, notes)
     shapes.textures.remove_unused(elements)

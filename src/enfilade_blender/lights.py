@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's lights as emitters of Mitsuba.
 
-Cycles' lamps do not block light, and the camera does not see them. Mitsuba's have neither property.
+Cycles' lamps do not block light, and the camera does not see them. enfilade's camera does not see emitters
+whose BSDF has the id of lamps, either, but they block light.
 """
 
 from __future__ import annotations
@@ -16,14 +17,13 @@ from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.mapping import spot_ramp
 from enfilade_blender.materials.values import Constant, Emission, Procedural, Value
 from enfilade_blender.notes import Notes
-from enfilade_blender.records import Lamp, View
-from enfilade_blender.scene_xml import Element, Identifiers, plugin
+from enfilade_blender.records import Lamp
+from enfilade_blender.scene_xml import LAMP, Element, Identifiers, plugin, reference
 
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
 DELTA = ("point", "spot", "directional")  # emitters that shadow rays alone reach
-CORNERS = ((-0.45, -0.45), (-0.45, 0.45), (0.45, -0.45), (0.45, 0.45))  # nearly, of an area light
 
 
 @dataclass(frozen=True)
@@ -151,40 +151,6 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
-def points_of(lamp: Lamp) -> np.ndarray:
-    """Points of a lamp's shape, (N, 3): its middle, and an area's corners; none where it has no shape."""
-    data, middle = lamp.data, lamp.matrix[:3, 3]
-    if data.type == "POINT" and data.shadow_soft_size > TINY:
-        return middle[None]
-    if data.type != "AREA":
-        return np.zeros((0, 3))
-    width, height = _area_size(data)
-    corners = [
-        middle + sx * width * lamp.matrix[:3, 0] + sy * height * lamp.matrix[:3, 1] for sx, sy in CORNERS
-    ]
-    return np.stack([middle, *corners])
-
-
-def faces_camera(lamp: Lamp, view: View) -> bool:
-    """Whether the bright side of a lamp is towards a camera."""
-    return (
-        lamp.data.type != "AREA" or float((lamp.matrix[:3, 3] - view.pose[:3, 3]) @ _axis(lamp.matrix)) > 0.0
-    )
-
-
-def note_seen(lamps: list[Lamp], sun: Sun | None, seen: set[str], notes: Notes) -> None:
-    """Note what becomes of the lamps that the camera would see."""
-    bright = "a bright shape where Cycles shows none"
-    for lamp in lamps:
-        if lamp.name in seen and lamp.data.type == "POINT":
-            what = "its radius is left out, since the camera would see the lamp"
-            notes.add("approximated", lamp.name, "Radius", what, "its shadows have sharp edges")
-        elif lamp.name in seen:
-            notes.add("approximated", lamp.name, "Light", "the camera sees the lamp", bright)
-    if sun is not None and sun.name in seen:
-        notes.add("approximated", sun.name, "Sun", "the camera sees the sun", bright)
-
-
 def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: bool) -> None:
     """Note the lamps whose light is blocked where Cycles lets it pass: Mitsuba's shadow rays pass no surface.
 
@@ -208,8 +174,8 @@ def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: 
             notes.add("approximated", name, "Shadow", "lamps that have a shape block its light", effect)
 
 
-def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes, *, is_seen: bool = False) -> list[Element]:
-    """Elements of one lamp; none for a dark one. A point light that the camera would see has no radius."""
+def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
+    """Elements of one lamp; none for a dark one."""
     data, name = lamp.data, lamp.name
     colour = lamp_colour(lamp, notes)
     if max(colour) <= 0.0:
@@ -225,12 +191,12 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes, *, is_seen: boo
         return [_spot(lamp, colour, notes)]
     radius = float(data.shadow_soft_size)
     place = lamp.matrix[:3, 3]
-    if radius <= TINY or is_seen:
+    if radius <= TINY:
         emitter = plugin("emitter", "point", intensity=_scaled(colour, point_intensity(1.0)))
         emitter.append(_vector("position", place, tag="point"))
         return [emitter]
     light = plugin("emitter", "area", radiance=_scaled(colour, sphere_radiance(1.0, radius)))
-    shape = plugin("shape", "sphere", light, plugin("bsdf", "null"), radius=radius)
+    shape = plugin("shape", "sphere", light, reference(LAMP), radius=radius)
     shape.append(_vector("center", place, tag="point"))
     shape.set("id", identifiers.unique(name))
     return [shape]
@@ -248,9 +214,7 @@ def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     matrix = axes @ FORWARD
     matrix[:3, 2] /= max(np.linalg.norm(matrix[:3, 2]), 1e-12)
     light = plugin("emitter", "area", radiance=radiance)
-    shape = plugin(
-        "shape", "disk" if is_round else "rectangle", light, plugin("bsdf", "null"), to_world=matrix
-    )
+    shape = plugin("shape", "disk" if is_round else "rectangle", light, reference(LAMP), to_world=matrix)
     shape.set("id", identifiers.unique(lamp.name))
     return shape
 

@@ -11,6 +11,7 @@ import numpy as np
 
 Element = ET.Element
 RESERVED = str.maketrans("./$", "___")  # of ids: separators of paths, and the mark of a parameter
+LAMP = "lamp"  # id of the BSDF of emitters that the camera does not see
 Property = float | int | bool | str | tuple[float, float, float] | np.ndarray | Element
 
 
@@ -58,7 +59,7 @@ class Identifiers:
     """Ids of a scene: names without the characters that Mitsuba reserves, each used once."""
 
     def __init__(self) -> None:
-        self._used: set[str] = set()
+        self._used = {LAMP}
 
     def unique(self, name: str) -> str:
         """An id after a name."""

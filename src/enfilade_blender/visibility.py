@@ -1,44 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps that the camera would see: Cycles does not show lamps to the camera, Mitsuba does."""
+"""Whether the camera sees the sun: Cycles does not show it, Mitsuba does, as a part of the environment."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
-import numpy as np
 from mathutils import Vector
 
-from enfilade_blender.lights import Sun, faces_camera, points_of
-from enfilade_blender.records import Lamp, Selection, View
+from enfilade_blender.lights import Sun
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Selection, View
 
 SAMPLED_VIEWS = 64
-NEAR = 0.98  # of the distance to a lamp: a surface behind that does not hide it
+FAR = 1e4  # scene units, to a point in the sun's direction
 
 
-def seen_lamps(lamps: list[Lamp], sun: Sun | None, views: list[View], selection: Selection) -> set[str]:
-    """Names of lamps, and of the sun, that no object hides from the camera in some view."""
+def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: Notes) -> None:
+    """Note a sun that no object hides from the camera in some view."""
+    if sun is None:
+        return
     graph = bpy.context.evaluated_depsgraph_get()
-    sampled = views[:: max(len(views) // SAMPLED_VIEWS, 1)]
-    seen = set()
-    for lamp in lamps:
-        points = points_of(lamp)
-        if any(_sees(view, points, selection, graph) for view in sampled if faces_camera(lamp, view)):
-            seen.add(lamp.name)
-    for view in sampled if sun is not None else ():
-        if sun is not None and _sees(view, view.pose[None, :3, 3] + 1e4 * sun.direction, selection, graph):
-            seen.add(sun.name)
-    return seen
-
-
-def _sees(view: View, points: np.ndarray, selection: Selection, graph: Any) -> bool:
-    eye = view.pose[:3, 3]
-    for point, (x, y, depth) in zip(points, view.pixels(points, selection.size), strict=True):
+    for view in views[:: max(len(views) // SAMPLED_VIEWS, 1)]:
+        eye = view.pose[:3, 3]
+        ((x, y, depth),) = view.pixels(eye[None] + FAR * sun.direction, selection.size)
         if depth <= 0.0 or not (0.0 <= x <= selection.size[0] and 0.0 <= y <= selection.size[1]):
             continue
-        distance = float(np.linalg.norm(point - eye))
-        toward = Vector((point - eye) / distance)
-        is_hidden = selection.scene.ray_cast(graph, Vector(eye), toward, distance=NEAR * distance)[0]
-        if not is_hidden:
-            return True
-    return False
+        if not selection.scene.ray_cast(graph, Vector(eye), Vector(sun.direction), distance=FAR)[0]:
+            what, effect = "the camera sees the sun", "a bright shape where Cycles shows none"
+            notes.add("approximated", sun.name, "Sun", what, effect)
+            return

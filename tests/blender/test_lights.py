@@ -10,16 +10,13 @@ import pytest
 
 from enfilade_blender.lights import (
     emitters,
-    faces_camera,
     is_portal,
     note_blocked,
-    note_seen,
-    points_of,
     split_suns,
 )
 from enfilade_blender.notes import Notes
-from enfilade_blender.records import Lamp, View
-from enfilade_blender.scene_xml import Identifiers, write_scene
+from enfilade_blender.records import Lamp
+from enfilade_blender.scene_xml import LAMP, Identifiers, named, plugin, write_scene
 
 SAMPLES = 20_000
 ABOVE = np.eye(4)
@@ -37,7 +34,7 @@ def lamp(kind, name="Lamp", matrix=ABOVE, **settings):
 
 def irradiance(tmp_path, light):
     """Irradiance at the origin, on a plane that faces up."""
-    elements = emitters(light, Identifiers(), Notes())
+    elements = [named(plugin("bsdf", "null"), LAMP), *emitters(light, Identifiers(), Notes())]
     write_scene(tmp_path / "scene.xml", elements)
     scene = mi.load_file(str(tmp_path / "scene.xml"))
     si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
@@ -77,6 +74,10 @@ def test_a_dark_lamp_is_left_out():
     assert emitters(lamp("POINT", energy=0.0), Identifiers(), Notes()) == []
 
 
+def test_a_material_may_have_the_name_of_the_lamps():
+    assert Identifiers().unique(LAMP) != LAMP
+
+
 def test_a_portal_is_an_area_light_that_is_marked():
     marks = [SimpleNamespace(is_portal=is_marked) for is_marked in (True, False)]
     assert [is_portal(lamp("AREA", cycles=mark)) for mark in marks] == [True, False]
@@ -91,24 +92,6 @@ def test_the_brightest_sun_with_a_disc_is_in_the_environment():
     assert [note["object"] for note in notes.to_list()] == ["weak"]
 
 
-def test_the_back_of_an_area_light_is_dark():
-    above, below = np.eye(4), np.eye(4)
-    above[2, 3] = 5.0
-    views = [View("Camera", pose, np.eye(4), {}) for pose in (above, below)]
-    assert [faces_camera(lamp("AREA"), view) for view in views] == [False, True]
-    assert [faces_camera(lamp("POINT"), view) for view in views] == [True, True]
-
-
-def test_a_point_light_that_the_camera_would_see_has_no_radius():
-    notes, bulb = Notes(), lamp("POINT", "Bulb", shadow_soft_size=0.1)
-    note_seen([bulb, lamp("AREA", "Panel")], None, {"Bulb", "Panel"}, notes)
-    assert [note["node"] for note in notes.to_list()] == ["Radius", "Light"]
-    kinds = [
-        emitters(bulb, Identifiers(), notes, is_seen=is_seen)[0].get("type") for is_seen in (False, True)
-    ]
-    assert kinds == ["sphere", "point"]
-
-
 def test_lamps_whose_light_is_blocked_are_noted():
     notes, names = Notes(), Identifiers()
     lamps = [lamp("SPOT", "Spot"), lamp("SUN", "Sun"), lamp("POINT", "Bulb", shadow_soft_size=0.1)]
@@ -118,9 +101,3 @@ def test_lamps_whose_light_is_blocked_are_noted():
     note_blocked(made, notes, has_cut_outs=True)
     found = [(note["object"], note["what"].split()[0]) for note in notes.to_list()]
     assert found == [(name, what) for name in ("Spot", "Sun") for what in ("transparent", "lamps")]
-
-
-def test_points_of_shapes():
-    assert len(points_of(lamp("AREA"))) == 5
-    assert len(points_of(lamp("POINT", shadow_soft_size=0.1))) == 1
-    assert len(points_of(lamp("POINT"))) == len(points_of(lamp("SPOT"))) == 0

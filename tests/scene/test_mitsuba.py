@@ -15,6 +15,7 @@ from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
 from enfilade.gbuffer import find_geometry
+from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.mitsuba_scene import (
@@ -143,6 +144,38 @@ def test_the_longest_path_is_the_setting(corner, corner_file):
     emitted = traced(opened(corner_file, max_depth=1), camera, spp=64).color.mean()
     assert emitted < 0.8 * direct
     assert direct < traced(renderer, camera, spp=64).color.mean()
+
+
+@pytest.mark.parametrize("is_lamp", [False, True])
+def test_the_camera_does_not_see_lamps(tmp_path, is_lamp):
+    """Two lamps, one behind the other, before a wall on the left and a mirror on the right."""
+    lamp = '<ref id="lamp"/>' if is_lamp else '<bsdf type="null"/>'
+    light = f'<emitter type="area"><rgb name="radiance" value="5"/></emitter>{lamp}'
+    mirror = '<bsdf type="conductor"><string name="material" value="none"/></bsdf>'
+    scale = '<scale x="0.5" y="0.5"/>'
+    around = [
+        f'<shape type="rectangle"><transform name="to_world">{scale}<translate x="{x}" z="{z}"/></transform>'
+        f"{of}</shape>"
+        for x, z, of in ((-1, 1, light), (-1, 1.5, light), (-1, 0, DIFFUSE), (1, 0, mirror))
+    ]
+    back = '<translate x="2.27" z="4"/>'
+    around.append(
+        f'<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="180"/>{scale}{back}'
+        f"</transform>{light}</shape>"
+    )
+    file = tmp_path / "scene.xml"
+    file.write_text(f'<scene version="3.0.0"><bsdf type="null" id="lamp"/>{"".join(around)}</scene>')
+    renderer = opened(file)
+    camera = Camera(look_at((0, 0, 3), (0, 0, 0)), 60.0, 32, 16)
+    colour = traced(renderer, camera, spp=64).color.reshape(16, 32, 3)[8, [10, 20], 0]
+    seen = find_geometry(renderer, camera).surface[8, [10, 20]]
+    assert colour[1] == pytest.approx(5.0)  # in the mirror
+    if is_lamp:
+        assert 0.0 < colour[0] < 5.0  # the wall, lit
+        assert seen.tolist() == [SurfaceClass.DIFFUSE, SurfaceClass.MIRROR]
+    else:
+        assert colour[0] > 5.0
+        assert seen.tolist() == [SurfaceClass.EMISSIVE, SurfaceClass.MIRROR]
 
 
 def test_fog_around_the_camera_is_that_of_the_scenes_camera(tmp_path):

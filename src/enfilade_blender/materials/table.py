@@ -145,18 +145,17 @@ INPUTS = (
     ("Missing image", "approximated", "a mid grey"),
 )
 LIGHTS = (
-    ("Point", "mapped", "`sphere` of its radius; `point` for radius 0"),
-    (
-        "Point that the camera would see",
-        "approximated",
-        "`point`: sharp shadows, no bright ball",
-    ),
+    ("Point", "mapped", "`sphere` of its radius, not seen by the camera; `point` for radius 0"),
     (
         "Spot",
         "approximated",
         "`spot`: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
     ),
-    ("Area: square, rectangle, disk, ellipse", "mapped", "`rectangle` or `disk`; the camera sees it"),
+    (
+        "Area: square, rectangle, disk, ellipse",
+        "mapped",
+        "`rectangle` or `disk`; not seen by the camera",
+    ),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     ("Nodes of lights: constants, black bodies, Light Falloff", "mapped", "a factor; falloff is quadratic"),

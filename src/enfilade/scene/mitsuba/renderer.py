@@ -232,12 +232,33 @@ class MitsubaRenderer:
         )
         return si, distance
 
+    def _beyond_lamps(self, ray: Any) -> Any:
+        """Camera rays that begin behind the lamps in front of everything else."""
+
+        def find(ray: Any, is_lamp: Any) -> Any:
+            return self._scene.ray_intersect(ray, int(mi.RayFlags.Minimal), Bool(True), is_lamp)
+
+        def continue_ray(ray: Any, is_lamp: Any, layer: Any) -> tuple[Any, ...]:
+            si = find(ray, is_lamp)
+            is_lamp = is_lamp & self._shapes.is_lamp(si)
+            return dr.select(is_lamp, si.spawn_ray(ray.d), ray), is_lamp, layer + 1
+
+        ray, _, _ = dr.while_loop(
+            (mi.Ray3f(ray), Bool(True), UInt(0)),
+            lambda _ray, is_lamp, layer: is_lamp & (layer < NULL_LAYERS),
+            continue_ray,
+            labels=("ray", "is_lamp", "layer"),
+        )
+        return ray
+
     def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> Any:
         """Radiance along rays that continue paths of a depth."""
         return self._radiance(rays, sampler, self._continued[path_depth - 1], active)
 
     def _radiance(self, rays: Rays, sampler: Any, integrator: Any = None, active: Any = True) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
+        if integrator is None and self._shapes.has_lamps:
+            ray = self._beyond_lamps(ray)
         self._sampler.sampler = sampler
         integrator = integrator or self._integrator
         radiance, _, _ = integrator.sample(

@@ -15,6 +15,8 @@ from enfilade.scene.mitsuba.merge import MergedScene
 
 NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has one, too, but is visible
 
+LAMP = "lamp"  # id of the `null` BSDF of emitters that the camera does not see, as in Blender's Cycles
+
 
 class Shapes:
     """The shapes of a scene's file.
@@ -29,6 +31,8 @@ class Shapes:
         Of shapes 1, 2, ...
     may_be_null : bool
         Whether any BSDF has null interactions.
+    has_lamps : bool
+        Whether there are lamps. Camera rays pass them.
     """
 
     def __init__(self, merged: MergedScene) -> None:
@@ -43,13 +47,17 @@ class Shapes:
         self._first, self._last = UInt(first), UInt(np.maximum(count, 1) - 1)
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
         self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
+        lamps = np.zeros(max(registry) + 1, bool)
+        lamps[registry] = [is_lamp(shape) for shape in shapes]
+        self._is_lamp = Bool(lamps)
         self.names = merged.names
         self.may_be_null = bool(dr.any(self._is_null))
+        self.has_lamps = bool(lamps.any())
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read, and all BSDFs, which makes Dr.Jit consider those of no shape, too."""
-        return self._index, self._first, self._last, self._is_null, self._bsdfs
+        return self._index, self._first, self._last, self._is_null, self._is_lamp, self._bsdfs
 
     def index(self, si: Any) -> Any:
         """Index of the shape that is hit, from 1; an instance is a shape. 0 for a miss; UInt."""
@@ -60,16 +68,28 @@ class Shapes:
         last = dr.gather(UInt, self._last, number, si.is_valid())
         return dr.gather(UInt, self._index, first + dr.minimum(si.prim_index, last), si.is_valid())
 
+    def is_lamp(self, si: Any) -> Any:
+        """Whether a hit is one of a lamp; Bool."""
+        number: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        return dr.gather(Bool, self._is_lamp, number, si.is_valid())
+
     def is_null(self, si: Any, transmittance: float) -> Any:
         """Whether a hit is a null interaction: its surface transmits more than this share of light; Bool.
 
-        Emitters never are: their light would be lost.
+        Of emitters only lamps are: the light of others would be lost.
         """
         bsdf = si.bsdf()
         number: Any = dr.reinterpret_array(mi.UInt32, bsdf)
         is_null = dr.gather(Bool, self._is_null, number, si.is_valid())
         transmitted = bsdf.eval_null_transmission(si, is_null)
-        return is_null & ~si.shape.is_emitter() & (mi.luminance(transmitted) > transmittance)
+        is_dark = ~si.shape.is_emitter() | self.is_lamp(si)
+        return is_null & is_dark & (mi.luminance(transmitted) > transmittance)
+
+
+def is_lamp(shape: Any) -> bool:
+    """Whether a shape gives light but is no surface: an emitter whose BSDF is :data:`LAMP`."""
+    bsdf = shape.bsdf()
+    return bool(shape.is_emitter() and bsdf.class_name() == "Null" and bsdf.id() == LAMP)
 
 
 def bsdf_table(scene: Any, predicate: Callable[[Any], bool]) -> Any:
