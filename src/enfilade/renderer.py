@@ -156,11 +156,14 @@ class Bounce:
         Density of the sampled direction, per steradian.
     is_delta : Bool
         Whether the direction comes from a delta lobe, which next-event estimation can't sample.
+    is_soft : Bool
+        Whether emitters that cast sharp shadows are left out.
     """
 
     position: Any
     pdf: Any
     is_delta: Any
+    is_soft: Any
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,8 @@ class BsdfSample:
     is_split : Bool
         Whether this is one of two branches of a clear interface: with :attr:`Branch.REFLECTED` or
         :attr:`Branch.TRANSMITTED`, and a throughput that is that of the branch.
+    is_passed : Bool
+        Whether this is a null interaction that shadow rays pass, too: the path keeps its last bounce.
     """
 
     rays: Rays
@@ -188,6 +193,7 @@ class BsdfSample:
     direct: Any
     is_alive: Any
     is_split: Any
+    is_passed: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,7 +311,6 @@ class LobeRenderer(Renderer, Protocol):
         active: Any = True,
         *,
         opaque_only: bool = False,
-        soft_only: bool = False,
     ) -> ShadingPoint:
         """Find the first surface along each ray, and its emission.
 
@@ -319,8 +324,6 @@ class LobeRenderer(Renderer, Protocol):
         opaque_only
             Take surfaces as either opaque or absent, as :meth:`surfaces` does, so that the point matches the
             G-buffer. Otherwise the transparency of a surface is one of its specular lobes.
-        soft_only
-            Leave out the emission of emitters that cast sharp shadows.
         """
         ...
 

@@ -11,7 +11,7 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
-from enfilade_blender.lights import emitters, is_portal, note_blocked, split_suns
+from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
@@ -52,12 +52,14 @@ def export(job: Job) -> dict[str, Any]:
     report_progress(0.9, "lights")
     lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
     note_sun(sun, views, selection, notes)
-    made = {lamp.name: emitters(lamp, shapes.identifiers, notes) for lamp in lamps}
-    elements += [named(plugin("bsdf", "null"), LAMP), *(one for of in made.values() for one in of)]
-    note_blocked(made, notes, has_cut_outs="mask" in shapes.kinds)
+    made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
+    elements += [named(plugin("bsdf", "null"), LAMP), *made]
+    is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)
     elements += environment(selection, sun, job.out, notes)
     shapes.textures.remove_unused(elements)
-    write_scene(job.out / "scene.xml", [_integrator(selection, shapes.kinds), *elements])
+    write_scene(
+        job.out / "scene.xml", [_integrator(selection, shapes.kinds, is_volumetric=is_volumetric), *elements]
+    )
     counts = {
         "objects": len(evaluated.placed),
         "instances": evaluated.instances,
@@ -120,17 +122,15 @@ def _note_settings(job: Job, selection: Selection, notes: Notes) -> None:
             notes.add("not-carried", other.name, "", what, "choose this one by blender.view_layer")
 
 
-def _integrator(selection: Selection, kinds: set[str]) -> Element:
+def _integrator(selection: Selection, kinds: set[str], *, is_volumetric: bool) -> Element:
     """A path tracer with the file's limit of bounces.
 
     Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
-    smaller one; glass needs further bounces. Surfaces of `mask` that are passed count in Mitsuba's depth, but
-    have a limit of their own in Cycles, which is added. Lamps are passed too rarely for that.
+    smaller one; glass needs further bounces. Shadow rays of the volumetric path tracer pass cut-outs and
+    lamps, which do not count in the depth of its paths.
     """
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))
     if kinds & GLASS:
         bounces = min(cycles.max_bounces, bounces + 2)
-    if "mask" in kinds:
-        bounces += cycles.transparent_max_bounces
-    return plugin("integrator", "path", max_depth=bounces + 2)
+    return plugin("integrator", "volpath" if is_volumetric else "path", max_depth=bounces + 2)

@@ -2,7 +2,7 @@
 """Blender's lights as emitters of Mitsuba.
 
 Cycles' lamps do not block light, and the camera does not see them. enfilade's camera does not see emitters
-whose BSDF has the id of lamps, either, but they block light.
+whose BSDF has the id of lamps, either; shadow rays of volumetric path tracers pass them.
 """
 
 from __future__ import annotations
@@ -151,27 +151,10 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
-def note_blocked(made: dict[str, list[Element]], notes: Notes, *, has_cut_outs: bool) -> None:
-    """Note the lamps whose light is blocked where Cycles lets it pass: Mitsuba's shadow rays pass no surface.
-
-    Parameters
-    ----------
-    made
-        Elements of lamps by their names.
-    notes
-    has_cut_outs
-        Whether there are surfaces of `mask`.
-    """
-    has_shapes = any(element.tag == "shape" for elements in made.values() for element in elements)
-    for name, elements in made.items():
-        if not any(element.get("type") in DELTA for element in elements):
-            continue
-        if has_cut_outs:
-            effect = "shadows of cut-outs are those of whole shapes"
-            notes.add("approximated", name, "Shadow", "transparent surfaces block its light", effect)
-        if has_shapes:
-            effect = "they cast shadows, which Cycles has not"
-            notes.add("approximated", name, "Shadow", "lamps that have a shape block its light", effect)
+def needs_passing(made: list[Element], sun: Sun | None) -> bool:
+    """Whether the shapes of lamps may be in the way of light that only shadow rays find."""
+    has_shapes = any(element.tag == "shape" for element in made)
+    return has_shapes and (sun is not None or any(element.get("type") in DELTA for element in made))
 
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from enfilade_blender.lights import (
+    Sun,
     emitters,
     is_portal,
-    note_blocked,
+    needs_passing,
     split_suns,
 )
 from enfilade_blender.notes import Notes
@@ -92,12 +93,17 @@ def test_the_brightest_sun_with_a_disc_is_in_the_environment():
     assert [note["object"] for note in notes.to_list()] == ["weak"]
 
 
-def test_lamps_whose_light_is_blocked_are_noted():
-    notes, names = Notes(), Identifiers()
-    lamps = [lamp("SPOT", "Spot"), lamp("SUN", "Sun"), lamp("POINT", "Bulb", shadow_soft_size=0.1)]
-    made = {one.name: emitters(one, names, notes) for one in lamps}
-    note_blocked({"Spot": made["Spot"]}, notes, has_cut_outs=False)
-    assert notes.to_list() == []
-    note_blocked(made, notes, has_cut_outs=True)
-    found = [(note["object"], note["what"].split()[0]) for note in notes.to_list()]
-    assert found == [(name, what) for name in ("Spot", "Sun") for what in ("transparent", "lamps")]
+@pytest.mark.parametrize(
+    ("kinds", "has_sun", "expected"),
+    [
+        (("SPOT", "AREA"), False, True),
+        (("SPOT",), True, False),
+        (("AREA",), True, True),
+        (("AREA",), False, False),
+    ],
+)
+def test_shadow_rays_have_to_pass_lamps_in_the_way_of_hard_light(kinds, has_sun, expected):
+    names = Identifiers()
+    made = [element for kind in kinds for element in emitters(lamp(kind), names, Notes())]
+    sun = Sun("Sun", np.array([0.0, 0.0, 1.0]), (1.0, 1.0, 1.0), 0.01) if has_sun else None
+    assert needs_passing(made, sun) == expected

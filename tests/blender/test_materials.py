@@ -133,11 +133,12 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert noted == {"unlit", "shadowless"}
 
 
-def test_light_passes_several_cut_outs_as_in_cycles(blender):
-    (source,) = blender.make("leaves")
-    code, out, result = blender.job(source, "leaves")
+@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way"])
+def test_light_passes_cut_outs_and_lamps_as_in_cycles(blender, name):
+    (source,) = blender.make(name)
+    code, out, result = blender.job(source, name)
     assert code == 0, result
-    _, theirs, _ = blender.job(source, "leaves of cycles", task="cycles", spp=64, unbiased=True)
+    _, theirs, _ = blender.job(source, f"{name} of cycles", task="cycles", spp=64, unbiased=True)
     wanted = read_exr(theirs / "cycles-0001.exr").mean(axis=(0, 1))
     # A floor of 0.5, less the edges of cards; their light alone would be 0.04. The noise is 1 %.
     assert render(out, 64, 1).mean(axis=(0, 1)) == pytest.approx(wanted, rel=0.03)

@@ -36,7 +36,7 @@ def of_integrator(folder, integrator, inside=DIFFUSE):
         ('<integrator type="path"/>', f'<bsdf type="dielectric"/>{FOG}', ""),  # which it never looks at
         ('<integrator type="volpath"/>', '<bsdf type="thindielectric"/>', ""),
         (f'<integrator type="volpath"/>{SPOT}', DIFFUSE, ""),
-        (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', "through null interactions"),
+        (f'<integrator type="volpath"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
         (f'<integrator type="path"/>{SPOT}', '<bsdf type="thindielectric"/>', ""),
     ],
 )  # fmt: skip

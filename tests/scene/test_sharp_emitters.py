@@ -8,7 +8,7 @@ import pytest
 from enfilade.arrays import Array3f, Float, UInt, rows
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.images import write_exr
-from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.estimate import Estimate, Samples, estimate
 from enfilade.kernels.random import Discrete, one_sequence
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
@@ -47,10 +47,10 @@ def photographed_sky():
     return np.where(is_sun[..., None], [9000.0, 8000.0, 7000.0], [0.5, 0.6, 0.9]).astype(np.float32)
 
 
-def opened(folder, sky):
+def opened(folder, sky, integrator="path"):
     write_exr(folder / "sky.exr", {"RGB": photographed_sky()}, is_portable=True)
     (folder / "scene.xml").write_text(
-        f"""<scene version="3.0.0"><integrator type="path"/>{sky}
+        f"""<scene version="3.0.0"><integrator type="{integrator}"/>{sky}
 <shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/></transform>
 <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf></shape>
 <shape type="cube"><transform name="to_world"><scale value="0.3"/><translate y="0.3"/></transform></shape>
@@ -59,18 +59,35 @@ def opened(folder, sky):
     return MitsubaRenderer(folder / "scene.xml")
 
 
+VEILS = """<shape type="rectangle"><transform name="to_world"><scale x="0.8" y="0.8"/>
+<rotate x="1" angle="90"/><translate x="0.9" y="0.65"/></transform>
+<bsdf type="mask"><float name="opacity" value="0.4"/>
+<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></bsdf></shape>
+<shape type="rectangle"><transform name="to_world"><scale x="0.5" y="0.5"/><rotate x="1" angle="90"/>
+<translate x="0.9" y="0.6"/></transform><bsdf type="null"/>
+<emitter type="area"><rgb name="radiance" value="0.7"/></emitter></shape>"""
+
+
+@pytest.mark.parametrize("veils", ["", VEILS], ids=["plain", "veiled"])
 @pytest.mark.parametrize("name", SKIES)
-def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name):
-    renderer = opened(tmp_path, SKIES[name])
+def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
+    """Behind a cut-out and the shape of a lamp, too, by a path tracer whose shadow rays pass these."""
+    renderer = opened(tmp_path, SKIES[name] + veils, "volpath" if veils else "path")
     assert renderer.has_sharp_light == (name in SHARP)
 
-    def both(rays, rng):
+    def both(rays, sampler):
         point = renderer.intersect(rays)
-        sample = renderer.sample_diffuse(point, rng, soft_only=True)
-        ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive, soft_only=True)
-        soft = sample.direct + dr.select(sample.is_alive, sample.throughput * ahead.emission, 0.0)
-        sharp = renderer.sharp_light(point, rng) if renderer.has_sharp_light else Array3f(0)
-        whole, _ = renderer.estimate_diffuse(point, rng)
+        sample = renderer.sample_diffuse(point, sampler, soft_only=True)
+        bounce, throughput, is_alive = sample.bounce, sample.throughput, sample.is_alive
+        soft = sample.direct
+        for _ in range(3 if veils else 1):
+            ahead = renderer.intersect(sample.rays, bounce, is_alive)
+            soft += dr.select(is_alive, throughput * ahead.emission, 0.0)
+            sample = renderer.sample_specular(ahead, sampler)
+            is_alive = is_alive & sample.is_alive & sample.is_passed
+            throughput = throughput * sample.throughput
+        sharp = renderer.sharp_light(point, sampler) if renderer.has_sharp_light else Array3f(0)
+        whole, _ = renderer.estimate_diffuse(point, sampler)
         return Samples((soft + sharp, whole))
 
     camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 24, 16)
@@ -84,6 +101,29 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name):
     deviation = np.sqrt(ours.variance + whole.variance) + 1e-4 * whole.color.max()
     assert np.mean(np.abs(error) > 4.0 * deviation) < 0.02
     assert ours.color.mean() == pytest.approx(whole.color.mean(), rel=0.02)
+
+
+@pytest.mark.parametrize("name", SKIES)
+def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name):
+    renderer = opened(tmp_path, SKIES[name] + VEILS, "volpath")
+
+    def radiance(rays, sampler):
+        point = renderer.intersect(rays)
+        diffuse = point.surfaces.albedo * sum(renderer.estimate_diffuse(point, sampler))
+        return point.emission + diffuse + sum(renderer.estimate_specular(point, sampler))
+
+    camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 24, 16)
+    pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
+    key = RandomKey(5, 1, Purpose.DIFFUSE)
+    ours = estimate(
+        camera, pixels, radiance, spp=256, chunk=1 << 18, pixel_filter=PixelFilter.BOX, random=key
+    )
+    key = RandomKey(6, 1, Purpose.REFERENCE)
+    theirs = renderer.trace(camera, pixels, key, spp=256, pixel_filter=PixelFilter.BOX)
+    error = (ours.color - theirs.color) @ [0.2126, 0.7152, 0.0722]
+    deviation = np.sqrt(ours.variance + theirs.variance) + 1e-4 * theirs.color.max()
+    assert np.mean(np.abs(error) > 4.0 * deviation) < 0.02
+    assert ours.color.mean() == pytest.approx(theirs.color.mean(), rel=0.02)
 
 
 def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):

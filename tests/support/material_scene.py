@@ -50,7 +50,7 @@ def _plane(name: str, transform: str, color: str) -> str:
     )
 
 
-def _scene(balls: dict[str, str], sky: str) -> str:
+def _scene(balls: dict[str, str], sky: str, integrator: str) -> str:
     shapes = [
         f'<shape type="sphere" id="{name}"><float name="radius" value="0.42"/>'
         f'<point name="center" x="{i % 4 - 1.5}" y="{0.5 + i // 4}" z="0"/>{bsdf}</shape>'
@@ -64,13 +64,15 @@ def _scene(balls: dict[str, str], sky: str) -> str:
         '<emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>'
     )
     # No limit of depth: where a path is cut off, the two estimators cut differently.
-    integrator = '<integrator type="path"><integer name="max_depth" value="-1"/></integrator>'
-    return f'<scene version="3.0.0">{integrator}{"".join(shapes)}{lamp}{sky}</scene>'
+    tracer = f'<integrator type="{integrator}"><integer name="max_depth" value="-1"/></integrator>'
+    return f'<scene version="3.0.0">{tracer}{"".join(shapes)}{lamp}{sky}</scene>'
 
 
-def opened_scene(folder, balls: dict[str, str], sky: str = CONSTANT) -> MitsubaRenderer:
+def opened_scene(
+    folder, balls: dict[str, str], sky: str = CONSTANT, integrator: str = "path"
+) -> MitsubaRenderer:
     file = folder / "scene.xml"
-    file.write_text(_scene(balls, sky))
+    file.write_text(_scene(balls, sky, integrator))
     return MitsubaRenderer(file)
 
 

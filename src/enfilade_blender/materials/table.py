@@ -159,11 +159,6 @@ LIGHTS = (
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     ("Nodes of lights: constants, black bodies, Light Falloff", "mapped", "a factor; falloff is quadratic"),
-    (
-        "Light of `point`, `spot` and `directional` through cut-outs and lamps",
-        "approximated",
-        "blocked: their shadows are those of whole shapes",
-    ),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),

@@ -189,6 +189,21 @@ def leaves(folder):
         plane(f"Leaf {number}", (0.0, 0.0, 0.3 + 0.2 * number), 3.0, leaf)
 
 
+def lamps_in_the_way(folder):
+    """A window's area light, and a card with holes, between a floor and a sun, a spot and a panel."""
+    scene = new_file()
+    scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 3.0), (0.0, 0.0, 0.0)
+    plane("Floor", (0.0, 0.0, 0.0), 6.0, shader("floor", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    light("AREA", "Window", (0.0, 0.0, 3.5), 10.0, size=3.0)
+    light("AREA", "Panel", (0.5, 0.0, 4.5), 40.0, size=1.0)
+    light("SUN", "Sun", (1.0, 0.0, 8.0), 2.0, angle=0.02)
+    light("SPOT", "Spot", (-0.5, 0.0, 5.0), 300.0, spot_size=1.0, shadow_soft_size=0.0)
+    holes = image("holes", _grey, 16, alpha=lambda x, y: ((16 * x).astype(int) + (16 * y).astype(int)) % 2)
+    card, tree, bsdf = shader("card", "BsdfPrincipled", Roughness=1.0)
+    fill(tree, bsdf, {"Alpha": picture(tree, holes).outputs["Alpha"]})
+    plane("Card", (0.0, 0.0, 3.2), 2.0, card)
+
+
 def _grey(x, _y):
     return np.full((*x.shape, 3), 0.8)
 

@@ -4,17 +4,28 @@ import numpy as np
 import pytest
 
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.estimate import Samples
 from support.integrated import (
     EMPTY,
     LUMINANCE,
     assert_same_in_chunks,
     cache_of,
+    estimated,
     gathered,
     shaded,
     standard_errors,
     traced,
 )
-from support.material_scene import MATERIALS, front_camera, opened_scene, specular_aovs, traced_irradiance
+from support.material_scene import (
+    CONSTANT,
+    MATERIALS,
+    PIXEL_ANGLE,
+    front_camera,
+    integrator_of,
+    opened_scene,
+    specular_aovs,
+    traced_irradiance,
+)
 
 # Alone in this file: while this scene is open, its materials are compiled into the kernels of all scenes.
 
@@ -38,6 +49,31 @@ def test_without_a_cache_every_material_keeps_its_energy(materials):
     assert set(MATERIALS) < set(errors)
     # Of 18 shapes one exceeds four standard errors once in 1000 runs.
     assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+
+
+def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
+    """By a path tracer whose shadow rays pass them: light of all kinds behind panes, cut-outs and lamps."""
+    sun = '<emitter type="directional"><vector name="direction" x="-0.1" y="-0.3" z="-1"/></emitter>'
+    names = "diffuse", "roughplastic", "thindielectric", "one-sided, from behind", "glowing air"
+    balls = {name: MATERIALS[name] for name in names}
+    renderer = opened_scene(tmp_path, balls, CONSTANT + sun, "volpath")
+    camera = front_camera()
+    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    numbers = [number for number in np.unique(shape_index) if number]
+    errors = [standard_errors(ours, reference, shape_index == number) for number in numbers]
+    assert len(errors) >= len(balls)
+    assert np.abs(errors).max() < 4.0
+
+    def irradiance(rays, sampler):
+        """By final gathering, with the sharp light apart; and by path tracing."""
+        gathered = integrator_of(renderer).final_gather(EMPTY, rays, sampler, pixel_angle=PIXEL_ANGLE)
+        point = renderer.intersect(rays, opaque_only=True)
+        sharp = renderer.sharp_light(point, sampler.fork(1))
+        return Samples((sum(gathered.layers) + sharp, sum(renderer.estimate_diffuse(point, sampler.fork(2)))))
+
+    ours, reference = estimated(irradiance, camera, 256, layers=2)
+    assert abs(standard_errors(ours, reference)) < 4.0
 
 
 def test_final_gathering_converges_to_path_traced_irradiance(materials):

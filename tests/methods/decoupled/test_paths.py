@@ -12,7 +12,7 @@ from enfilade.renderer import Bounce, Branch, Rays
 def made(count, first):
     origin = Array3f(np.arange(3 * count, dtype=np.float32).reshape(count, 3).T + first)
     path = spawn(Rays(origin, Array3f(0, 0, 1) + dr.zeros(Array3f, count)), one_sequence(count), spread=first)
-    return path, (UInt(np.arange(count) + first), Bounce(origin, origin.x, origin.x > 5.0))
+    return path, (UInt(np.arange(count) + first), Bounce(origin, origin.x, origin.x > 5.0, origin.x > 9.0))
 
 
 def test_trees_are_joined_lane_by_lane():

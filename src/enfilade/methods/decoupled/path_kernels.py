@@ -119,11 +119,9 @@ class PathKernels:
         scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
         return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)
 
-    def _intersect(
-        self, cache: IrradianceCache, path: Path, *, soft_only: bool = False
-    ) -> tuple[Any, Vertex]:
+    def _intersect(self, cache: IrradianceCache, path: Path) -> tuple[Any, Vertex]:
         """Emission at the next surface, and the vertex there, with its cached diffuse reflection."""
-        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, soft_only=soft_only)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         albedo = point.surfaces.albedo
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         sharp: tuple[Any, ...] = ()
@@ -162,10 +160,11 @@ class PathKernels:
 
         # Extend the path; a broad lobe widens it.
         lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
+        bounce = path.bounce and dr.select(sample.is_passed, path.bounce, sample.bounce)
         extended = Path(
             lane=_aov_lane(path, point, sample, transmitted_at),
             rays=sample.rays,
-            bounce=sample.bounce,
+            bounce=bounce or sample.bounce,
             throughput=Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
@@ -207,7 +206,7 @@ class PathKernels:
         )
 
         # Query the cache at the next vertex.
-        emitted, vertex = self._intersect(cache, extended, soft_only=is_visible)
+        emitted, vertex = self._intersect(cache, extended)
         return Array3f(sample.direct + emitted), vertex
 
     def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any]:

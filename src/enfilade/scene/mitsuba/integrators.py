@@ -15,7 +15,6 @@ PATH_TRACERS = {  # Mitsuba's classes that trace paths from the camera to their 
     "VolumetricPathIntegrator": "volpath",
     "VolpathMisIntegratorImpl": "volpathmis",
 }
-DELTA_EMITTERS = (mi.EmitterFlags.DeltaPosition, mi.EmitterFlags.DeltaDirection)  # no ray hits these
 UNLIMITED = 2**31  # as Mitsuba prints a max_depth of -1
 
 
@@ -63,17 +62,17 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     max_depth, _ = _depths(integrator)
     if max_depth <= MAX_PATH_DEPTH:
         return f"its paths end at depth {max_depth}; {MAX_PATH_DEPTH + 1} is the least"
-    plugin = PATH_TRACERS[integrator.class_name()]
-    if plugin == "path":
-        return ""
-    nodes = mi.traverse(scene).hierarchy
-    if any(isinstance(node, mi.Medium) for node in nodes):
+    is_volumetric = PATH_TRACERS[integrator.class_name()] != "path"
+    if is_volumetric and any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
         return "it has participating media"
-    if any(isinstance(n, mi.BSDF) and mi.has_flag(n.flags(), mi.BSDFFlags.Null) for n in nodes) and any(
-        mi.has_flag(emitter.flags(), flag) for emitter in scene.emitters() for flag in DELTA_EMITTERS
-    ):
-        return f"its integrator, {plugin}, lights surfaces from delta emitters through null interactions"
     return ""
+
+
+def shadow_rays_pass_null(scene: Any, integrator: Any) -> bool:
+    """Whether shadow rays pass null interactions: those of volumetric path tracers, where there are any."""
+    nodes = mi.traverse(scene).hierarchy
+    has_null = any(isinstance(n, mi.BSDF) and mi.has_flag(n.flags(), mi.BSDFFlags.Null) for n in nodes)
+    return has_null and PATH_TRACERS.get(integrator.class_name(), "path") != "path"
 
 
 def _depths(integrator: Any) -> tuple[int, int]:

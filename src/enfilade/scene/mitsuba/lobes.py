@@ -141,8 +141,8 @@ class Lobes:
 
     def sample_specular(
         self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
-    ) -> tuple[Any, Any, Any, Any]:
-        """Direction, density, weight of a sample, and whether it is of a delta lobe.
+    ) -> tuple[Any, ...]:
+        """Direction, density, weight of a sample, and whether it is of a delta lobe, and a null interaction.
 
         The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
         of its albedo as probability, so that the weight stays bounded where only one of them is large. A
@@ -165,8 +165,8 @@ class Lobes:
         sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
         whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
-        is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) | mi.has_flag(kind, mi.BSDFFlags.Null)
-        is_delta &= ~is_whole | by_bsdf
+        is_null = mi.has_flag(kind, mi.BSDFFlags.Null) & (~is_whole | by_bsdf)
+        is_delta = is_null | (mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_whole | by_bsdf))
 
         # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
@@ -178,7 +178,7 @@ class Lobes:
             weight = dr.select(is_clear, weight * sample.pdf, weight)
 
         wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
-        return wo, pdf, dr.select(is_whole, difference, weight), is_delta
+        return wo, pdf, dr.select(is_whole, difference, weight), is_delta, is_null
 
     def _mean_specular_albedo(self, scene: Any) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
@@ -191,7 +191,7 @@ class Lobes:
         start, end = random_point(), random_point()
         si = scene.ray_intersect(mi.Ray3f(start, dr.normalize(end - start)))
         bsdf = si.bsdf()
-        _, pdf, weight, _ = self.sample_specular(si, bsdf, sampler)
+        _, pdf, weight, *_ = self.sample_specular(si, bsdf, sampler)
         value = dr.select(pdf > 0.0, dr.max(dr.abs(weight)), 0.0)
         entry = _albedo_entry(_number(bsdf), si.wi.z)
         dr.eval(value, entry)

@@ -34,7 +34,12 @@ from enfilade.renderer import (
     Surfaces,
 )
 from enfilade.scene.mitsuba.emitters import find_emitters
-from enfilade.scene.mitsuba.integrators import scene_integrator, shortened, why_inseparable
+from enfilade.scene.mitsuba.integrators import (
+    scene_integrator,
+    shadow_rays_pass_null,
+    shortened,
+    why_inseparable,
+)
 from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.merge import merge_meshes
@@ -76,7 +81,8 @@ class MitsubaRenderer:
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
-        self._transport = LightTransport(scene, self._lobes, self._continued_radiance)
+        pass_null = shadow_rays_pass_null(scene, self._integrator)
+        self._transport = LightTransport(scene, self._lobes, self._continued_radiance, pass_null=pass_null)
         self._shapes = Shapes(self._merged)
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
@@ -141,7 +147,6 @@ class MitsubaRenderer:
         active: Any = True,
         *,
         opaque_only: bool = False,
-        soft_only: bool = False,
     ) -> ShadingPoint:
         """Find the first surface along each ray, and its emission.
 
@@ -153,7 +158,7 @@ class MitsubaRenderer:
         return ShadingPoint(
             surfaces=surfaces,
             position=Array3f(si.p),
-            emission=self._transport.emission(si, bounce, soft_only=soft_only),
+            emission=self._transport.emission(si, bounce),
             has_specular=self._lobes.has_specular(si, bsdf),
             specular_albedo=self._lobes.specular_albedo(si, bsdf),
             native=si,

@@ -13,6 +13,7 @@ import numpy as np
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import BELOW_ONE, Discrete
 from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.scene.mitsuba.shadow_rays import ShadowRays
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
@@ -25,10 +26,12 @@ class SharpEmitters:
     Parameters
     ----------
     scene : mitsuba.Scene
+    shadow_rays
     """
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: Any, shadow_rays: ShadowRays) -> None:
         self._scene = scene
+        self._shadow_rays = shadow_rays
         emitters = scene.emitters()
         weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
@@ -117,7 +120,7 @@ class SharpEmitters:
         index, within, _ = self._soft.sample(sample_point.x)
         first, pmf = dr.gather(Float, self._first, index), dr.gather(Float, self._pmf, index)
         point = mi.Point2f(dr.minimum(first + within * pmf, BELOW_ONE), sample_point.y)
-        sample, radiance = self._scene.sample_emitter_direction(si, point, True, active)
+        sample, radiance = self._shadow_rays.sample_emitter(si, point, active)
         is_soft = active & ~sample.delta & ~(self._is_environment(sample) & self.is_sun(sample.d))
         sample.pdf = dr.select(is_soft, self.soft_pdf(sample.pdf), 0.0)
         return sample, dr.select(is_soft, radiance * self._soft_share, 0.0)
@@ -135,5 +138,5 @@ class SharpEmitters:
 
     def _unoccluded(self, si: Any, target: Any, contribution: Any, active: Any) -> Any:
         """A contribution from a point, 0 where an occluder is between."""
-        is_lit = active & ~self._scene.ray_test(si.spawn_ray_to(target), active)
-        return dr.select(is_lit, contribution, 0.0)
+        share = self._shadow_rays.transmittance(si, target, active)
+        return dr.select(active, contribution * Array3f(share), 0.0)

@@ -8,10 +8,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from enfilade.arrays import Array3f, Bool
+from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
+from enfilade.scene.mitsuba.shadow_rays import MAX_LAYERS, ShadowRays
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
@@ -28,40 +29,66 @@ class LightTransport:
     radiance
         The path tracer: radiance along rays, from the rays, their random number generators, the path depth at
         which they begin, and which of them are traced.
+    pass_null
+        Whether its shadow rays pass null interactions.
     """
 
-    def __init__(self, scene: Any, lobes: Lobes, radiance: Radiance) -> None:
+    def __init__(self, scene: Any, lobes: Lobes, radiance: Radiance, *, pass_null: bool) -> None:
         self._scene = scene
         self._lobes = lobes
         self._radiance = radiance
-        self.sharp_emitters = SharpEmitters(scene)
+        self._shadow_rays = ShadowRays(scene, pass_null=pass_null)
+        self.sharp_emitters = SharpEmitters(scene, self._shadow_rays)
 
-    def emission(self, si: Any, bounce: Bounce | None, *, soft_only: bool = False) -> Any:
+    def emission(self, si: Any, bounce: Bounce | None, active: Any = True) -> Any:
         """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
-        emitted = si.emitter(self._scene).eval(si)
+        emitted = si.emitter(self._scene, active).eval(si, active)
         if bounce is None:
             return Array3f(emitted)
         origin = dr.zeros(mi.Interaction3f)
         origin.p = mi.Point3f(bounce.position)
         direction = mi.DirectionSample3f(self._scene, si, origin)
         emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
-        if soft_only:
-            emitter_pdf = self.sharp_emitters.soft_pdf(emitter_pdf)
-            emitted = dr.select(~si.is_valid() & self.sharp_emitters.is_sun(-si.wi), 0.0, emitted)
+        emitter_pdf = dr.select(bounce.is_soft, self.sharp_emitters.soft_pdf(emitter_pdf), emitter_pdf)
+        is_left_out = bounce.is_soft & ~si.is_valid() & self.sharp_emitters.is_sun(-si.wi)
+        emitted = dr.select(is_left_out, 0.0, emitted)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
 
     def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
         found = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
-        ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
-        si = self._scene.ray_intersect(ray, sample.is_alive)
-
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
-        unweighted = si.emitter(self._scene).eval(si, sample.is_alive)
-        emitted = sample.throughput * self.emission(si, sample.bounce)
-        direct = sample.direct + dr.select(sample.is_alive, emitted, 0.0)
+        unweighted, weighted = self._emission_along(sample)
+        direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
         indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
+
+    def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any]:
+        """Emission of the first hit, and of those before it that shadow rays pass: as it is, and weighted."""
+        ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
+        if not self._shadow_rays.pass_null:
+            si = self._scene.ray_intersect(ray, sample.is_alive)
+            return self.emission(si, None, sample.is_alive), self.emission(si, sample.bounce, sample.is_alive)
+
+        def add_hit(
+            ray: Any, share: Any, unweighted: Any, weighted: Any, active: Any, layer: Any
+        ) -> tuple[Any, ...]:
+            si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
+            unweighted += dr.select(active, share * self.emission(si, None, active), 0.0)
+            weighted += dr.select(active, share * self.emission(si, sample.bounce, active), 0.0)
+            active = active & si.is_valid()
+            passed = mi.unpolarized_spectrum(si.bsdf().eval_null_transmission(si, active))
+            share = dr.select(active, share * Array3f(passed), share)
+            active &= dr.max(share) > 0.0
+            return si.spawn_ray(ray.d), share, unweighted, weighted, active, layer + 1
+
+        _, _, unweighted, weighted, _, _ = dr.while_loop(
+            (ray, Array3f(1), Array3f(0), Array3f(0), Bool(sample.is_alive), UInt(0)),
+            lambda *state: state[4] & (state[5] < MAX_LAYERS),
+            add_hit,
+            labels=("ray", "share", "unweighted", "weighted", "active", "layer"),
+        )
+        return unweighted, weighted
 
     def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
@@ -85,11 +112,12 @@ class LightTransport:
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
-            bounce=Bounce(Array3f(si.p), pdf, Bool(False)),
+            bounce=Bounce(Array3f(si.p), pdf, Bool(False), Bool(soft_only)),
             throughput=_divided(weight, albedo),
             direct=Array3f(direct),
             is_alive=Bool(active & (pdf > 0.0)),
             is_split=Bool(False),
+            is_passed=Bool(False),
         )
 
     def sample_specular(
@@ -98,7 +126,7 @@ class LightTransport:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         si = point.native
         bsdf = si.bsdf()
-        wo, pdf, weight, is_delta = self._lobes.sample_specular(si, bsdf, sampler, choice, branch)
+        wo, pdf, weight, is_delta, is_null = self._lobes.sample_specular(si, bsdf, sampler, choice, branch)
         # Total reflection has a density of one, and no other branch.
         is_split = point.has_specular & self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
@@ -107,11 +135,12 @@ class LightTransport:
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
-            bounce=Bounce(Array3f(si.p), pdf, Bool(is_delta)),
+            bounce=Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(False)),
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
             is_split=Bool(is_split & (branch is not None)),
+            is_passed=Bool(is_null & self._shadow_rays.pass_null),
         )
 
     def _next_event(
@@ -129,7 +158,7 @@ class LightTransport:
         if soft_only:
             emitter, radiance = self.sharp_emitters.sample_soft(si, sample_point, active)
         else:
-            emitter, radiance = self._scene.sample_emitter_direction(si, sample_point, True, active)
+            emitter, radiance = self._shadow_rays.sample_emitter(si, sample_point, active)
         active = active & (emitter.pdf != 0.0)
         value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), active)
         if albedo is not None:
