@@ -61,17 +61,20 @@ class Shapes:
 
     def index(self, si: Any) -> Any:
         """Index of the shape that is hit, from 1; an instance is a shape. 0 for a miss; UInt."""
-        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
-        instance: Any = dr.reinterpret_array(mi.UInt32, si.instance)
-        number = dr.select(instance != 0, instance, shape)
+        number = self._number(si)
         first = dr.gather(UInt, self._first, number, si.is_valid())
         last = dr.gather(UInt, self._last, number, si.is_valid())
         return dr.gather(UInt, self._index, first + dr.minimum(si.prim_index, last), si.is_valid())
 
     def is_lamp(self, si: Any) -> Any:
         """Whether a hit is one of a lamp; Bool."""
-        number: Any = dr.reinterpret_array(mi.UInt32, si.shape)
-        return dr.gather(Bool, self._is_lamp, number, si.is_valid())
+        return dr.gather(Bool, self._is_lamp, self._number(si), si.is_valid())
+
+    def _number(self, si: Any) -> Any:
+        """Index in the registry of the shape that is hit, or of the instance whose shape it is; UInt."""
+        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        instance: Any = dr.reinterpret_array(mi.UInt32, si.instance)
+        return dr.select(instance != 0, instance, shape)
 
     def is_null(self, si: Any, transmittance: float) -> Any:
         """Whether a hit is a null interaction: its surface transmits more than this share of light; Bool.
