@@ -132,6 +132,8 @@ class ShadingPoint:
     specular_albedo : Float
         Rough estimate of the share of light that these scatter towards the ray's origin. Russian roulette
         weighs what goes on from here by it; it changes no mean.
+    bounce : Bounce or None
+        The previous vertex; None for camera rays.
     native : Any
         The renderer's own record of the hit.
     """
@@ -141,6 +143,7 @@ class ShadingPoint:
     emission: Any
     has_specular: Any
     specular_albedo: Any
+    bounce: Bounce | None
     native: Any
 
 
@@ -175,6 +178,7 @@ class BsdfSample:
     rays : Rays
         That continue the paths.
     bounce : Bounce
+        Here; the previous one where the path passes a null interaction that shadow rays pass, too.
     throughput : Array3f
         Weight of the sample. It may be negative where the specular part is a BSDF minus its diffuse lobe.
     direct : Array3f
@@ -184,7 +188,7 @@ class BsdfSample:
         Whether this is one of two branches of a clear interface: with :attr:`Branch.REFLECTED` or
         :attr:`Branch.TRANSMITTED`, and a throughput that is that of the branch.
     is_passed : Bool
-        Whether this is a null interaction that shadow rays pass, too: the path keeps its last bounce.
+        Whether this is such a null interaction.
     """
 
     rays: Rays

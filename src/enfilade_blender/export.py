@@ -127,7 +127,7 @@ def _integrator(selection: Selection, kinds: set[str], *, is_volumetric: bool) -
 
     Cycles limits bounces by kind. A path of many diffuse bounces ends by their own limit, which is the
     smaller one; glass needs further bounces. Shadow rays of the volumetric path tracer pass cut-outs and
-    lamps, which do not count in the depth of its paths.
+    lamps, and with it these do not count in the depth of paths.
     """
     cycles = selection.scene.cycles
     bounces = min(cycles.max_bounces, max(cycles.diffuse_bounces, cycles.glossy_bounces))

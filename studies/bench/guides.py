@@ -122,7 +122,7 @@ class Guides:
     def _extend_kernel(self, rays: Rays, sampler: Any) -> tuple[Any, ...]:
         """Scatter paths at a sharp surface, and find the next one."""
         assert isinstance(self._renderer, LobeRenderer)  # noqa: S101  (`__init__`)
-        sampler = sampler.fork(0)
+        sampler = sampler.copy()
         point = self._renderer.intersect(rays, opaque_only=True)
         sample = self._renderer.sample_specular(point, sampler)
         hit = self._renderer.intersect(sample.rays, sample.bounce).surfaces

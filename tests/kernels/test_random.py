@@ -141,9 +141,10 @@ def test_pairs_of_dimensions_are_not_correlated():
 
 def test_a_fork_draws_numbers_of_its_own():
     sampler = one_sequence(COUNT)
-    same, other = sampler.fork(0), sampler.fork(5)
+    same, other = sampler.copy(), sampler.fork(5)
     numbers = [np.array(of.next_1d()) for of in (sampler, same, other)]
     np.testing.assert_array_equal(numbers[0], numbers[1])
     assert abs(np.corrcoef(numbers[0], numbers[2])[0, 1]) < LIMIT
-    # Drawing from one does not advance the other.
+    # Forks of a fork are no copies of the original, and drawing from one sampler does not advance another.
+    assert abs(np.corrcoef(numbers[0], np.array(one_sequence(COUNT).fork(5).fork(5).next_1d()))[0, 1]) < LIMIT
     np.testing.assert_array_equal(np.array(sampler.next_1d()), np.array(same.next_1d()))

@@ -78,10 +78,10 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
     def both(rays, sampler):
         point = renderer.intersect(rays)
         sample = renderer.sample_diffuse(point, sampler, soft_only=True)
-        bounce, throughput, is_alive = sample.bounce, sample.throughput, sample.is_alive
+        throughput, is_alive = sample.throughput, sample.is_alive
         soft = sample.direct
         for _ in range(3 if veils else 1):
-            ahead = renderer.intersect(sample.rays, bounce, is_alive)
+            ahead = renderer.intersect(sample.rays, sample.bounce, is_alive)
             soft += dr.select(is_alive, throughput * ahead.emission, 0.0)
             sample = renderer.sample_specular(ahead, sampler)
             is_alive = is_alive & sample.is_alive & sample.is_passed

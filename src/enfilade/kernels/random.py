@@ -27,7 +27,7 @@ class PaddedSobolSampler:
     Pairs of dimensions are (0, 2)-sequences: the first two dimensions of Sobol's, nested uniformly scrambled
     (Owen 1995) by the hash function of Laine and Karras (2011), in an order that is shuffled likewise (Burley
     2020). Each number is uniform by itself, pairs are independent of each other, and the points of the first
-    paths of a pixel cover the square evenly. As of pbrt-v4's sampler of this name.
+    paths of a pixel cover the square evenly. As pbrt-v4's sampler of this name.
 
     Attributes
     ----------
@@ -57,15 +57,19 @@ class PaddedSobolSampler:
         y = _scrambled(_pascal(index), _hashed(seed + 2))
         return Array2f(Float(x >> 8), Float(y >> 8)) * 2.0**-24  # a float holds 24 bits
 
+    def copy(self) -> PaddedSobolSampler:
+        """A copy that draws the same numbers."""
+        return replace(self)
+
     def fork(self, salt: Any) -> PaddedSobolSampler:
         """A copy that draws numbers of its own.
 
         Parameters
         ----------
         salt : UInt or int
-            Tells copies apart; 0 has the numbers of the original.
+            Tells copies of the same dimension apart.
         """
-        return replace(self, seed=self.seed ^ UInt(salt))
+        return replace(self, seed=_hashed(self.seed ^ UInt(salt) ^ _hashed(self.dimension)))
 
 
 def one_sequence(count: int, seed: int = 0) -> PaddedSobolSampler:

@@ -17,7 +17,6 @@ from support.integrated import (
     traced,
 )
 from support.material_scene import (
-    CONSTANT,
     MATERIALS,
     PIXEL_ANGLE,
     front_camera,
@@ -52,11 +51,25 @@ def test_without_a_cache_every_material_keeps_its_energy(materials):
 
 
 def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
-    """By a path tracer whose shadow rays pass them: light of all kinds behind panes, cut-outs and lamps."""
-    sun = '<emitter type="directional"><vector name="direction" x="-0.1" y="-0.3" z="-1"/></emitter>'
+    """By a path tracer whose shadow rays pass them: light of all kinds behind panes, cut-outs and lamps.
+
+    Four layers are above the scene, more than are followed before the rest is path traced. They are above the
+    lamp, too: behind three layers Mitsuba's shadow rays take the surface of a near emitter for an occluder.
+    """
+    sun = '<emitter type="directional"><vector name="direction" x="-0.1" y="-0.9" z="-0.4"/></emitter>'
+    sky = (
+        '<emitter type="sunsky"><vector name="sun_direction" x="0.1" y="0.8" z="0.6"/>'
+        '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>'
+    )
+    layers = "".join(
+        f'<shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="90"/>'
+        f'<translate y="{4.1 + 0.1 * layer}"/></transform><bsdf type="mask">'
+        '<float name="opacity" value="0.2"/><bsdf type="diffuse"/></bsdf></shape>'
+        for layer in range(4)
+    )
     names = "diffuse", "roughplastic", "thindielectric", "one-sided, from behind", "glowing air"
     balls = {name: MATERIALS[name] for name in names}
-    renderer = opened_scene(tmp_path, balls, CONSTANT + sun, "volpath")
+    renderer = opened_scene(tmp_path, balls, sky + sun + layers, "volpath")
     camera = front_camera()
     ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
     shape_index = find_geometry(renderer, camera).shape_index.ravel()

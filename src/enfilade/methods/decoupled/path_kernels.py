@@ -159,12 +159,12 @@ class PathKernels:
         sample = self._renderer.sample_specular(point, sampler, branch=path.branch)
 
         # Extend the path; a broad lobe widens it.
-        lobe_width = dr.select(sample.bounce.is_delta, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
-        bounce = path.bounce and dr.select(sample.is_passed, path.bounce, sample.bounce)
+        is_narrow = sample.bounce.is_delta | sample.is_passed
+        lobe_width = dr.select(is_narrow, 0.0, ENTRY_LOBE_WIDTH * dr.rsqrt(sample.bounce.pdf))
         extended = Path(
             lane=_aov_lane(path, point, sample, transmitted_at),
             rays=sample.rays,
-            bounce=bounce or sample.bounce,
+            bounce=sample.bounce,
             throughput=Array3f(dr.select(sample.is_alive, path.throughput * sample.throughput, 0.0)),
             width=path.width_at(point),
             spread=dr.maximum(path.spread, lobe_width),
@@ -186,7 +186,7 @@ class PathKernels:
 
         A visible surface is that of the G-buffer, and emitters with sharp shadows are left out.
         """
-        sampler = path.sampler.fork(0)
+        sampler = path.sampler.copy()
 
         # Intersect, and sample the diffuse lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=is_visible)
@@ -231,7 +231,7 @@ class PathKernels:
 
     def _terminate(self, path: Path) -> Any:
         """Path trace the specular lobes at the next surface to their end."""
-        sampler = path.sampler.fork(0)
+        sampler = path.sampler.copy()
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         direct, indirect = self._renderer.estimate_specular(point, sampler, path_depth=MAX_PATH_DEPTH)
         return Array3f(path.throughput * (direct + indirect))

@@ -98,7 +98,7 @@ def compact(path: Path, chosen: Any) -> Path:
         bounces=dr.gather(UInt, path.bounces, index),
         branch=dr.gather(UInt, path.branch, index),
     )
-    dr.eval(taken)
+    dr.make_opaque(taken)  # a literal would be another signature of the kernels
     return taken
 
 

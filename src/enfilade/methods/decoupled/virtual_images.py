@@ -139,7 +139,7 @@ class VirtualImages:
             Whether the following surface may form another one.
         """
         # Scatter.
-        sampler = path.sampler.fork(0)
+        sampler = path.sampler.copy()
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
         sample = self._renderer.sample_specular(point, sampler, choice)
         ahead = replace(

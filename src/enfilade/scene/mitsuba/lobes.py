@@ -142,7 +142,7 @@ class Lobes:
     def sample_specular(
         self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, ...]:
-        """Direction, density, weight of a sample, and whether it is of a delta lobe, and a null interaction.
+        """Direction, density, weight of a sample; whether it is of a delta lobe, and if a null interaction.
 
         The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
         of its albedo as probability, so that the weight stays bounded where only one of them is large. A

@@ -43,10 +43,10 @@ from enfilade.scene.mitsuba.integrators import (
 from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.merge import merge_meshes
+from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS
 from enfilade.scene.mitsuba.shapes import Shapes, surface_class
 from enfilade.scene.mitsuba.transport import LightTransport
 
-NULL_LAYERS = 32  # null interactions along a ray before it gives up
 NULL_GBUFFER = 0.5  # transmittance above which a hit is a null interaction for the G-buffer
 NULL_PATH = 0.999  # ... and for a path
 
@@ -161,6 +161,7 @@ class MitsubaRenderer:
             emission=self._transport.emission(si, bounce),
             has_specular=self._lobes.has_specular(si, bsdf),
             specular_albedo=self._lobes.specular_albedo(si, bsdf),
+            bounce=bounce,
             native=si,
         )
 
@@ -238,21 +239,18 @@ class MitsubaRenderer:
         return si, distance
 
     def _beyond_lamps(self, ray: Any) -> Any:
-        """Camera rays that begin behind the lamps in front of everything else."""
+        """Camera rays that begin behind what they do not see in front of the first surface."""
 
-        def find(ray: Any, is_lamp: Any) -> Any:
-            return self._scene.ray_intersect(ray, int(mi.RayFlags.Minimal), Bool(True), is_lamp)
-
-        def continue_ray(ray: Any, is_lamp: Any, layer: Any) -> tuple[Any, ...]:
-            si = find(ray, is_lamp)
-            is_lamp = is_lamp & self._shapes.is_lamp(si)
-            return dr.select(is_lamp, si.spawn_ray(ray.d), ray), is_lamp, layer + 1
+        def continue_ray(ray: Any, is_null: Any, layer: Any) -> tuple[Any, ...]:
+            si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), is_null)
+            is_null = is_null & self._shapes.is_null(si, NULL_PATH)
+            return dr.select(is_null, si.spawn_ray(ray.d), ray), is_null, layer + 1
 
         ray, _, _ = dr.while_loop(
             (mi.Ray3f(ray), Bool(True), UInt(0)),
-            lambda _ray, is_lamp, layer: is_lamp & (layer < NULL_LAYERS),
+            lambda _ray, is_null, layer: is_null & (layer < NULL_LAYERS),
             continue_ray,
-            labels=("ray", "is_lamp", "layer"),
+            labels=("ray", "is_null", "layer"),
         )
         return ray
 
@@ -283,7 +281,7 @@ def _lane_sampler() -> Any:
             self.sampler: Any = None
 
         def next_1d(self, active: Any = True) -> Any:
-            del active  # all paths of a pixel draw as often
+            del active  # a dimension has one use in all paths of a pixel
             return self.sampler.next_1d()
 
         def next_2d(self, active: Any = True) -> Any:

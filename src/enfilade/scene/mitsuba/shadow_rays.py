@@ -9,7 +9,7 @@ import mitsuba as mi
 
 from enfilade.arrays import Bool, UInt
 
-MAX_LAYERS = 32  # null interactions along a shadow ray before it is blocked
+NULL_LAYERS = 32  # null interactions along a ray before it gives up
 
 
 class ShadowRays:
@@ -51,10 +51,10 @@ class ShadowRays:
             share = dr.select(active, share * mi.unpolarized_spectrum(passed), share)
             return hit.spawn_ray_to(target), share, active & (dr.max(share) > 0.0), layer + 1
 
-        _, share, _, layer = dr.while_loop(
+        _, share, is_blocked, _ = dr.while_loop(
             (mi.Ray3f(ray), mi.Color3f(1.0), Bool(active & is_blocked), UInt(0)),
-            lambda _ray, _share, active, layer: active & (layer < MAX_LAYERS),
+            lambda _ray, _share, active, layer: active & (layer < NULL_LAYERS),
             continue_ray,
             labels=("ray", "share", "active", "layer"),
         )
-        return dr.select(layer < MAX_LAYERS, share, 0.0)
+        return dr.select(is_blocked, 0.0, share)

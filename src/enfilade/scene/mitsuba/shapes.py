@@ -32,7 +32,7 @@ class Shapes:
     may_be_null : bool
         Whether any BSDF has null interactions.
     has_lamps : bool
-        Whether there are lamps. Camera rays pass them.
+        Whether there are lamps. Camera rays pass them, but for scenes with participating media.
     """
 
     def __init__(self, merged: MergedScene) -> None:
@@ -48,7 +48,8 @@ class Shapes:
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
         self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
         lamps = np.zeros(max(registry) + 1, bool)
-        lamps[registry] = [is_lamp(shape) for shape in shapes]
+        has_media = any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy)
+        lamps[registry] = [is_lamp(shape) and not has_media for shape in shapes]
         self._is_lamp = Bool(lamps)
         self.names = merged.names
         self.may_be_null = bool(dr.any(self._is_null))

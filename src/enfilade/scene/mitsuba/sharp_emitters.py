@@ -137,6 +137,6 @@ class SharpEmitters:
         return sample.emitter == mi.EmitterPtr(self._scene.environment())
 
     def _unoccluded(self, si: Any, target: Any, contribution: Any, active: Any) -> Any:
-        """A contribution from a point, 0 where an occluder is between."""
+        """A contribution from a point, times the transmittance in between."""
         share = self._shadow_rays.transmittance(si, target, active)
         return dr.select(active, contribution * Array3f(share), 0.0)

@@ -12,7 +12,7 @@ from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
-from enfilade.scene.mitsuba.shadow_rays import MAX_LAYERS, ShadowRays
+from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
@@ -27,7 +27,7 @@ class LightTransport:
     lobes
         Of its BSDFs.
     radiance
-        The path tracer: radiance along rays, from the rays, their random number generators, the path depth at
+        The path tracer: radiance along rays, from the rays, their samplers, the path depth at
         which they begin, and which of them are traced.
     pass_null
         Whether its shadow rays pass null interactions.
@@ -84,7 +84,7 @@ class LightTransport:
 
         _, _, unweighted, weighted, _, _ = dr.while_loop(
             (ray, Array3f(1), Array3f(0), Array3f(0), Bool(sample.is_alive), UInt(0)),
-            lambda *state: state[4] & (state[5] < MAX_LAYERS),
+            lambda *state: state[4] & (state[5] < NULL_LAYERS),
             add_hit,
             labels=("ray", "share", "unweighted", "weighted", "active", "layer"),
         )
@@ -133,14 +133,16 @@ class LightTransport:
         has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
         direct = self._next_event(si, bsdf, self._lobes.eval_specular, sampler, has_glossy)
         ray = si.spawn_ray(si.to_world(wo))
+        bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(False))
+        is_passed = Bool(is_null & self._shadow_rays.pass_null)
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
-            bounce=Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(False)),
+            bounce=dr.select(is_passed, point.bounce, bounce) if point.bounce else bounce,
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
             is_split=Bool(is_split & (branch is not None)),
-            is_passed=Bool(is_null & self._shadow_rays.pass_null),
+            is_passed=is_passed,
         )
 
     def _next_event(
