@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An office of instances: 850 objects, of which 770 are instances, 2 million triangles, 40 materials."""
+"""An office: 704 objects, most of them instances, 3.6 million triangles, 34 materials, 14 of them baked."""
 
 import random
 
