@@ -7,7 +7,7 @@ import random
 import bpy
 import numpy as np
 
-from corpus.stage import aim, camera, fill, image, light, new_file, node_of, shader, world
+from corpus.stage import aim, box, camera, fill, image, light, new_file, node_of, shader, world
 
 ROOMS, ROOM_M, HEIGHT_M = 3, 5.0, 2.7
 
@@ -56,19 +56,19 @@ def _print(x, y, number):
 
 def _room(x, paints, chance):
     """Floor, ceiling and walls, shelves of books, chairs, and bowls on a table."""
-    _box("floor", (x + 2.5, 1.0, -0.05), (ROOM_M, 6.0, 0.1), paints[1])
-    _box("ceiling", (x + 2.5, 1.0, HEIGHT_M), (ROOM_M, 6.0, 0.1), paints[2])
-    _box("wall", (x + 2.5, 4.0, HEIGHT_M / 2), (ROOM_M, 0.1, HEIGHT_M), paints[5])
+    box("floor", (x + 2.5, 1.0, -0.05), (ROOM_M, 6.0, 0.1), paints[1])
+    box("ceiling", (x + 2.5, 1.0, HEIGHT_M), (ROOM_M, 6.0, 0.1), paints[2])
+    box("wall", (x + 2.5, 4.0, HEIGHT_M / 2), (ROOM_M, 0.1, HEIGHT_M), paints[5])
     for shelf in range(5):
-        _box("shelf", (x + 2.5, 3.8, 0.4 + 0.4 * shelf), (3.0, 0.3, 0.03), paints[0])
+        box("shelf", (x + 2.5, 3.8, 0.4 + 0.4 * shelf), (3.0, 0.3, 0.03), paints[0])
         for book in range(27):
             size = (chance.uniform(0.03, 0.08), 0.2, chance.uniform(0.2, 0.32))
             place = (x + 1.05 + 0.11 * book, 3.78, 0.42 + 0.4 * shelf + size[2] / 2)
-            bevel = _box("book", place, size, chance.choice(paints)).modifiers.new("Bevel", "BEVEL")
+            bevel = box("book", place, size, chance.choice(paints)).modifiers.new("Bevel", "BEVEL")
             bevel.width, bevel.segments = 0.004, 2
     for seat in range(8):
         place = (x + 0.8 + 0.7 * (seat % 4), 0.6 + 1.2 * (seat // 4), 0.3)
-        soft = _box("chair", place, (0.5, 0.5, 0.6), chance.choice(paints)).modifiers.new("Soft", "SUBSURF")
+        soft = box("chair", place, (0.5, 0.5, 0.6), chance.choice(paints)).modifiers.new("Soft", "SUBSURF")
         soft.levels, soft.render_levels = 1, 6
     for bowl in range(20):
         bpy.ops.mesh.primitive_uv_sphere_add(
@@ -78,15 +78,6 @@ def _room(x, paints, chance):
         bpy.context.object.name = "bowl"
         bpy.context.object.data.materials.append(chance.choice(paints))
     light("POINT", "Bulb", (x + 2.5, 1.0, 2.2), 60.0, shadow_soft_size=0.08)
-
-
-def _box(name, place, size, material):
-    bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
-    obj = bpy.context.object
-    obj.name, obj.scale = name, size
-    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
-    obj.data.materials.append(material)
-    return obj
 
 
 def _daylight():

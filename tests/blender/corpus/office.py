@@ -6,7 +6,7 @@ import random
 import bpy
 import numpy as np
 
-from corpus.stage import add, aim, camera, fill, image, light, new_file, node_of, shader, world
+from corpus.stage import add, aim, box, camera, fill, image, light, new_file, node_of, shader, world
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 18.0, 8.0, 3.0
 PATTERNS = (  # procedural: kind of node, and its scales
@@ -75,31 +75,31 @@ def _cover(x, y, number):
 def _shell(paints):
     """Floor, ceiling, walls, a row of windows with frames, and glass between the desks."""
     middle = LENGTH_M / 2
-    _box("carpet", (middle, 4.0, -0.05), (LENGTH_M, DEPTH_M, 0.1), paints[0])
-    _box("ceiling", (middle, 4.0, HEIGHT_M), (LENGTH_M, DEPTH_M, 0.1), paints[34])
-    _box("brick wall", (middle, 0.0, HEIGHT_M / 2), (LENGTH_M, 0.1, HEIGHT_M), paints[3])
+    box("carpet", (middle, 4.0, -0.05), (LENGTH_M, DEPTH_M, 0.1), paints[0])
+    box("ceiling", (middle, 4.0, HEIGHT_M), (LENGTH_M, DEPTH_M, 0.1), paints[34])
+    box("brick wall", (middle, 0.0, HEIGHT_M / 2), (LENGTH_M, 0.1, HEIGHT_M), paints[3])
     for side, x in enumerate((0.0, LENGTH_M)):
-        _box("end wall", (x, 4.0, HEIGHT_M / 2), (0.1, DEPTH_M, HEIGHT_M), paints[35 + side])
-    _box("sill", (middle, DEPTH_M, 0.4), (LENGTH_M, 0.15, 0.8), paints[37])
+        box("end wall", (x, 4.0, HEIGHT_M / 2), (0.1, DEPTH_M, HEIGHT_M), paints[35 + side])
+    box("sill", (middle, DEPTH_M, 0.4), (LENGTH_M, 0.15, 0.8), paints[37])
     for i in range(13):
-        _box("mullion", (1.5 * i, DEPTH_M, 1.9), (0.08, 0.12, 2.2), paints[14])
+        box("mullion", (1.5 * i, DEPTH_M, 1.9), (0.08, 0.12, 2.2), paints[14])
     for i in range(3):
-        _box("partition", (4.5 + 4.5 * i, 5.0, 0.95), (0.02, 3.0, 1.9), paints["glass"])
+        box("partition", (4.5 + 4.5 * i, 5.0, 0.95), (0.02, 3.0, 1.9), paints["glass"])
 
 
 def _desks(paints, chance):
     """24 instances of a collection of 26 objects, and shelves along the brick wall."""
     parts = [
-        _box("top", (0.0, 0.0, 0.74), (1.4, 0.7, 0.03), paints[2]),
-        _box("monitor", (0.0, 0.22, 1.1), (0.6, 0.03, 0.36), paints[22]),
-        _box("screen", (0.0, 0.2, 1.1), (0.56, 0.012, 0.32), paints["screen"]),
-        _box("foot", (0.0, 0.22, 0.84), (0.08, 0.08, 0.18), paints[15]),
+        box("top", (0.0, 0.0, 0.74), (1.4, 0.7, 0.03), paints[2]),
+        box("monitor", (0.0, 0.22, 1.1), (0.6, 0.03, 0.36), paints[22]),
+        box("screen", (0.0, 0.2, 1.1), (0.56, 0.012, 0.32), paints["screen"]),
+        box("foot", (0.0, 0.22, 0.84), (0.08, 0.08, 0.18), paints[15]),
         *(
-            _box("leg", (0.65 * (-1) ** i, 0.3 * (-1) ** (i // 2), 0.37), (0.05, 0.05, 0.72), paints[16])
+            box("leg", (0.65 * (-1) ** i, 0.3 * (-1) ** (i // 2), 0.37), (0.05, 0.05, 0.72), paints[16])
             for i in range(4)
         ),
         *(
-            _box("paper", (-0.5 + 0.03 * i, -0.1, 0.76 + 0.006 * i), (0.2, 0.28, 0.005), paints[28 + i % 6])
+            box("paper", (-0.5 + 0.03 * i, -0.1, 0.76 + 0.006 * i), (0.2, 0.28, 0.005), paints[28 + i % 6])
             for i in range(10)
         ),
         *(
@@ -107,8 +107,8 @@ def _desks(paints, chance):
             for i in range(6)
         ),
     ]
-    seat = _box("seat", (0.0, -0.55, 0.48), (0.48, 0.48, 0.14), paints[1])
-    back = _box("back", (0.0, -0.78, 0.85), (0.44, 0.1, 0.6), paints[5])
+    seat = box("seat", (0.0, -0.55, 0.48), (0.48, 0.48, 0.14), paints[1])
+    back = box("back", (0.0, -0.78, 0.85), (0.44, 0.1, 0.6), paints[5])
     for cushion in (seat, back):
         soft = cushion.modifiers.new("Soft", "SUBSURF")
         soft.levels, soft.render_levels = 1, 6
@@ -119,10 +119,10 @@ def _desks(paints, chance):
     for i in range(40):
         size = (chance.uniform(0.04, 0.3), 0.24, chance.uniform(0.15, 0.32))
         place = (1.0 + 0.4 * i, 0.22, 1.2 + size[2] / 2 + 0.5 * (i % 2))
-        bevel = _box("binder", place, size, paints[chance.randrange(38)]).modifiers.new("Bevel", "BEVEL")
+        bevel = box("binder", place, size, paints[chance.randrange(38)]).modifiers.new("Bevel", "BEVEL")
         bevel.width, bevel.segments = 0.01, 3
     for height in (1.19, 1.69):
-        _box("shelf", (LENGTH_M / 2, 0.22, height), (LENGTH_M - 1.0, 0.3, 0.02), paints[9])
+        box("shelf", (LENGTH_M / 2, 0.22, height), (LENGTH_M - 1.0, 0.3, 0.02), paints[9])
 
 
 def _plants(paints):
@@ -131,7 +131,7 @@ def _plants(paints):
     leaf.scale, leaf.hide_render = (1.0, 0.5, 0.1), True
     for i in range(8):
         x = 2.0 + 2.1 * i
-        _box("pot", (x, 7.4, 0.2), (0.35, 0.35, 0.4), paints[6 + i])
+        box("pot", (x, 7.4, 0.2), (0.35, 0.35, 0.4), paints[6 + i])
         crown = _ball("crown", (x, 7.4, 0.85), 0.4, paints[24])
         crown.modifiers.new("Leaves", "NODES").node_group = _scatter(leaf)
 
@@ -180,15 +180,6 @@ def _lamps():
         ),
     )
     fill(tree, tree.nodes["Background"], {0: texture})
-
-
-def _box(name, place, size, material):
-    bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
-    obj = bpy.context.object
-    obj.name, obj.scale = name, size
-    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
-    obj.data.materials.append(material)
-    return obj
 
 
 def _ball(name, place, radius, material):

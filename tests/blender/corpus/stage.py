@@ -84,6 +84,14 @@ def cube(name, location, size, material):
     return finish(name, material)
 
 
+def box(name, location, size, material):
+    """A cuboid of a size along each axis, whose object has no scale."""
+    obj = cube(name, location, 1.0, material)
+    obj.scale = size
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    return obj
+
+
 def sphere(name, location, radius, material):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=64, ring_count=32)
     obj = finish(name, material)

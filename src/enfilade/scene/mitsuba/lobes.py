@@ -166,7 +166,7 @@ class Lobes:
         whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
         is_null = mi.has_flag(kind, mi.BSDFFlags.Null) & (~is_whole | by_bsdf)
-        is_delta = is_null | (mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_whole | by_bsdf))
+        is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_whole | by_bsdf)  # null interactions, too
 
         # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))

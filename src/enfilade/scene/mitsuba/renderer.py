@@ -198,7 +198,7 @@ class MitsubaRenderer:
             si = self._scene.ray_intersect(ray, Bool(active))
             distance = si.t
         else:
-            si, distance = self._intersect_beyond(ray, Bool(active), null_transmittance)
+            si, distance, _ = self._intersect_beyond(ray, Bool(active), null_transmittance)
 
         # Describe the surface; its normal faces the ray's origin.
         is_hit = si.is_valid()
@@ -215,44 +215,27 @@ class MitsubaRenderer:
         )
         return surfaces, si
 
-    def _intersect_beyond(self, ray: Any, active: Any, null_transmittance: float) -> tuple[Any, Any]:
-        """First interactions of rays that are not null interactions, and their distances."""
+    def _intersect_beyond(self, ray: Any, active: Any, null_transmittance: float) -> tuple[Any, Any, Any]:
+        """First interactions of rays that are not null interactions, their distances, and rays to them."""
         si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
         distance = Float(si.t)
         if not self._shapes.may_be_null:
-            return si, distance
+            return si, distance, ray
 
-        def continue_ray(si: Any, distance: Any, is_null: Any, layer: Any) -> tuple[Any, ...]:
-            next_si = self._scene.ray_intersect(
-                si.spawn_ray(ray.d), int(mi.RayFlags.All), Bool(False), is_null
-            )
+        def continue_ray(ray: Any, si: Any, distance: Any, is_null: Any, layer: Any) -> tuple[Any, ...]:
+            ray = dr.select(is_null, si.spawn_ray(ray.d), ray)
+            next_si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(False), is_null)
             distance = dr.select(is_null, distance + next_si.t, distance)
             si = dr.select(is_null, next_si, si)
-            return si, distance, is_null & self._shapes.is_null(si, null_transmittance), layer + 1
+            return ray, si, distance, is_null & self._shapes.is_null(si, null_transmittance), layer + 1
 
-        si, distance, _, _ = dr.while_loop(
-            (si, distance, self._shapes.is_null(si, null_transmittance), UInt(0)),
-            lambda _si, _distance, is_null, layer: is_null & (layer < NULL_LAYERS),
+        ray, si, distance, _, _ = dr.while_loop(
+            (mi.Ray3f(ray), si, distance, self._shapes.is_null(si, null_transmittance), UInt(0)),
+            lambda _ray, _si, _distance, is_null, layer: is_null & (layer < NULL_LAYERS),
             continue_ray,
-            labels=("si", "distance", "is_null", "layer"),
+            labels=("ray", "si", "distance", "is_null", "layer"),
         )
-        return si, distance
-
-    def _beyond_lamps(self, ray: Any) -> Any:
-        """Camera rays that begin behind what they do not see in front of the first surface."""
-
-        def continue_ray(ray: Any, is_null: Any, layer: Any) -> tuple[Any, ...]:
-            si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), is_null)
-            is_null = is_null & self._shapes.is_null(si, NULL_PATH)
-            return dr.select(is_null, si.spawn_ray(ray.d), ray), is_null, layer + 1
-
-        ray, _, _ = dr.while_loop(
-            (mi.Ray3f(ray), Bool(True), UInt(0)),
-            lambda _ray, is_null, layer: is_null & (layer < NULL_LAYERS),
-            continue_ray,
-            labels=("ray", "is_null", "layer"),
-        )
-        return ray
+        return si, distance, ray
 
     def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> Any:
         """Radiance along rays that continue paths of a depth."""
@@ -261,7 +244,7 @@ class MitsubaRenderer:
     def _radiance(self, rays: Rays, sampler: Any, integrator: Any = None, active: Any = True) -> Any:
         ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
         if integrator is None and self._shapes.has_lamps:
-            ray = self._beyond_lamps(ray)
+            *_, ray = self._intersect_beyond(ray, Bool(True), NULL_PATH)
         self._sampler.sampler = sampler
         integrator = integrator or self._integrator
         radiance, _, _ = integrator.sample(
