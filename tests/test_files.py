@@ -157,6 +157,23 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
     assert [entry.name for entry in out.parent.iterdir()] == ["scene"]
 
 
+def test_an_interrupted_replacement_leaves_the_older_folder(tmp_path, monkeypatch):
+    out, rename = tmp_path / "scene", Path.rename
+    with whole_folder(out) as beside:
+        (beside / "a.ply").touch()
+
+    def interrupted(place, target):
+        if target == out and place.name.startswith(".scene.writing-") and not (place / "a.ply").exists():
+            raise KeyboardInterrupt
+        return rename(place, target)
+
+    monkeypatch.setattr(Path, "rename", interrupted)
+    with pytest.raises(KeyboardInterrupt), whole_folder(out) as beside:
+        (beside / "b.ply").touch()
+    assert [entry.name for entry in out.iterdir()] == ["a.ply"]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
+
+
 def test_folders_of_killed_processes_are_swept(tmp_path):
     left = tmp_path / f".scene.writing-{socket.gethostname()}-4194400-00000000"
     (left / "meshes").mkdir(parents=True)

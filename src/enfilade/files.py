@@ -100,6 +100,8 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     except OSError as error:
         raise unwritable(folder, error) from error
     finally:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
         for place in (temporary, old):
             shutil.rmtree(place, ignore_errors=True)
 

@@ -33,6 +33,7 @@ from enfilade.methods.walkthrough import Walkthrough
 from enfilade.resource_limits import die_with
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import digest_of
 from enfilade.runs.job import Job
 from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
@@ -356,7 +357,7 @@ def _is_finished(job: Job, folder: Path) -> bool:
     """Whether a run folder holds the finished run of a job."""
     if not (folder / "summary.json").is_file():
         return False
-    return RunFolder.read(folder).identity in json.loads(json.dumps(job.identities()))
+    return digest_of(RunFolder.read(folder).identity) == digest_of(job.identity())
 
 
 def _render(job: Job, folder: Path, *, quiet: bool) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -73,8 +74,6 @@ def test_a_host_with_another_denoiser_is_refused(tmp_path, monkeypatch):
     run = RunFolder.read(tmp_path / "run")
     with pytest.raises(RunFolderError, match="or of the denoiser is not that with which the run began"):
         open_worker(job, run)
-    del run.identity["method"]["denoiser"]  # as runs of earlier versions
-    open_worker(job, run)
 
 
 @pytest.mark.parametrize(
@@ -101,3 +100,20 @@ def test_in_process_a_worker_is_kept_until_it_is_discarded(begun, tmp_path):
     assert "Traceback" in failure.log
     executor.discard(0)
     assert executor._worker is None
+
+
+def test_an_interrupt_that_a_loop_of_drjit_caught_ends_the_run(begun, monkeypatch):
+    error = RuntimeError("dr.while_loop(): encountered an exception")
+    error.__cause__ = KeyboardInterrupt()
+    monkeypatch.setattr("enfilade.runs.executor.open_worker", Mock(side_effect=error))
+    executor = InProcess(*begun)
+    executor.begin(0, Order(Task("analysis", 0)))
+    with pytest.raises(KeyboardInterrupt):
+        executor.wait(None)
+
+
+def test_a_time_limit_needs_processes(begun):
+    job, run = begun
+    job = dataclasses.replace(job, settings=job.settings.replace(LimitSettings, task_timeout_s=5.0))
+    with pytest.raises(SettingsError, match="add --executor processes"):
+        open_executor(job, run, Workers("in-process"))

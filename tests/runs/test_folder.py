@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -88,15 +89,30 @@ def test_another_run_is_refused_with_its_differences(folder):
     RunFolder.create(folder, {**IDENTITY, "path": {"frames": [1, 2, 3], "fps": 24}}).close()
 
 
-def test_a_run_of_an_earlier_version_is_continued(folder):
-    now, earlier = {**IDENTITY, "denoiser": "OIDN 2"}, {**IDENTITY, "denoiser": None}
-    RunFolder.create(folder, earlier).close()
-    with pytest.raises(RunFolderError, match=r'denoiser: null there, "OIDN 2" now'):
-        RunFolder.create(folder, now)
-    for lost in ("run.json", "ledger.jsonl", "none"):
-        (folder / lost).unlink(missing_ok=True)
-        with RunFolder.create(folder, now, earlier) as run:
-            assert run.identity == RunFolder.read(folder).identity == earlier
+def test_results_of_an_unknown_run_are_not_taken(folder):
+    with RunFolder.create(folder, IDENTITY) as run:
+        run.finish({"pass": "frames", "frame": 1, "files": {}})
+    (folder / "run.json").unlink()
+    RunFolder.create(folder, IDENTITY).close()  # the ledger names it, too
+    (folder / "run.json").unlink()
+    head, *lines = (folder / "ledger.jsonl").read_text().splitlines(keepends=True)
+    assert "identity" in head
+    (folder / "ledger.jsonl").write_text("".join(lines))
+    with pytest.raises(RunFolderError, match="results of a run that is not named"):
+        RunFolder.create(folder, IDENTITY)
+
+
+def test_a_folder_that_was_deleted_or_replaced_gets_no_results(folder):
+    line = {"pass": "frames", "frame": 1, "files": {}}
+    with RunFolder.create(folder, IDENTITY) as first:
+        shutil.rmtree(folder)
+        with pytest.raises(RunFolderError, match="was deleted or replaced"):
+            first.finish(line)
+        with RunFolder.create(folder, {**IDENTITY, "seed": 5}) as second:
+            with pytest.raises(RunFolderError, match="was deleted or replaced"):
+                first.finish(line)
+            second.finish(line)
+        assert [found["frame"] for found in RunFolder.read(folder).lines()] == [1]
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):

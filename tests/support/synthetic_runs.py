@@ -143,7 +143,8 @@ def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=Non
     }
     random = np.random.default_rng(1)
     with RunFolder.create(folder, {**known, **identity}) as run:
-        write_json(folder / "job.json", {"settings": Settings().to_tables()})
+        job = {"scene": {"file": "scene.xml"}, "settings": Settings().to_tables()}
+        write_json(folder / "job.json", job)
         analysis = [{"speed_deg_s": 0.5 * number} for number in FRAMES]
         _finish(run, "analysis", FRAMES[0], {"frames": analysis})
         for number in FRAMES if finished is None else finished:

@@ -8,8 +8,8 @@ from enfilade.errors import SettingsError
 from enfilade.methods.base import Method
 
 METHODS = {
-    "decoupled": "enfilade.methods.decoupled:Decoupled",
-    "paper": "enfilade.methods.paper:Paper",
+    "decoupled": "enfilade.methods.decoupled.method:Decoupled",
+    "paper": "enfilade.methods.paper.method:Paper",
     "reference": "enfilade.methods.reference:Reference",
 }
 
@@ -41,17 +41,20 @@ def open_method(name: str) -> Method:
     return kind()
 
 
-def name_of(method: str | Method | type[Method]) -> str:
+def name_of(kind: str | type[Method]) -> str:
     """The name by which :func:`open_method` finds a method in any process.
 
     Raises
     ------
     SettingsError
-        Its class is not at the top level of an importable module.
+        It is no class, or not at the top level of an importable module.
     """
-    if isinstance(method, str):
-        return method
-    kind = method if isinstance(method, type) else type(method)
+    if isinstance(kind, str):
+        return kind
+    if not isinstance(kind, type):
+        raise SettingsError(
+            f"{kind!r} is no class: give the class of a method; its settings go into tables of their own"
+        )
     if kind.__module__ == "__main__" or "." in kind.__qualname__:
         raise SettingsError(
             f"the method {kind.__qualname__} must be a class at the top level of a module that worker "

@@ -18,7 +18,7 @@ class Reference(Method):
     """Path tracing."""
 
     name = "reference"
-    revision = 3
+    revision = 4
     settings = (TraceSettings, SamplingSettings, ReferenceSettings)
     passes = (Pass(FRAMES, Frame),)
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from enfilade.comparison import CompareOptions
 from enfilade.errors import ImageError, RunFolderError, SceneError
-from enfilade.files import read_json
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
 from enfilade.records import F32, U8, Flow
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.identity import RUN_FILE
-from enfilade.runs.job import JOB_FILE
+from enfilade.runs.job import JOB_FILE, read_table
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.lock import holder_of
 from enfilade.runs.statistics import statistics
@@ -91,7 +90,7 @@ class ReportedRun:
         self.numbers: tuple[int, ...] = tuple(path["frames"])
         self._starts = {self.numbers[0], *path["cuts"]}
         self.there = tuple(i for i, number in enumerate(self.numbers) if self._run.line(FRAMES, number))
-        job = _job(folder)
+        job = read_table(folder)
         self.viewing_settings, self.video = _settings(job, folder)
         self.viewing = CompareOptions(viewing=self.viewing_settings).conditions(
             tuple(path["size"]), path["fps"]
@@ -152,12 +151,6 @@ class ReportedRun:
         return Flow(
             backward, forward, has_backward=self.numbers[index] not in self._starts, has_forward=has_forward
         )
-
-
-def _job(folder: Path) -> dict[str, Any]:
-    """The job file, unchecked."""
-    found = read_json(folder / JOB_FILE)
-    return found if isinstance(found, dict) else {}
 
 
 def _settings(job: dict[str, Any], folder: Path) -> tuple[ViewingSettings, VideoSettings]:

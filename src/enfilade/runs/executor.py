@@ -13,6 +13,7 @@ from enfilade.errors import RunFolderError, SettingsError
 from enfilade.methods.base import Task
 from enfilade.runs.failure import Failure
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import digest_of
 from enfilade.runs.job import Job
 from enfilade.runs.worker import Worker
 from enfilade.settings import LimitSettings
@@ -158,7 +159,10 @@ class InProcess:
                 self._worker = open_worker(self._job, self._run, order.reduction)
                 self._reduction = order.reduction
             return [Ended(0, self._worker.do(order.task))]
-        except Exception as error:  # noqa: BLE001  (the scheduler decides)
+        except Exception as error:
+            # Dr.Jit makes another error of an interrupt in a loop that it records.
+            if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+                raise KeyboardInterrupt from error
             return [Ended(0, Failure.of(error, traceback.format_exc()))]
 
     def discard(self, slot: int) -> None:
@@ -181,7 +185,7 @@ def open_worker(job: Job, run: RunFolder, reduction: int = 1) -> Worker:
     RunFolderError
         This host would render another result: another scene, version or device.
     """
-    if run.identity not in job.identities():
+    if digest_of(run.identity) != digest_of(job.identity()):
         raise RunFolderError(
             f"{run.folder}: the scene, the device, or the version of enfilade, of the renderer or of the "
             "denoiser is not that with which the run began; `enfilade render` lists the differences"

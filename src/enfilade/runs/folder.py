@@ -62,15 +62,14 @@ class RunFolder:
             self.notes.append(f"{LEDGER_FILE}: line {numbers} is damaged and left out")
 
     @classmethod
-    def create(cls, folder: Path, *identities: Mapping[str, Any]) -> Self:
+    def create(cls, folder: Path, identity: Mapping[str, Any]) -> Self:
         """Begin a run in a new or empty folder, or continue the same run.
 
         Parameters
         ----------
         folder
-        identities
-            Everything on which the results depend, fit for JSON; then other forms of it, in which runs of
-            earlier versions have it.
+        identity
+            Everything on which the results depend, fit for JSON.
 
         Raises
         ------
@@ -79,19 +78,15 @@ class RunFolder:
             it.
         NoSpaceError
         """
-        forms: list[dict[str, Any]] = json.loads(json.dumps(identities, allow_nan=False))
-        wanted = forms[0]
+        wanted: dict[str, Any] = json.loads(json.dumps(identity, allow_nan=False))
         check_place(folder)
         lock = Lock(folder)
         try:
             run = cls(folder, wanted, lock)
             known = run._ledger.head
-            for form in forms:
-                if digest_of(form) == known.get("identity") or _has_identity(folder, form):
-                    run.identity = wanted = form
             head = {"format": FORMAT, "identity": digest_of(wanted)}
             if known != head:
-                check_same(folder, wanted, is_begun=bool(known))
+                check_same(folder, wanted, is_begun=bool(known), has_results=any(run.lines()))
             if not _has_identity(folder, wanted):
                 write_json(folder / RUN_FILE, {"format": FORMAT, "identity": wanted})
             run._ledger.write_head(head)
@@ -181,7 +176,10 @@ class RunFolder:
         Raises
         ------
         RunFolderError, NoSpaceError
+            The folder was deleted or replaced; or it can't be written.
         """
+        if self.lock is not None:
+            self.lock.check()
         earlier = self.recorded(line["pass"], line["frame"]) or {"files": ()}
         self._ledger.append(line)
         for name in earlier["files"]:

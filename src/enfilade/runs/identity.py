@@ -70,7 +70,7 @@ def identity_of(folder: Path) -> dict[str, Any]:
     return identity
 
 
-def check_same(folder: Path, now: dict[str, Any], *, is_begun: bool) -> None:
+def check_same(folder: Path, now: dict[str, Any], *, is_begun: bool, has_results: bool) -> None:
     """Refuse a folder that holds another run, and list the differences.
 
     Parameters
@@ -80,13 +80,20 @@ def check_same(folder: Path, now: dict[str, Any], *, is_begun: bool) -> None:
         Identity of the run that is wanted.
     is_begun
         Whether the ledger names another identity, or one of another format.
+    has_results
+        Whether it has finished tasks.
 
     Raises
     ------
     RunFolderError
-        It does, or its identity is damaged.
+        It does, or its identity is damaged, or results have none.
     """
     if not is_begun and not (folder / RUN_FILE).exists():
+        if has_results:
+            raise RunFolderError(
+                f"{folder} has results of a run that is not named: {RUN_FILE} and the first line of "
+                f"{LEDGER_FILE} are missing; choose another --out, or delete {folder} to begin anew"
+            )
         return
     before, after = _flat(identity_of(folder)), _flat(now)
     keys = [key for key in {**before, **after} if before.get(key, ABSENT) != after.get(key, ABSENT)]

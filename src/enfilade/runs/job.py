@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +16,7 @@ from enfilade import __version__
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import CENTRE, Camera
 from enfilade.errors import RunFolderError, SettingsError
-from enfilade.files import read_json
+from enfilade.files import read_json, write_json
 from enfilade.images import check_encodable
 from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
@@ -98,25 +100,13 @@ class Job:
             "settings": settings.to_tables([*method.settings, OutputSettings]),
         }
 
-    def identities(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The identity, and as runs of earlier versions have it: without libraries, and with layers as given.
-
-        Raises
-        ------
-        SceneError, SettingsError
-            As :meth:`identity`.
-        """
-        now, method = self.identity(), self.opened_method()
-        earlier = {"name": method.name, "revision": method.revision}
-        settings = self.settings.to_tables([*method.settings, OutputSettings])
-        return now, {**now, "method": earlier, "settings": settings}
-
     @cached_property
     def video_identity(self) -> dict[str, Any]:
         """Everything on which the video depends beside the frames: clips of another one are encoded again."""
         settings = self.settings[VideoSettings]
         exposure_ev = self.settings[ViewingSettings].exposure_ev
-        return {**settings.to_table(), **view_identity(settings), "exposure_ev": exposure_ev}
+        table = {name: value for name, value in settings.to_table().items() if name != "ocio"}  # a path
+        return {**table, **view_identity(settings), "exposure_ev": exposure_ev}
 
     def check(self) -> None:
         """Refuse everything that can be known to be wrong before the scene is loaded.
@@ -202,7 +192,7 @@ class Job:
         path = table["path"]
         width, height = map(int, path["size"])
         poses = np.array(path["poses"], np.float64).reshape(-1, 4, 4)
-        points = path.get("principal_points", [CENTRE] * len(poses))  # absent in runs of earlier versions
+        points = path["principal_points"]
         cameras = tuple(
             Camera(pose, float(fov), width, height, (float(x), float(y)))
             for pose, fov, (x, y) in zip(poses, path["fov_deg"], points, strict=True)
@@ -230,15 +220,66 @@ def read_job(folder: Path) -> Job:
     file = folder / JOB_FILE
     if not file.is_file():
         raise RunFolderError(f"{folder} holds no run; begin one with `enfilade render SCENE --out {folder}`")
-    table = read_json(file)
+    table = read_table(folder)
     try:
         return Job.from_json(table)
     except SettingsError:  # a method that can't be imported here, or an unknown setting
         raise
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise RunFolderError(
-            f"{file} is damaged ({error}); run the command that made the run again"
-        ) from error
+        raise _damaged(file, error) from error
+
+
+def write_job(folder: Path, job: Job) -> None:
+    """Write the job of a run folder, unless it is there.
+
+    Files in the folder, as those of an imported scene, are named by their places in it: it may be moved.
+
+    Raises
+    ------
+    RunFolderError, NoSpaceError
+    """
+    home = folder.resolve()
+
+    def in_folder(name: str) -> str:
+        return str(Path(name).relative_to(home)) if Path(name).is_relative_to(home) else name
+
+    table = _relocated(job.to_json(), in_folder)
+    with suppress(RunFolderError):  # there is none yet, or it is damaged
+        if read_json(folder / JOB_FILE) == table:
+            return
+    write_json(folder / JOB_FILE, table)
+
+
+def read_table(folder: Path) -> dict[str, Any]:
+    """The job of a run folder as plain values, with absolute names of files.
+
+    Raises
+    ------
+    RunFolderError
+        It can't be read, or is damaged.
+    """
+    file = folder / JOB_FILE
+    try:
+        return _relocated(read_json(file), lambda name: str(folder.resolve() / name))
+    except (AttributeError, LookupError, TypeError) as error:
+        raise _damaged(file, error) from error
+
+
+def _relocated(table: dict[str, Any], place: Callable[[str], str]) -> dict[str, Any]:
+    """A job as plain values, with the files of its scene and view at other places."""
+    scene, video = table["scene"], table["settings"]["video"]
+    return {
+        **table,
+        "scene": {**scene, "file": place(scene["file"])},
+        "settings": {
+            **table["settings"],
+            "video": {**video, "ocio": place(video["ocio"]) if video.get("ocio") else ""},
+        },
+    }
+
+
+def _damaged(file: Path, error: Exception) -> RunFolderError:
+    return RunFolderError(f"{file} is damaged ({error}); run the command that made the run again")
 
 
 def path_identity(path: CameraPath) -> dict[str, Any]:

@@ -70,6 +70,15 @@ class Lock:
             size = os.pwrite(self._handle, data, 0)
         os.ftruncate(self._handle, size)
 
+    def check(self) -> None:
+        """Raise RunFolderError if the folder was deleted or replaced: its lock is another one, or is gone."""
+        try:
+            is_same = os.path.samestat(os.fstat(self._handle), (self._folder / LOCK_FILE).stat())
+        except FileNotFoundError:
+            is_same = False
+        if not is_same:
+            raise RunFolderError(f"{self._folder} was deleted or replaced while this command worked in it")
+
     def release(self) -> None:
         """Let others write. A second call does nothing."""
         if self._handle >= 0:

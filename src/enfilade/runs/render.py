@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
-from enfilade.files import read_json, write_json
+from enfilade.errors import SettingsError, UnfinishedError
+from enfilade.files import write_json
 from enfilade.images.codecs import odd_size_note
 from enfilade.methods.base import Task
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder, check_place
-from enfilade.runs.job import JOB_FILE, Job, read_job
+from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
@@ -198,26 +198,18 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
         check_place(folder)
         if has_preflight and not (folder / LEDGER_FILE).exists():
             job.preflight()
-        run = RunFolder.create(folder, *job.identities())
+        run = RunFolder.create(folder, job.identity())
     except BaseException:
         for place in made:
             with suppress(OSError):
                 place.rmdir()
         raise
     try:
-        _write_job(folder, job)
+        write_job(folder, job)
     except BaseException:
         run.close()
         raise
     return run
-
-
-def _write_job(folder: Path, job: Job) -> None:
-    table = job.to_json()
-    with suppress(RunFolderError):  # there is none yet, or it is damaged
-        if read_json(folder / JOB_FILE) == table:
-            return
-    write_json(folder / JOB_FILE, table)
 
 
 def _video_notes(job: Job) -> list[str]:

@@ -52,9 +52,13 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
             "--set limits.preflight_s"
         )
     if done.returncode:
+        *_, last = ("", *done.stderr.strip().splitlines())
+        bound = "the memory of the GPU"
+        if not variant.startswith("cuda"):
+            bound = f"{limits.preflight_mb} MB of memory (--set limits.preflight_mb)"
         raise SceneError(
-            f"{scene} was too much for the preflight process (exit code {done.returncode}, "
-            f"{limits.preflight_mb} MB of memory): it is damaged, or needs more (--set limits.preflight_mb)"
+            f"{scene} was too much for the preflight process (exit code {done.returncode}{last and ': '}"
+            f"{last}): it is damaged, or needs more than {bound}"
         )
     answer = json.loads(done.stdout)
     if answer["error"]:

@@ -40,7 +40,7 @@ class Paper(Method):
     """The published method."""
 
     name = "paper"
-    revision = 5
+    revision = 6
     settings = (
         TraceSettings,
         SamplingSettings,
