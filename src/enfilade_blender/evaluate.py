@@ -20,7 +20,6 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
 
 ENGINE = "ENFILADE_EXPORT"
-SURFACES = ("MESH", "CURVE", "SURFACE", "FONT", "META")
 NOT_CARRIED = {
     "CURVES": "hair curves",
     "POINTCLOUD": "a point cloud",
@@ -123,10 +122,10 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         elif obj.type in NOT_CARRIED:
             what = f"{NOT_CARRIED[obj.type]} can't be exported"
             notes.add("not-carried", obj.name, "Object", what, "it is missing from the picture")
-        elif obj.type in SURFACES:
-            key = (_name(instance), obj.name_full, obj.data.as_pointer() if obj.data else 0)
+        elif isinstance(obj.data, bpy.types.Mesh):  # text, curves and metaballs have an instance of one
+            key = (_name(instance), obj.name_full, obj.data.as_pointer())
             if key not in by_key:
-                by_key[key] = _place(instance, graph, notes)
+                by_key[key] = _place(instance, notes)
             placed = by_key[key]
             if placed is not None:
                 placed.matrices.append(matrix)
@@ -161,11 +160,11 @@ def _too_many(limits: Limits, name: str) -> ExportError:
     return ExportError(what, name, advice)
 
 
-def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
+def _place(instance: Any, notes: Notes) -> Placed | None:
     obj = instance.object
     _note_object(obj, notes)
-    mesh = read_mesh(obj, graph)
-    if mesh is None or len(mesh) == 0:
+    mesh = read_mesh(obj.data)
+    if len(mesh) == 0:
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)
     return Placed(
@@ -178,10 +177,9 @@ def _place(instance: Any, graph: Any, notes: Notes) -> Placed | None:
 
 
 def _name(instance: Any) -> str:
-    obj = instance.object
-    return (
-        f"{instance.parent.name}: {obj.name}" if instance.is_instance and instance.parent else str(obj.name)
-    )
+    obj, parent = instance.object, instance.parent
+    is_part = instance.is_instance and parent is not None and parent.name != obj.name
+    return f"{parent.name}: {obj.name}" if is_part else str(obj.name)
 
 
 def _note_linking(obj: Any, notes: Notes) -> None:

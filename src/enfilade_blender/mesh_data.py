@@ -10,25 +10,14 @@ import numpy as np
 from enfilade_blender.ply import F32, Mesh
 
 
-def read_mesh(obj: Any, graph: Any) -> Mesh | None:
-    """Triangles of an evaluated object, with normals, UV maps and colours; None without a surface.
+def read_mesh(data: Any) -> Mesh:
+    """Triangles of an evaluated mesh, with normals, UV maps and colours.
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        Evaluated.
-    graph : bpy.types.Depsgraph
+    data : bpy.types.Mesh
     """
-    data = obj.to_mesh(preserve_all_data_layers=True, depsgraph=graph)
-    if data is None:
-        return None
     data.calc_loop_triangles()
-    mesh = _arrays(data)
-    obj.to_mesh_clear()
-    return mesh
-
-
-def _arrays(data: Any) -> Mesh:
     count = len(data.loop_triangles)
     loops = _get(data.loop_triangles, "loops", np.int32, count * 3)
     polygons = _get(data.loop_triangles, "polygon_index", np.int32, count)

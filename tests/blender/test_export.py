@@ -22,6 +22,8 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 FILES = (
     "modifiers",
     "instances",
+    "instances_of_meshes",
+    "curves",
     "markers",
     "lens_shift",
     "agx",
@@ -95,6 +97,23 @@ def test_instances_are_shapes_of_their_instancers(exported):
     points = np.array(parameters["vertex_positions"]).reshape(-1, 3)
     normals = np.array(parameters["vertex_normals"]).reshape(-1, 3)
     assert (np.einsum("ij,ij->i", points - points.mean(axis=0), normals) > 0.0).all()
+
+
+def test_meshes_that_geometry_nodes_make_are_instances(exported):
+    found = shapes(exported("instances_of_meshes")[0])
+    ball, box = 64 * 30 * 2 + 64 * 2, 12
+    counts = sorted(shape.face_count() for name, shape in found.items() if name.startswith("Pedestal"))
+    pedestal, *_ = counts
+    assert pedestal == 2  # of one alone: the other has no surface
+    assert counts[1:] == sorted(2 * [15 * ball, 15 * box])
+
+
+def test_text_curves_surfaces_and_metaballs_are_meshes(exported):
+    found = shapes(exported("curves")[0])
+    assert {"Text", "Tube", "Tube again", "Surface", "Drop"} <= set(found)
+    assert "Drop.001" not in found  # is a part of the first
+    assert len(found) == 8  # with floor, wall and lamp: none twice
+    assert found["Tube"].face_count() == found["Tube again"].face_count() > 1000
 
 
 def test_a_marker_is_a_cut(exported):

@@ -10,6 +10,7 @@ from corpus.stage import (
     aim,
     camera,
     cube,
+    finish,
     image,
     new_file,
     plane,
@@ -77,6 +78,59 @@ def geometry_nodes(folder):
     tree.links.new(start.outputs[0], join.inputs[0])
     tree.links.new(join.outputs[0], end.inputs[0])
     ground.modifiers.new("Scatter", "NODES").node_group = tree
+
+
+def instances_of_meshes(folder):
+    """Geometry nodes that make what they scatter, with the surface that they scatter it on and without."""
+    stage()
+    red = principled("red", (0.7, 0.15, 0.1, 1), Roughness=0.5)
+    green = principled("green", (0.1, 0.5, 0.15, 1), Roughness=0.5)
+    lent = sphere("Lent", (0.0, 0.0, -5.0), 0.15, green)
+    lent.hide_render = True
+    for x, has_surface in ((-1.1, True), (1.1, False)):
+        ground = plane("Pedestal", (x, 0.0, 0.4), 1.6, principled("pedestal", Roughness=0.9))
+        tree = bpy.data.node_groups.new("Cubes", "GeometryNodeTree")
+        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+        points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
+        points.inputs["Density"].default_value = 6.0
+        box, painted = tree.nodes.new("GeometryNodeMeshCube"), tree.nodes.new("GeometryNodeSetMaterial")
+        box.inputs["Size"].default_value = (0.2, 0.2, 0.2)
+        painted.inputs["Material"].default_value = red
+        info = tree.nodes.new("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = lent, False
+        made, lents, join = (tree.nodes.new(f"GeometryNode{n}") for n in (*["InstanceOnPoints"] * 2, "JoinGeometry"))
+        tree.links.new(start.outputs[0], points.inputs["Mesh"])
+        tree.links.new(box.outputs["Mesh"], painted.inputs["Geometry"])
+        for copies, source in ((made, painted.outputs[0]), (lents, info.outputs["Geometry"])):
+            tree.links.new(points.outputs["Points"], copies.inputs["Points"])
+            tree.links.new(source, copies.inputs["Instance"])
+            tree.links.new(copies.outputs[0], join.inputs[0])
+        lents.inputs["Scale"].default_value = (0.5, 0.5, 2.5)
+        if has_surface:
+            tree.links.new(start.outputs[0], join.inputs[0])
+        tree.links.new(join.outputs[0], end.inputs[0])
+        ground.modifiers.new("Cubes", "NODES").node_group = tree
+
+
+def curves(folder):
+    """Text, a tube along a curve, a surface of NURBS and a metaball, one of them twice."""
+    stage()
+    bpy.ops.object.text_add(location=(-2.2, 0.0, 0.3), rotation=(1.3, 0.0, 0.0))
+    text = finish("Text", principled("letters", (0.7, 0.3, 0.1, 1), Roughness=0.4))
+    text.data.body, text.data.extrude, text.data.size = "Grüße", 0.08, 0.8
+    bpy.ops.curve.primitive_bezier_circle_add(radius=0.5, location=(0.6, 0.0, 0.6), rotation=(1.2, 0.0, 0.3))
+    tube = finish("Tube", principled("tube", (0.1, 0.3, 0.7, 1), Roughness=0.3))
+    tube.data.bevel_depth = 0.1
+    again = add("Tube again", tube.data, (1.6, 0.6, 0.5))
+    again.scale = (0.8, 0.8, 0.8)
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(radius=0.35, location=(1.7, -0.6, 0.36))
+    finish("Surface", principled("surface", (0.2, 0.6, 0.3, 1), Roughness=0.5))
+    bpy.ops.object.metaball_add(type="BALL", radius=0.5, location=(-0.9, -1.0, 0.35))
+    finish("Drop", principled("drop", (0.6, 0.6, 0.2, 1), Roughness=0.4))
+    bpy.ops.object.metaball_add(type="BALL", radius=0.4, location=(-0.5, -1.0, 0.3))
+    bpy.context.object.name = "Drop.001"
 
 
 def markers(folder):
