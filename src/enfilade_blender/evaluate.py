@@ -36,6 +36,7 @@ SETTINGS = {  # of a render of nothing
     "use_multiview": False,
     "use_compositing": False,
     "use_sequencer": False,
+    "use_freestyle": False,  # it draws with EEVEE, and its modules run scripts
 }
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 RAYS_OF_LAMPS = ("diffuse", "glossy", "transmission")
@@ -112,6 +113,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         result.instances += 1
         if result.instances > limits.instances:
             raise _too_many(limits, instance.parent.name if instance.parent else obj.name)
+        _note_hair(obj, notes)
         if not instance.show_self:
             continue
         matrix = np.array(instance.matrix_world, np.float64)
@@ -162,7 +164,7 @@ def _too_many(limits: Limits, name: str) -> ExportError:
 
 def _place(instance: Any, notes: Notes) -> Placed | None:
     obj = instance.object
-    _note_object(obj, notes)
+    _note_object(instance, notes)
     mesh = read_mesh(obj.data)
     if len(mesh) == 0:
         return None
@@ -200,11 +202,20 @@ def _note_rays(obj: Any, rays: tuple[str, ...], effect: str, notes: Notes) -> No
         notes.add("not-carried", obj.name, "Ray visibility", what, effect)
 
 
-def _note_object(obj: Any, notes: Notes) -> None:
+def _note_object(instance: Any, notes: Notes) -> None:
+    obj, placed = instance.object, instance.parent or instance.object  # an instancer's visibility counts
     _note_linking(obj, notes)
     _note_rays(obj, RAYS, "it is visible to all rays", notes)
-    if getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False):
-        notes.add("not-carried", obj.name, "Shadow catcher or holdout", "an ordinary object", "it is visible")
+    if placed != obj:
+        _note_rays(placed, RAYS, "its instances are visible to all rays", notes)
+    layer, original = bpy.context.view_layer, placed.original
+    catches = getattr(obj, "is_shadow_catcher", False) or getattr(obj, "is_holdout", False)
+    if catches or original.holdout_get(view_layer=layer) or original.indirect_only_get(view_layer=layer):
+        what = "Shadow catcher, holdout or indirect only"
+        notes.add("not-carried", placed.name, what, "an ordinary object", "it is visible")
+
+
+def _note_hair(obj: Any, notes: Notes) -> None:
     for system in getattr(obj, "particle_systems", ()):
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             what = "hair can't be exported"

@@ -11,6 +11,7 @@ import bpy
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.job import Job
+from enfilade_blender.left_out import note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
@@ -20,7 +21,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import LAMP, Element, named, plugin, write_scene
 from enfilade_blender.shapes import Shapes
-from enfilade_blender.visibility import note_sun
+from enfilade_blender.visibility import note_clipping, note_sun
 from enfilade_blender.world import environment
 
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
@@ -40,18 +41,21 @@ def export(job: Job) -> dict[str, Any]:
     check_size(selection, job.limits)
     report_progress(0.05, "cameras")
     note_motion(selection, notes)
-    _note_settings(job, selection, notes)
+    note_settings(job, selection, notes)
     views = read_views(selection, notes)
     if views:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
     report_progress(0.1, "meshes")
     evaluated = evaluate(selection, job.limits, notes)
+    note_inputs(selection, notes)
     report_progress(0.3, "materials")
     shapes = Shapes(job, selection, views, notes)
     elements = shapes.write(evaluated.placed)
+    note_light(selection, notes, has_glass=bool(shapes.kinds & GLASS))
     report_progress(0.9, "lights")
     lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
     note_sun(sun, views, selection, notes)
+    note_clipping(views, selection, notes)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)
@@ -91,35 +95,6 @@ def _facts(job: Job, selection: Selection) -> dict[str, Any]:
             "look": view.look,
         },
     }
-
-
-def _note_settings(job: Job, selection: Selection, notes: Notes) -> None:
-    """Note settings of the scene's view, frames and view layers that nothing carries."""
-    scene = selection.scene
-    view, render = scene.view_settings, scene.render
-    settings = {
-        "Gamma": abs(view.gamma - 1.0) > 1e-4,
-        "Curves": view.use_curve_mapping,
-        "White balance": getattr(view, "use_white_balance", False),  # from Blender 4.3 on
-    }
-    for name in (name for name, is_used in settings.items() if is_used):
-        what, effect = f"{name.lower()} of the view is left out", "the tones of the picture differ"
-        notes.add("not-carried", scene.name, f"Color Management: {name}", what, effect)
-    if scene.frame_step != 1:
-        what, effect = f"its step of {scene.frame_step} is left out", "every frame is rendered"
-        notes.add("not-carried", scene.name, "Frame Step", what, effect)
-    if render.use_border and render.use_crop_to_border:
-        what, effect = "its crop to the render region is left out", "the whole frame is rendered"
-        notes.add("not-carried", scene.name, "Render Region", what, effect)
-    layer = selection.view_layer
-    for name in ("material_override", "world_override"):  # Blender 4.2 has none of the world
-        if getattr(layer, name, None) is not None:
-            what, effect = f"its {name.replace('_', ' ')} is left out", "materials and world are the scene's"
-            notes.add("not-carried", layer.name, "Override", what, effect)
-    for other in scene.view_layers:
-        if other.use and other != layer and not job.view_layer:
-            what = f"of several view layers {layer.name} is used"
-            notes.add("not-carried", other.name, "", what, "choose this one by blender.view_layer")
 
 
 def _integrator(selection: Selection, kinds: set[str], *, is_volumetric: bool) -> Element:

@@ -14,6 +14,7 @@ from enfilade_blender.records import Selection
 SAMPLES = 5  # frames at which poses are compared
 LISTED = 20  # objects that are named
 TOLERANCE = 1e-5
+SIZES = ("shadow_soft_size", "size", "size_y", "spot_size", "spot_blend", "angle")  # of lamps
 DEFORMING = ("ARMATURE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY", "OCEAN", "WAVE", "FLUID")
 
 
@@ -33,11 +34,14 @@ def note_motion(selection: Selection, notes: Notes) -> None:
         notes.add("not-carried", name, "Animation", "its deformation is left out", effect)
     for name in _changing(lights):
         notes.add("not-carried", name, "Animation", "the change of its light is left out", effect)
-    world = selection.scene.world
+    world, lamps = selection.scene.world, [lamp for lamp in bpy.data.lights if lamp.users and lamp.use_nodes]
     used = [material for material in bpy.data.materials if material.users] + ([world] if world else [])
-    for data in used:
-        if any(_is_animated(part) for part in (data, data.node_tree)):
+    for data in used + lamps:
+        if any(map(_is_animated, [*([] if data in lamps else [data]), *_trees(data.node_tree)])):
             notes.add("not-carried", data.name, "Animation", "its animation is left out", effect)
+    for image in bpy.data.images:
+        if image.users and image.source in ("SEQUENCE", "MOVIE"):
+            notes.add("not-carried", image.name, "Animation", "its motion is left out", effect)
     rest = max(len(moving) - LISTED, 0) + max(len(deforming) - LISTED, 0)
     if rest:
         notes.add("not-carried", f"{rest} further objects", "Animation", "their motion is left out", effect)
@@ -45,12 +49,17 @@ def note_motion(selection: Selection, notes: Notes) -> None:
 
 
 def _state(selection: Selection, frame: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Poses of objects, and power and colour of lamps, by name."""
+    """Poses and visibility of objects, and power, colour and size of lamps, by name."""
     selection.scene.frame_set(frame)
     objects = [obj for obj in selection.scene.objects if obj.type != "CAMERA"]
     lamps = [obj for obj in objects if obj.type == "LIGHT"]
-    lights = {obj.name: np.array([obj.data.energy, *obj.data.color]) for obj in lamps}
-    return {obj.name: np.array(obj.matrix_world) for obj in objects}, lights
+    lights = {
+        obj.name: np.array(
+            [obj.data.energy, *obj.data.color, *(float(getattr(obj.data, name, 0.0)) for name in SIZES)]
+        )
+        for obj in lamps
+    }
+    return {obj.name: np.append(np.array(obj.matrix_world), obj.hide_render) for obj in objects}, lights
 
 
 def _changing(states: tuple[dict[str, np.ndarray], ...]) -> list[str]:
@@ -60,7 +69,15 @@ def _changing(states: tuple[dict[str, np.ndarray], ...]) -> list[str]:
 
 def _is_animated(data: Any) -> bool:
     animation = getattr(data, "animation_data", None)
-    return animation is not None and animation.action is not None
+    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
+
+
+def _trees(tree: Any) -> list[Any]:
+    """A node tree and the groups in it."""
+    if tree is None:
+        return []
+    groups = [node.node_tree for node in tree.nodes if node.type == "GROUP" and node.node_tree]
+    return [tree, *(inner for group in groups for inner in _trees(group))]
 
 
 def _differs(pose: np.ndarray, other: Any) -> bool:

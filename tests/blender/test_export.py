@@ -201,6 +201,13 @@ def test_settings_that_are_left_out_are_noted(exported):
     assert {(note["object"], note["node"]) for note in result["notes"] if note["kind"] == "not-carried"} == {
         ("No gloss", "Ray visibility"),
         ("Scene", "Render Region"),
+        ("Scene", "Sequencer"),
+        ("Scene", "Freestyle"),
+        ("Scene", "Light Paths: Reflective Caustics"),
+        ("Scene", "Light Paths: Clamping"),
+        ("Camera", "Clip Start"),
+        ("Coated", "Shadow catcher, holdout or indirect only"),
+        ("DejaVu Sans Mono Book", "Font"),
         ("ViewLayer", "Override"),
         ("Second", ""),
         ("coated", "Principled BSDF: Coat Tint"),

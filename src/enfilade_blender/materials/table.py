@@ -62,11 +62,13 @@ COLOUR_NODES = {  # functions of their inputs alone
     "COMBINE_COLOR", "SEPXYZ", "COMBXYZ", "CLAMP", "MAP_RANGE", "RGBTOBW", "BLACKBODY", "WAVELENGTH",
 }  # fmt: skip
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
-VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming",)}
+VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming", "Backfacing")}
 OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate as Cycles does, and how it does
     "PARTICLE_INFO": "data of particles are taken as 0",
     "HAIR_INFO": "data of hairs are taken as 0",
     "POINT_INFO": "data of points are taken as 0",
+    "AMBIENT_OCCLUSION": "other objects do not occlude",
+    "SHADERTORGB": "the light on a surface is no colour in Cycles, and is taken as 0",
 }
 PRINCIPLED = (
     (
@@ -176,7 +178,7 @@ OBJECTS = (
         "merged, or `instance` where they are many",
     ),
     ("Linked libraries, files of images", "mapped", "within the source's folder and the allowed ones"),
-    ("Animated objects, lamps, materials and worlds", "not carried", "as in the first frame"),
+    ("Animated objects, lamps, materials, worlds and images", "not carried", "as in the first frame"),
     ("Gamma, curves and white balance of the view", "not carried", "left out"),
     (
         "Limits of bounces",
@@ -185,12 +187,16 @@ OBJECTS = (
     ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
-    ("Ray visibility, shadow catcher, holdout", "not carried", "visible to all rays"),
+    ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
+    ("Clipping of cameras", "not carried", "all is visible from the eye on"),
+    ("Caustics switched off, clamping", "not carried", "all light counts"),
+    ("Compositor, sequencer, Freestyle", "not carried", "left out"),
     (
         "Overrides of the view layer, further view layers, crop to the render region",
         "not carried",
         "left out",
     ),
+    ("Missing fonts and caches, drivers that need Python", "not carried", "as Blender shows them without"),
 )
 
 

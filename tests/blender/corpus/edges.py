@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials that are easily lost: one plane of each."""
 
+import shutil
+from pathlib import Path
+
 import bpy
 import numpy as np
 
 from corpus.stage import (
+    add,
     fill,
     image,
     light,
@@ -147,7 +151,7 @@ def painted(_folder):
                 corner.color = colour
 
 
-def left_out(_folder):
+def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
     light("AREA", "No gloss", (0.0, 2.0, 3.0), 10.0).visible_glossy = False
@@ -159,7 +163,27 @@ def left_out(_folder):
     tree, tilted = material.node_tree, image("tilt", _grey, 16, space="Non-Color")
     normals = {name: node_of(tree, "NormalMap", Color=tilted) for name in ("Normal", "Coat Normal")}
     fill(tree, tree.nodes["Principled BSDF"], normals)
-    plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
+    coated = plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
+
+    # A camera that clips, and what follows the render.
+    scene.camera.data.clip_start = 5.0
+    bpy.data.collections.new("Seen in mirrors").objects.link(coated)
+    scene.collection.objects.unlink(coated)
+    scene.collection.children.link(bpy.data.collections["Seen in mirrors"])
+    for layer in scene.view_layers:
+        layer.layer_collection.children["Seen in mirrors"].indirect_only = True
+    scene.render.use_freestyle = True
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # before Blender 4.4
+    strips.new_effect(name="White", type="COLOR", channel=1, frame_start=1, frame_end=3)
+    scene.cycles.caustics_reflective, scene.cycles.sample_clamp_indirect = False, 2.0
+    text = bpy.data.curves.new("Text", "FONT")
+    lost = shutil.copy(
+        next(Path(bpy.utils.system_resource("DATAFILES", path="fonts")).glob("DejaVu*")), folder
+    )
+    text.body, text.font = "a", bpy.data.fonts.load(lost)
+    add("Text", text)
+    return Path(lost).unlink
 
 
 def simplified(_folder):

@@ -100,7 +100,9 @@ def instances_of_meshes(folder):
         painted.inputs["Material"].default_value = red
         info = tree.nodes.new("GeometryNodeObjectInfo")
         info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = lent, False
-        made, lents, join = (tree.nodes.new(f"GeometryNode{n}") for n in (*["InstanceOnPoints"] * 2, "JoinGeometry"))
+        made, lents, join = (
+            tree.nodes.new(f"GeometryNode{n}") for n in (*["InstanceOnPoints"] * 2, "JoinGeometry")
+        )
         tree.links.new(start.outputs[0], points.inputs["Mesh"])
         tree.links.new(box.outputs["Mesh"], painted.inputs["Geometry"])
         for copies, source in ((made, painted.outputs[0]), (lents, info.outputs["Geometry"])):

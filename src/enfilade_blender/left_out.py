@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Notes what nothing carries: settings of the scene, missing files, limits of light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from enfilade_blender.job import Job
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Selection
+
+PASSED_ON = {"R_LAYERS", "COMPOSITE", "VIEWER", "GROUP_OUTPUT", "REROUTE", "FRAME"}  # compositor nodes
+LEAST_CLAMP = 10.0  # Cycles' own limit of indirect light; a lower one makes pictures darker
+
+
+def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
+    """Note settings of the scene's view, frames, view layers and of what follows the render."""
+    scene = selection.scene
+    view, render = scene.view_settings, scene.render
+    tones, picture = "the tones of the picture differ", "the picture is as Cycles alone renders it"
+    settings = {
+        ("Color Management: Gamma", "gamma of the view", tones): abs(view.gamma - 1.0) > 1e-4,
+        ("Color Management: Curves", "curves of the view", tones): view.use_curve_mapping,
+        ("Color Management: White balance", "white balance of the view", tones): getattr(
+            view,
+            "use_white_balance",
+            False,  # from Blender 4.3 on
+        ),
+        ("Compositor", "its compositor", picture): render.use_compositing and _has_compositor(scene),
+        ("Sequencer", "its video sequencer", picture): render.use_sequencer and _has_strips(scene),
+        ("Freestyle", "its lines", picture): render.use_freestyle,
+        ("Render Region", "its crop to the render region", "the whole frame is rendered"): (
+            render.use_border and render.use_crop_to_border
+        ),
+        ("Frame Step", f"its step of {scene.frame_step}", "every frame is rendered"): scene.frame_step != 1,
+    }
+    for (name, what, effect), is_used in settings.items():
+        if is_used:
+            notes.add("not-carried", scene.name, name, f"{what} is left out", effect)
+    layer = selection.view_layer
+    for name in ("material_override", "world_override"):  # Blender 4.2 has none of the world
+        if getattr(layer, name, None) is not None:
+            what, effect = f"its {name.replace('_', ' ')} is left out", "materials and world are the scene's"
+            notes.add("not-carried", layer.name, "Override", what, effect)
+    for other in scene.view_layers:
+        if other.use and other != layer and not job.view_layer:
+            what = f"of several view layers {layer.name} is used"
+            notes.add("not-carried", other.name, "", what, "choose this one by blender.view_layer")
+
+
+def _has_compositor(scene: Any) -> bool:
+    tree = getattr(scene, "compositing_node_group", None)  # from Blender 5.0 on
+    if tree is None and getattr(scene, "use_nodes", False):
+        tree = getattr(scene, "node_tree", None)
+    return tree is not None and any(node.type not in PASSED_ON and not node.mute for node in tree.nodes)
+
+
+def _has_strips(scene: Any) -> bool:
+    editor = scene.sequence_editor
+    strips = getattr(editor, "strips", None) or getattr(editor, "sequences", ())  # before Blender 4.4
+    return len(strips) > 0
+
+
+def note_inputs(selection: Selection, notes: Notes) -> None:
+    """Note fonts, caches and drivers that are missing or blocked in the evaluated scene."""
+    kinds = (
+        (bpy.data.fonts, "Font", "Blender's own font stands in"),
+        (bpy.data.cache_files, "Cache", "what it moves or deforms stays at rest"),
+    )
+    for items, node, effect in kinds:
+        for item in items:
+            is_packed = getattr(item, "packed_file", None) is not None or item.filepath == "<builtin>"
+            file = Path(bpy.path.abspath(item.filepath, library=item.library))
+            if item.users and not is_packed and not file.is_file():
+                notes.add("not-carried", item.name, node, f"its file {file} is missing", effect)
+    if bpy.app.autoexec_fail and bpy.app.autoexec_fail_message.startswith("Driver"):
+        what = f"drivers that need Python don't run: {bpy.app.autoexec_fail_message}"
+        notes.add("not-carried", selection.scene.name, "Drivers", what, "what they drive is 0")
+
+
+def note_light(selection: Selection, notes: Notes, *, has_glass: bool) -> None:
+    """Note light that Cycles leaves out by its settings."""
+    scene, cycles = selection.scene, selection.scene.cycles
+    indirect = cycles.sample_clamp_indirect
+    settings = {
+        ("Refractive Caustics", "glass passes light, which it blocks in Blender"): (
+            has_glass and not cycles.caustics_refractive
+        ),
+        ("Reflective Caustics", "mirrors and metals throw light"): not cycles.caustics_reflective,
+        ("Clamping", "bright paths are brighter"): (
+            cycles.sample_clamp_direct > 0.0 or 0.0 < indirect < LEAST_CLAMP
+        ),
+    }
+    for (name, effect), is_left_out in settings.items():
+        if is_left_out:
+            notes.add("not-carried", scene.name, f"Light Paths: {name}", "the setting is left out", effect)
