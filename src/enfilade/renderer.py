@@ -38,6 +38,7 @@ class Purpose(IntEnum):
     KEYFRAME_SECOND_HALF = 14
     VIRTUAL_IMAGES = 15
     GUIDE_SECOND_HALF = 16
+    SEEN_HASH_GRID = 17
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,8 @@ class ShadingPoint:
         against next-event estimation at the ray's origin if the ray continues a path.
     has_specular : Bool
         Whether the BSDF has lobes other than the diffuse one.
+    may_pass : Bool
+        Whether one of these is a null interaction: a cut-out, opaque in part or not at all.
     specular_albedo : Float
         Rough estimate of the share of light that these scatter towards the ray's origin. Russian roulette
         weighs what goes on from here by it; it changes no mean.
@@ -142,6 +145,7 @@ class ShadingPoint:
     position: Any
     emission: Any
     has_specular: Any
+    may_pass: Any
     specular_albedo: Any
     bounce: Bounce | None
     native: Any

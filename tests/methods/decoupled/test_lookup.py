@@ -155,6 +155,17 @@ def test_one_kernel_serves_images_of_all_sizes():
     assert kernels_of_lookup(12, 16) == kernels_of_lookup(30, 40) != []
 
 
+def test_outermost_pixels_count_within_the_margin(wall):
+    pixels = np.stack([np.float64([0.5, -0.9, -1.6, -1.4]), np.full(4, 6.5), np.ones(4)])
+    direction = CAMERA.direction_from_pixel @ pixels
+    points = (CAMERA.eye[:, None] - direction * CAMERA.eye[2] / direction[2]).T
+    none, some = (found(wall, points, 1, margin=margin) for margin in (0.0, 1.5))
+    assert (np.array(none.weight) > 0).tolist() == [True, False, False, False]
+    assert (np.array(some.weight) > 0).tolist() == [True, True, False, True]
+    values = np.array(some.totals[0]).T[[0, 1, 3]] / np.array(some.weight)[[0, 1, 3], None]
+    np.testing.assert_allclose(values, np.tile(wall[2][6, 0], (3, 1)), atol=0.01)
+
+
 def test_the_weight_of_an_image_falls_towards_its_borders(wall):
     """Points behind the pixels of the middle row: full weight in the interior, little at the border."""
     pixels = np.stack([np.arange(WIDTH) + 0.5, np.full(WIDTH, 6.5), np.ones(WIDTH)])

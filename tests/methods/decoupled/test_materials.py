@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Samples
@@ -87,6 +88,34 @@ def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
 
     ours, reference = estimated(irradiance, camera, 256, layers=2)
     assert abs(standard_errors(ours, reference)) < 4.0
+
+
+def test_bump_maps_keep_their_energy_and_change_no_albedo(tmp_path):
+    waves = np.uint8(127 + 120 * np.sin(np.arange(64) * 0.8))
+    Image.fromarray(np.broadcast_to(waves, (64, 64)).copy()).save(tmp_path / "waves.png")
+    tilted = np.broadcast_to(np.uint8([200, 128, 230]), (4, 4, 3)).copy()
+    Image.fromarray(tilted).save(tmp_path / "tilted.png")
+
+    def texture(name, file):
+        return (
+            f'<texture type="bitmap" name="{name}"><string name="filename" value="{file}"/>'
+            '<boolean name="raw" value="true"/></texture>'
+        )
+
+    paint = MATERIALS["diffuse"]
+    balls = {
+        "bumpy": f'<bsdf type="bumpmap">{texture("height", "waves.png")}<float name="scale" value="0.1"/>'
+        f"{paint}</bsdf>",
+        "tilted": f'<bsdf type="normalmap">{texture("normalmap", "tilted.png")}{paint}</bsdf>',
+    }
+    renderer, camera = opened_scene(tmp_path, balls), front_camera()
+    geometry, names = find_geometry(renderer, camera), renderer.describe().shapes
+    ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
+    for name in balls:
+        here = geometry.shape_index == names.index(name) + 1
+        assert np.ptp(geometry.albedo[here], axis=0).max() < 1e-5
+        assert geometry.albedo[here][0] == pytest.approx([0.6, 0.4, 0.2])
+        assert abs(standard_errors(ours, reference, here.ravel())) < 4.0
 
 
 def test_final_gathering_converges_to_path_traced_irradiance(materials):

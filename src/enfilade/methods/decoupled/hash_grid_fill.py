@@ -18,6 +18,7 @@ from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the frame
+SEEN_SPP = 4  # camera rays of each pixel of the frame
 GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
 
 
@@ -50,6 +51,19 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         specular.add(SPECULAR_SPP)
         paths, dropped = paths + specular.paths, dropped + specular.dropped
 
+    # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
+    seen = Estimate(
+        camera,
+        np.arange(camera.width * camera.height, dtype=np.uint32),
+        lambda rays, sampler: shot.integrator.diffuse_radiance(
+            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+        ),
+        chunk=chunk,
+        pixel_filter=PixelFilter.GAUSSIAN,
+        random=walk.random(frame, Purpose.SEEN_HASH_GRID),
+    )
+    seen.add(SEEN_SPP)
+
     # Gather at the diffuse pixels of the prepass image.
     gathered = Estimate(
         geometry.camera,
@@ -66,5 +80,6 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
-    facts = {"rays": {"hash_grid": paths + gathered.paths}, "dropped": dropped + gathered.dropped}
+    paths, dropped = paths + seen.paths + gathered.paths, dropped + seen.dropped + gathered.dropped
+    facts = {"rays": {"hash_grid": paths}, "dropped": dropped}
     return Output({frame: entries}, facts | {"entries": len(entries.keys)})

@@ -92,6 +92,7 @@ class Integrator:
         cache: IrradianceCache,
         rays: Rays,
         sampler: Any,
+        on_miss: OnMiss | None = None,
         *,
         pixel_angle: float,
     ) -> Samples:
@@ -103,6 +104,8 @@ class Integrator:
         rays
             From the camera, one a lane.
         sampler : PaddedSobolSampler
+        on_miss
+            Receives the irradiance that was not cached and had to be estimated.
         pixel_angle
             Of the camera, radians.
 
@@ -114,7 +117,7 @@ class Integrator:
         vertex = self._kernels.see(cache, spawn(rays, sampler, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
-        for found, lane in self._missed_light(cache, deferred):
+        for found, lane in self._missed_light(cache, deferred, on_miss):
             scatter_add(radiance, found, lane)
         return Samples((radiance,), vertex.has_specular)
 

@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, matrix3, opaque, vector3
+from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
@@ -94,7 +95,9 @@ def _mean(
     total, weight = Array3f(0), Float(0)
     valid = Float(0)
     for one, own in images:
-        found = lookup(position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE)
+        found = lookup(
+            position, normal, shape_index, one, plane_tolerance=PLANE_TOLERANCE, margin=GAUSSIAN_RADIUS_PX
+        )
         total += own * sum(found.totals, Array3f(0))
         weight += own * found.weight
         valid += dr.select(own > 0.0, found.weight, 0.0)

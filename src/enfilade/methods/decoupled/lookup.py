@@ -80,6 +80,7 @@ def lookup(
     *,
     plane_tolerance: float,
     min_cosine: float = 0.0,
+    margin: float = 0.0,
 ) -> Found:
     """Interpolate an image at points in the world.
 
@@ -97,6 +98,8 @@ def lookup(
         Largest distance from the tangent plane on the same surface, as a part of the depth.
     min_cosine
         Least cosine between the normals.
+    margin
+        Pixels beyond the image's borders where its outermost pixels count.
 
     Returns
     -------
@@ -107,7 +110,8 @@ def lookup(
     is_ahead = seen.z > 0.0
     x, y = seen.x / seen.z - 0.5, seen.y / seen.z - 0.5
     right, bottom = Float(image.width) - 0.5, Float(image.height) - 0.5
-    is_inside = is_ahead & (x > -0.5) & (y > -0.5) & (x < right) & (y < bottom)
+    is_inside = is_ahead & (x > -0.5 - margin) & (y > -0.5 - margin)
+    is_inside &= (x < right + margin) & (y < bottom + margin)
     across = dr.minimum(x + 0.5, right - x) / (TAPER * Float(image.width))
     down = dr.minimum(y + 0.5, bottom - y) / (TAPER * Float(image.height))
     taper = dr.clip(dr.minimum(across, down), MIN_TAPER, 1.0)

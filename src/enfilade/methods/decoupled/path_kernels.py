@@ -115,7 +115,7 @@ class PathKernels:
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index
         found = lookup(*at, aovs, plane_tolerance=PLANE_TOLERANCE, min_cosine=AOV_COSINE)
-        is_found = found.weight > 0.0
+        is_found = (found.weight > 0.0) & ~point.may_pass  # what is seen through it changes with its opacity
         scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
         return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)
 

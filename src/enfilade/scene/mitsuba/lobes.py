@@ -3,6 +3,8 @@
 Most BSDFs of Mitsuba evaluate and sample their diffuse component alone when a context selects it. Their
 albedo is the value of that component for light along the normal. It includes the transmittance of a coat
 towards the viewer, so that the quotient of the diffuse component and the albedo does not depend on the view.
+Below a bump or normal map it is the reflectance alone: the quotient would contain the map's slopes, which
+have to stay out of what is cached and filtered.
 
 Some BSDFs can't be split by a context: ``principled`` evaluates all of itself, and ``mask`` samples its
 diffuse component wrongly. Their diffuse lobe is a Lambertian one with their own albedo, reduced by
@@ -24,6 +26,7 @@ from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
+MAPPED = {"BumpMap", "NormalMap"}
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
@@ -58,14 +61,17 @@ class Lobes:
             bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.FrontSide)),
             bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.BackSide)),
         )
+        self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE | MAPPED))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
+        self._has_own_albedo = bool(dr.any(self._own_albedo))
         self._specular_albedo = self._mean_specular_albedo(scene)
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        return self._whole, self._lambertian, self._sides, self._clear, self._specular_albedo
+        tables = self._whole, self._lambertian, self._own_albedo, self._sides, self._clear
+        return tables, self._specular_albedo
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -92,20 +98,20 @@ class Lobes:
     def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1; Color3f."""
         is_diffuse = active & has_lobe(bsdf.flags(), "DiffuseReflection", "DiffuseTransmission")
-        is_whole = _of(self._whole, si, bsdf)
+        is_own = _of(self._own_albedo, si, bsdf)
         along_normal = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), si.wi.z))
-        albedo = dr.pi * bsdf.eval(self._diffuse, si, along_normal, is_diffuse & ~is_whole)
-        if self._has_whole:
-            is_whole &= is_diffuse
-            own = bsdf.eval_diffuse_reflectance(si, is_whole)
-            own *= _opacity(si, bsdf, is_whole)
+        albedo = dr.pi * bsdf.eval(self._diffuse, si, along_normal, is_diffuse & ~is_own)
+        if self._has_own_albedo:
+            is_own &= is_diffuse
+            own = bsdf.eval_diffuse_reflectance(si, is_own)
+            own *= _opacity(si, bsdf, is_own)
             for name, scale in NOT_DIFFUSE.items():
-                has_it = is_whole & bsdf.has_attribute(name, is_whole)
+                has_it = is_own & bsdf.has_attribute(name, is_own)
                 own *= 1.0 - dr.select(has_it, scale * bsdf.eval_attribute_1(name, si, has_it), 0.0)
             own = dr.select(
                 dr.select(si.wi.z > 0.0, *(_of(side, si, bsdf) for side in self._sides)), own, 0.0
             )
-            albedo = dr.select(is_whole, own, albedo)
+            albedo = dr.select(is_own, own, albedo)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
 
@@ -145,8 +151,8 @@ class Lobes:
         """Direction, density, weight of a sample; whether it is of a delta lobe, and if a null interaction.
 
         The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
-        of its albedo as probability, so that the weight stays bounded where only one of them is large. A
-        masked Lambertian BSDF is sampled by itself: only its null interaction counts. A given `choice` of the
+        of its albedo as probability, so that the weight stays bounded where only one of them is large. Paths
+        pass a masked Lambertian BSDF: only its null interaction counts. A given `choice` of the
         lobe, 0..1, yields a direction of that lobe, and a weight without meaning. A branch of a clear
         interface has its own weight: what is reflected, or transmitted.
         """
@@ -155,7 +161,7 @@ class Lobes:
         is_masked = is_whole & _of(self._lambertian, si, bsdf)
         albedo = self.albedo(si, bsdf, is_whole)
         share = _bsdf_share(albedo)
-        by_bsdf = is_masked | (sampler.next_1d() < share)
+        by_bsdf = sampler.next_1d() < share
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
         if branch is not None:
@@ -172,8 +178,15 @@ class Lobes:
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
         difference, pdf = self._difference(si, bsdf, wo, albedo, is_whole & ~is_delta)
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
-        difference = dr.select(is_delta, dr.select(is_masked, 1.0, dr.rcp(share)) * whole_weight, difference)
+        difference = dr.select(is_delta, whole_weight * dr.rcp(share), difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
+
+        # Of a masked Lambertian BSDF the null interaction alone counts: all paths pass, without chance.
+        if self._has_whole:
+            passed = bsdf.eval_null_transmission(si, is_masked)
+            difference, pdf = dr.select(is_masked, passed, difference), dr.select(is_masked, 1.0, pdf)
+            wo = dr.select(is_masked, -si.wi, wo)
+            is_null, is_delta = is_null | is_masked, is_delta | is_masked
         if branch is not None:
             weight = dr.select(is_clear, weight * sample.pdf, weight)
 

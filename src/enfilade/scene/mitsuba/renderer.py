@@ -44,7 +44,7 @@ from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.merge import merge_meshes
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS
-from enfilade.scene.mitsuba.shapes import Shapes, surface_class
+from enfilade.scene.mitsuba.shapes import Shapes, has_lobe, surface_class
 from enfilade.scene.mitsuba.transport import LightTransport
 
 NULL_GBUFFER = 0.5  # transmittance above which a hit is a null interaction for the G-buffer
@@ -160,6 +160,7 @@ class MitsubaRenderer:
             position=Array3f(si.p),
             emission=self._transport.emission(si, bounce),
             has_specular=self._lobes.has_specular(si, bsdf),
+            may_pass=has_lobe(bsdf.flags(), "Null"),
             specular_albedo=self._lobes.specular_albedo(si, bsdf),
             bounce=bounce,
             native=si,
