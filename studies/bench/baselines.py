@@ -59,7 +59,7 @@ class Denoised(Method):
     """Path tracing of every frame, denoised; accumulated over time before or after on request."""
 
     name = "denoised"
-    revision = 4
+    revision = 3
     settings = (*Reference.settings, DenoiserSettings, ViewingSettings)
     passes = (
         Pass("history", History, reads=("history",)),
