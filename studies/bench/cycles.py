@@ -19,6 +19,7 @@ from typing import Any
 
 import click
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from enfilade.camera import parse_frames
 from enfilade.cli.options import Size
@@ -37,6 +38,7 @@ from enfilade.settings import LimitSettings
 from studies.bench.bench import cached_kernels
 from studies.versions import machine, origin
 
+SMOOTHED = 5  # pixels to a side
 LIMITS = LimitSettings(import_s=86_400.0)
 SEEDS = (1, 2)  # of the halves of a reference
 COST = "cost.json"  # in the folder of a finished run
@@ -148,7 +150,8 @@ def errors_of(image: F32, first: F32, second: F32) -> tuple[float, float]:
     shown = [srgb_encode(np.clip(of, 0.0, 1.0)).astype(np.float64) for of in (image, first, second)]
     displayed = float(((shown[0] - shown[1]) * (shown[0] - shown[2])).mean())
     linear = [of.astype(np.float64) for of in (image, first, second)]
-    mean = (linear[1] + linear[2]).mean(axis=-1, keepdims=True) / 2.0
+    # Smooth the weights: those of single pixels contain the noise of the product.
+    mean = uniform_filter((linear[1] + linear[2]).mean(axis=-1, keepdims=True) / 2.0, (SMOOTHED, SMOOTHED, 1))
     weight = 1.0 / (mean**2 + 0.01)  # Rousselle et al. 2011
     return displayed, float((weight * (linear[0] - linear[1]) * (linear[0] - linear[2])).mean())
 

@@ -34,6 +34,8 @@ class WindowPair(DisplayedPair):
     ----------
     linear : (S, S, 3) float32
         The test before exposure and clipping.
+    linear_reference : (S, S, 3) float32
+        The reference, denoised.
     linear_halves, halves : tuple of (S, S, 3) float32
         The two halves of the reference, of independent random numbers: linear, and encoded.
     flow : Flow
@@ -41,6 +43,7 @@ class WindowPair(DisplayedPair):
     """
 
     linear: F32
+    linear_reference: F32
     linear_halves: tuple[F32, F32]
     halves: tuple[F32, F32]
     flow: Flow
@@ -177,7 +180,10 @@ class SquaredError:
 
 
 class RelativeSquaredError:
-    """Mean of (F - A)(F - B) / (R^2 + 0.01), linear, R the mean of both halves (Rousselle et al. 2011)."""
+    """Mean of (F - A)(F - B) / (R^2 + 0.01), linear, R the denoised reference (Rousselle et al. 2011).
+
+    The mean of both halves as R would weigh pixels by the noise that their product contains.
+    """
 
     def __init__(self) -> None:
         self._values: list[float] = []
@@ -185,8 +191,8 @@ class RelativeSquaredError:
     def add(self, pair: WindowPair) -> None:
         """Mean over pixels and channels."""
         first, second = (pair.linear.astype(np.float64) - half for half in pair.linear_halves)
-        mean = 0.5 * (pair.linear_halves[0].astype(np.float64) + pair.linear_halves[1])
-        self._values.append(float(np.mean(first * second / (np.square(mean) + RELATIVE_FLOOR))))
+        squared = np.square(pair.linear_reference.astype(np.float64))
+        self._values.append(float(np.mean(first * second / (squared + RELATIVE_FLOOR))))
 
     def value(self) -> float:
         """Mean over frames; it may be negative within the noise."""

@@ -146,6 +146,7 @@ def _pairs(
         yield WindowPair(
             **vars(pair),
             linear=test,
+            linear_reference=wanted,
             linear_halves=(first, second),
             halves=(shown.test, shown.reference),
             flow=flow,

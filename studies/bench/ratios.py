@@ -14,6 +14,7 @@ from studies.bench.measures import QUALITIES
 
 DRAWS = 1000  # bootstrap resamples
 INTERVAL = (5.0, 95.0)  # percentiles of the resamples
+REACH = 1.645  # of the interval, in standard deviations
 SEED = 0
 
 
@@ -124,7 +125,9 @@ def cost_at(points: Sequence[Point], error: float) -> tuple[float, str]:
 
 
 def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Geometric mean of ratios over scenes, with an interval over the scenes.
+    """Geometric mean of ratios over scenes, with an interval over scenes and windows.
+
+    Scenes are drawn, and of each a ratio within its own interval, whose logarithm is taken to be normal.
 
     Parameters
     ----------
@@ -137,9 +140,12 @@ def mean_ratio(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         As :class:`Ratio`; its `kind` is None where it contains bounds in both directions, and it is decided
         if all are.
     """
-    logs = np.log([one["times"] for one in found])
+    logs, lows, highs = (np.log([one[key] for one in found]) for key in ("times", "low", "high"))
     random = np.random.default_rng(SEED)
-    drawn = [logs[random.integers(len(logs), size=len(logs))].mean() for _ in range(DRAWS)]
+    chosen = random.integers(len(logs), size=(DRAWS, len(logs)))
+    deviation = random.standard_normal(chosen.shape) / REACH
+    width = np.where(deviation < 0.0, (logs - lows)[chosen], (highs - logs)[chosen])
+    drawn = (logs[chosen] + deviation * width).mean(axis=1)
     low, high = np.exp(np.percentile(drawn, INTERVAL)).tolist()
     bounds = {one["kind"] for one in found} - {"equal"}
     kind = None if len(bounds) > 1 else next(iter(bounds), "equal")

@@ -25,9 +25,10 @@ def noisy(image, seed, noise=0.5):
     return tuple((image * factor).astype(np.float32) for factor in factors)
 
 
-def compared(reference, test, index, noise=0.5):
+def compared(reference, test, index, noise=0.5, noise_of_test=None):
     frames = (np.broadcast_to(of, (4, *of.shape)) for of in (reference, test))
-    halves = (noisy(of, seed, noise) for seed, of in enumerate(frames))
+    sizes = noise, noise if noise_of_test is None else noise_of_test
+    halves = (noisy(of, seed, size) for seed, (of, size) in enumerate(zip(frames, sizes, strict=True)))
     return compare_objects(*halves, np.broadcast_to(index, (4, *SIZE)), NAMES)
 
 
@@ -44,6 +45,12 @@ def test_noise_is_no_difference(index):
         assert of.color_percent < 1.5 * of.noise_percent
         assert abs(of.contrast_percent) < 3.0
         assert abs(of.highlight_percent) < 10.0
+
+
+def test_unequal_noise_makes_no_highlights(index):
+    grain = 0.5 * np.exp(0.2 * np.random.default_rng(9).standard_normal((*SIZE, 1))) * np.ones(3)
+    everything, *_ = compared(grain, grain, index, noise=0.3, noise_of_test=0.1)
+    assert abs(everything.highlight_percent) < 8.0
 
 
 def test_each_kind_of_difference_is_found(index):

@@ -80,7 +80,7 @@ def test_squared_errors_of_a_known_error():
     constant = [pair(picture() + 0.1, picture(), is_first=frame == 0) for frame in range(2)]
     assert QUALITIES["psnr"].score([value(SquaredError(), constant)]) == pytest.approx(20.0, abs=1e-3)
     grey = [
-        replace(constant[0], linear=np.float32(1.1) * half, linear_halves=(half, half))
+        replace(constant[0], linear=np.float32(1.1) * half, linear_reference=half, linear_halves=(half, half))
         for half in constant[0].halves
     ]
     expected = np.mean((0.1 * grey[0].linear_halves[0]) ** 2 / (grey[0].linear_halves[0] ** 2 + 0.01))
@@ -121,5 +121,15 @@ def test_noise_of_the_reference_does_not_count(kind):
                 ),
             )
         )
-    # 110,592 products of deviation 0.05^2 (blocks: 1,584), and the changed denominator of the relative error
+    # 110,592 products of deviation 0.05^2 (blocks: 1,584)
     assert value(kind(), noisy) == pytest.approx(value(kind(), clean), rel=0.15)
+
+
+def test_the_relative_error_of_the_truth_is_none():
+    added = [[noise(100 * k + f, 0.1) * picture() for k in (1, 2)] for f in range(12)]
+    exact = [pair(picture(), picture()) for _ in added]
+    seen = [
+        replace(of, linear_halves=tuple(of.linear + n for n in two))
+        for of, two in zip(exact, added, strict=True)
+    ]
+    assert abs(value(RelativeSquaredError(), seen)) < 5e-4

@@ -79,9 +79,12 @@ def test_errors_of_scores():
 
 def test_means_over_scenes():
     one = {"times": 2.0, "kind": "equal", "low": 1.0, "high": 3.0, "is_decided": True}
-    found = mean_ratio([one, one | {"times": 0.5}])
+    sure = [one | {"times": times, "low": times, "high": times} for times in (2.0, 0.5)]
+    found = mean_ratio(sure)
     assert found["times"] == pytest.approx(1.0)
     assert found["kind"] == "equal"
     assert (found["low"], found["high"]) == (pytest.approx(0.5), pytest.approx(2.0))
+    alone = mean_ratio([one])  # has the interval of its scene
+    assert (alone["low"], alone["high"]) == (pytest.approx(1.0, rel=0.1), pytest.approx(3.0, rel=0.1))
     assert mean_ratio([one, one | {"kind": "at least"}])["kind"] == "at least"
     assert mean_ratio([one | {"kind": "at most"}, one | {"kind": "at least"}])["kind"] is None

@@ -38,6 +38,7 @@ def pair(
     return WindowPair(
         **vars(shown),
         linear=linear,
+        linear_reference=wanted,
         linear_halves=(wanted, wanted),
         halves=(shown.reference, shown.reference),
         flow=flow,

@@ -101,9 +101,10 @@ def _difference(
     reference, test = (ref_a + ref_b) / 2.0, (test_a + test_b) / 2.0
     mean = max(float((reference @ LUMINANCE).mean()), floor, 1e-9)
     noise = np.sqrt(_variance_of_mean(ref_a - ref_b) + _variance_of_mean(test_a - test_b))
-    bright_ref, bright_test = ref_a @ LUMINANCE, test_a @ LUMINANCE
-    halves = (bright_ref, ref_b @ LUMINANCE), (bright_test, test_b @ LUMINANCE)
-    levels, contrasts, highlights = zip(*(_statistics(*half) for half in halves), strict=True)
+    of_ref = ref_a @ LUMINANCE, ref_b @ LUMINANCE
+    of_test = test_a @ LUMINANCE, test_b @ LUMINANCE
+    levels, contrasts = zip(*(_statistics(*halves) for halves in (of_ref, of_test)), strict=True)
+    highlights = -_highlights(of_ref, of_test), _highlights(of_test, of_ref)
 
     def percent(value: float) -> float:
         return 100.0 * value / mean
@@ -116,7 +117,7 @@ def _difference(
         noise_percent=percent(SIGMAS * float(noise.mean())),
         brightness_percent=percent(levels[1] - levels[0]),
         contrast_percent=percent(contrasts[1] - contrasts[0]),
-        highlight_percent=percent(highlights[1] - highlights[0]),
+        highlight_percent=percent(max(highlights, key=abs)),
     )
 
 
@@ -126,14 +127,22 @@ def _variance_of_mean(difference: F64) -> F64:
     return result
 
 
-def _statistics(first: F64, second: F64) -> tuple[float, float, float]:
-    """Mean, standard deviation and highlights of luminance in two halves (N,), without the bias of noise."""
+def _statistics(first: F64, second: F64) -> tuple[float, float]:
+    """Mean and standard deviation of luminance in two halves (N,), without the bias of noise."""
     mean = float(first.mean() + second.mean()) / 2.0
     covariance = float(((first - first.mean()) * (second - second.mean())).mean())
-    # Choose the brightest pixels by one half, and measure them in the other.
-    count = max(round(HIGHLIGHT_SHARE * len(first)), 1)
-    highlights = [
-        float(measured[np.argpartition(chosen, -count)[-count:]].mean())
-        for chosen, measured in ((first, second), (second, first))
+    return mean, float(np.sqrt(max(covariance, 0.0)))
+
+
+def _highlights(bright: tuple[F64, F64], other: tuple[F64, F64]) -> float:
+    """How much brighter than other halves (N,) an image is in its brightest pixels, free of noise's bias.
+
+    One half chooses the pixels, and the other one is compared in them.
+    """
+    count = max(round(HIGHLIGHT_SHARE * len(bright[0])), 1)
+    mean = (other[0] + other[1]) / 2.0
+    brighter = [
+        float((measured - mean)[np.argpartition(chosen, -count)[-count:]].mean())
+        for chosen, measured in (bright, bright[::-1])
     ]
-    return mean, float(np.sqrt(max(covariance, 0.0))), sum(highlights) / 2.0
+    return sum(brighter) / 2.0
