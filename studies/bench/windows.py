@@ -71,7 +71,7 @@ def draw_windows(walk: Walkthrough) -> list[Window]:
     Raises
     ------
     InputError
-        The image is too small.
+        The image is too small, or shows no surfaces.
     """
     height, width = walk.path.height, walk.path.width
     side = min(LARGEST_PX, int(SHARE_OF_SIDE * min(height, width)) // 8 * 8)
@@ -97,6 +97,10 @@ def draw_windows(walk: Walkthrough) -> list[Window]:
         share, window = max(found, key=lambda one: one[0], default=(0.0, None))  # the first of equal shares
         if window is not None and share > MIN_SHARE:
             chosen.append(window)
+    if not chosen:
+        raise InputError(
+            f"no window of {side}x{side} pixels has surfaces in {MIN_SHARE:.0%} of it; choose other frames"
+        )
     return chosen
 
 

@@ -97,7 +97,11 @@ def test_a_run_states_its_rate_and_where_shots_begin(tmp_path, selected, cuts, s
     run = open_sequence(tmp_path)
     assert means(run) == [1, 2, 5, 11]
     assert (run.fps, run.exposure_ev, run.numbers, run.starts) == (23.976, 1.5, (1, 2, 5, 11), starts)
-    assert means(open_sequence(tmp_path / "frames" / "0005.exr")) == [5]
+    part = open_sequence(tmp_path / "frames" / "00*1.exr")  # has the rate and exposure of its run
+    assert (means(part), part.fps, part.exposure_ev, part.numbers) == ([1, 11], 23.976, 1.5, (1, 11))
+    assert part.starts == (None if starts is None else {1})
+    one = open_sequence(tmp_path / "frames" / "0005.exr")
+    assert (means(one), one.exposure_ev) == ([5], 1.5)
     (tmp_path / "run.json").write_text("[1]")  # of another program
     assert open_sequence(tmp_path).fps is None
 

@@ -16,6 +16,7 @@ from enfilade.images.decode import VideoFile
 from enfilade.images.imagefiles import SUFFIXES, ImageFiles
 
 RUN_FILE, JOB_FILE = "run.json", "job.json"
+FRAMES = "frames"  # folder of a run's images
 NUMBER_FIELD = re.compile(r"%0?\d*d|#+")  # of a pattern: frame.%04d.exr, frame.####.exr
 NUMBER = re.compile(r"(^-?[0-9]+|[0-9]+)")  # in a name; one at the beginning may be negative
 MAX_LISTED = 6  # patterns of a folder, in a message
@@ -53,7 +54,9 @@ def open_sequence(source: Path | str, *, layer: str | None = None) -> Sequence:
     files = files_of(path)
     if not files:
         raise ImageError(f"there is no file, folder or pattern with files {path}")
-    return ImageFiles(files, numbers=None if path.is_file() else _numbers(files), layer=layer)
+    numbers = None if path.is_file() else _numbers(files)
+    home = files[0].parent
+    return _of_run(files, home.parent if home.name == FRAMES else home, numbers, layer)
 
 
 def files_of(source: Path | str) -> list[Path]:
@@ -75,17 +78,24 @@ def files_of(source: Path | str) -> list[Path]:
 
 def _image_folder(folder: Path) -> Path:
     """The folder of the images: a run keeps its frames in a subfolder."""
-    return folder / "frames" if (folder / RUN_FILE).is_file() else folder
+    return folder / FRAMES if (folder / RUN_FILE).is_file() else folder
 
 
 def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
-    run, files = folder / RUN_FILE, files_of(folder)
+    files = files_of(folder)
     if not files:
         raise ImageError(f"{_image_folder(folder)} has no images of {', '.join(sorted(SUFFIXES))} in it")
     _check_one_sequence(files)
-    numbers = _numbers(files)
+    return _of_run(files, folder, _numbers(files), layer)
+
+
+def _of_run(
+    files: list[Path], folder: Path, numbers: tuple[int, ...] | None, layer: str | None
+) -> ImageFiles:
+    """Images with the frame rate, exposure and shots of the run in a folder, if there is one."""
+    run, job_file = folder / RUN_FILE, folder / JOB_FILE
     identity = _at(read_json(run), "identity") if run.is_file() else None
-    job = read_json(run.with_name(JOB_FILE)) if run.with_name(JOB_FILE).is_file() else None
+    job = read_json(job_file) if run.is_file() and job_file.is_file() else None
     return ImageFiles(
         files,
         fps=_at(identity, "path", "fps"),

@@ -89,7 +89,8 @@ def _glance(run: ReportedRun) -> list[tuple[str, str, str]]:
     width, height = summary["size"]
     rows = [("method", summary["method"], ""), ("image", f"{width}×{height}", f"{summary['fps']:g} fps")]
     if summary["rays"]:
-        rows.append(("rays per pixel", f"{sum(summary['rays'].values()):.1f}", ""))
+        name = "rays per pixel" if run.is_finished else "rays per pixel so far"
+        rows.append((name, f"{sum(summary['rays'].values()):.1f}", ""))
     elif summary["per_frame"]:
         rows.append(("pixels traced", percent(summary["traced_percent"]["total"]), "%"))
     if run.is_finished:
