@@ -52,6 +52,7 @@ ARCHITRAVE: list[Point2] = [
     (0.0, 0.03),
     (0.0, 0.0),
 ]
+GAP = 0.09  # between panels
 BEAD: list[Point2] = [(0.035, 0.0), (0.03, 0.008), (0.022, 0.014), (0.012, 0.016), (0.004, 0.012), (0.0, 0.0)]
 GILT: list[Point2] = [
     (0.055, 0.004),
@@ -116,11 +117,11 @@ def panelled_door(width: float, height: float) -> Mesh:
     return join(pieces)
 
 
-def panelling(length: float, low: float, high: float, count: int, margin: float = 0.09) -> Mesh:
+def panelling(length: float, low: float, high: float, count: int) -> Mesh:
     """Return a row of beaded panels for a wall, lying face up, from x = 0 to `length`."""
     bay = length / count
     height = high - low
-    return join(frame(bay - margin, height, BEAD).at((k + 0.5) * bay, (low + high) / 2) for k in range(count))
+    return join(frame(bay - GAP, height, BEAD).at((k + 0.5) * bay, (low + high) / 2) for k in range(count))
 
 
 def architrave(width: float, height: float) -> Mesh:

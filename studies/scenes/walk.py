@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from studies.scenes.solids import Floats, Vector
 
+FPS = 30
 STEPS_PER_FRAME = 16  # of the pace's integral
 
 
@@ -68,7 +69,7 @@ def look_at(eye: Floats, target: Floats) -> Floats:
     return matrix
 
 
-def write_path(file: Path, poses: Floats, *, fov_deg: float, size: tuple[int, int], fps: int = 30) -> None:
+def write_path(file: Path, poses: Floats, *, fov_deg: float, size: tuple[int, int]) -> None:
     """Write poses, (frames, 4, 4), as a nerfstudio `camera_path.json`."""
     width, height = size
     entries = [
@@ -83,8 +84,8 @@ def write_path(file: Path, poses: Floats, *, fov_deg: float, size: tuple[int, in
         "camera_type": "perspective",
         "render_width": width,
         "render_height": height,
-        "fps": fps,
-        "seconds": len(poses) / fps,
+        "fps": FPS,
+        "seconds": len(poses) / FPS,
         "camera_path": entries,
     }
     file.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

@@ -6,8 +6,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.decoupled.integrator import Integrator
-from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
-from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.records import Geometry, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
@@ -137,8 +136,3 @@ def traced_irradiance(
     everywhere = np.ones((camera.height, camera.width), bool)
     direct, indirect = (shading.to_image(everywhere) for shading in estimate.shadings)
     return find_geometry(renderer, camera), IrradianceImage(direct, indirect, everywhere)
-
-
-def uploaded_irradiance(renderer: MitsubaRenderer, camera: Camera) -> UploadedImage:
-    """The same on the device."""
-    return upload(*traced_irradiance(renderer, camera))

@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from enfilade.reports.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
-IMAGES = frozenset(  # `images.imagefiles.SUFFIXES`, which would load NumPy here
-    {".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"}
-)
-
 
 def _list_displays(ctx: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
     if value == "list" and not ctx.resilient_parsing:
@@ -220,6 +216,7 @@ def _check_apart(sources: Sequence[str], heatmap: Path | None, graph: Path | Non
     if heatmap is None and graph is None:
         return
     from enfilade.images import files_of
+    from enfilade.images.imagefiles import SUFFIXES
 
     of_test, of_reference, *others = map(files_of, sources)
     read = {_place_on_disk(file) for file in chain(of_test, of_reference, *others)} - {None}
@@ -227,7 +224,7 @@ def _check_apart(sources: Sequence[str], heatmap: Path | None, graph: Path | Non
     if heatmap is not None and _is_folder(heatmap):
         # The frames of a video are counted, and as many as the reference's.
         counted = [f"{number:06d}" for number in range(1, len(of_reference) + 1)]
-        names = [file.stem for file in of_test if file.suffix.lower() in IMAGES] or counted
+        names = [file.stem for file in of_test if file.suffix.lower() in SUFFIXES] or counted
         pictures = [heatmap / f"{name}.png" for name in names]
     for flag, files in (("--heatmap", pictures), ("--graph", [graph] if graph is not None else [])):
         for file in files:
@@ -245,8 +242,10 @@ def _place_on_disk(file: Path) -> tuple[int, int] | None:
 
 
 def _name(frame: ComparedFrame) -> str:
+    from enfilade.images.imagefiles import SUFFIXES
+
     file = Path(frame.difference.name)
-    return file.stem if file.suffix.lower() in IMAGES else f"{frame.difference.number:06d}"
+    return file.stem if file.suffix.lower() in SUFFIXES else f"{frame.difference.number:06d}"
 
 
 def _picture(painter: HeatmapPainter, frame: ComparedFrame) -> Any:

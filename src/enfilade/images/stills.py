@@ -28,7 +28,6 @@ from enfilade.records import F32, U8
 
 STILL_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"})
 FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "WEBP", "BMP")  # Pillow's names
-MITSUBA_SUFFIXES = (".exr", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".pfm", ".ppm", ".hdr", ".rgbe")
 MITSUBA_FORMATS = ("PNG", "JPEG", "BMP", "TGA", "PPM")  # Pillow's names
 PNG_DEPTH = 24  # offset of the bit depth in IHDR, PNG (3rd ed.), 11.2.1
 TIFF_BITS, TIFF_PHOTOMETRIC, TIFF_TILE_WIDTH, TIFF_SAMPLE_FORMAT = 258, 262, 322, 339  # tags, TIFF 6.0

@@ -52,7 +52,7 @@ class Aqm:
         self.pursuit = pursuit
 
     @classmethod
-    def modern(cls, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH, workers: int = 1) -> Self:
+    def modern(cls, viewing: Viewing, *, pursuit: Pursuit = Pursuit.BOTH) -> Self:
         """The published metric with each stage brought up to later measurements of vision (`metric.modern`).
 
         Parameters
@@ -62,10 +62,8 @@ class Aqm:
             of the screen.
         pursuit : Pursuit
             Eye movement while the image moves.
-        workers : int
-            Threads of the FFT, 1 or more.
         """
-        return cls(ModernMetric(viewing, workers=workers), pursuit=pursuit)
+        return cls(ModernMetric(viewing), pursuit=pursuit)
 
     @classmethod
     def paper(
@@ -74,18 +72,17 @@ class Aqm:
         *,
         pursuit: Pursuit = Pursuit.BOTH,
         mask_slope: float = MASK_SLOPE,
-        workers: int = 1,
     ) -> Self:
         """The published metric (`metric.paper`).
 
         Parameters
         ----------
-        viewing, pursuit, workers
+        viewing, pursuit
             As in `modern`.
         mask_slope : float
             Slope of visual masking, 0 to 1 (`metric.masking`).
         """
-        return cls(PaperMetric(viewing, mask_slope=mask_slope, workers=workers), pursuit=pursuit)
+        return cls(PaperMetric(viewing, mask_slope=mask_slope), pursuit=pursuit)
 
     @property
     def has_transient(self) -> bool:

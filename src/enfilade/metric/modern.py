@@ -44,7 +44,7 @@ class ModernMetric:
 
     Parameters
     ----------
-    viewing, workers
+    viewing
         As in `Aqm.modern`.
     transducer : Transducer
         Constants of masking.
@@ -60,12 +60,11 @@ class ModernMetric:
         *,
         transducer: Transducer = TRANSDUCER,
         aperture_sigma_deg: float = APERTURE_SIGMA_DEG,
-        workers: int = 1,
     ) -> None:
         self.viewing = viewing
         self._transducer = transducer
         self._gain = patch_gain(aperture_sigma_deg)
-        self._bank = ChannelBank(viewing, tilt=self._csf_within_band, oversampling=1.0, workers=workers)
+        self._bank = ChannelBank(viewing, tilt=self._csf_within_band, oversampling=1.0)
         self.bands = self._bank.bands
         density = viewing.pixels_per_degree
         self._aperture = Aperture(self._bank.image_shape, density, aperture_sigma_deg)

@@ -37,18 +37,18 @@ class PaperMetric:
 
     Parameters
     ----------
-    viewing, mask_slope, workers
+    viewing, mask_slope
         As in `Aqm.paper`.
     """
 
     has_transient = False
 
-    def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE, workers: int = 1) -> None:
+    def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE) -> None:
         if not 0.0 <= mask_slope <= 1.0:
             raise InputError(f"metric: mask_slope is {mask_slope!r}; give a number from 0 to 1")
         self.viewing = viewing
         self._mask_slope = mask_slope
-        self._bank = ChannelBank(viewing, workers=workers)
+        self._bank = ChannelBank(viewing)
         self.bands = self._bank.bands
         self._table = SensitivityTable(_csf, self.bands, viewing.pixels_per_degree)
 
