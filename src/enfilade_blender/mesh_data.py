@@ -36,16 +36,31 @@ def read_mesh(data: Any) -> Mesh:
         colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 4)
     active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
     active_colour = data.color_attributes.render_color_index if colours else -1
+    triangles = corners[loops].reshape(-1, 3)
     return Mesh(
         positions=positions,
-        triangles=corners[loops].reshape(-1, 3),
+        triangles=triangles,
         normals=normals[loops].reshape(-1, 3, 3),
         uvs={name: uv.reshape(-1, 3, 2) for name, uv in uvs.items()},
         colours=colours,
         materials=slots[polygons],
         active_uv=active_uv,
         active_colour=list(colours)[active_colour] if 0 <= active_colour < len(colours) else "",
+        generated=_generated(data, positions, triangles),
     )
+
+
+def _generated(data: Any, positions: F32, triangles: Any) -> F32 | None:
+    """Coordinates of corners in the texture space of the mesh before modifiers, 0..1, as Cycles has them."""
+    if not len(positions):
+        return None
+    undeformed = _get(data.vertices, "undeformed_co", np.float32, len(positions) * 3).reshape(-1, 3)
+    place, size = np.float32(data.texspace_location), np.float32(data.texspace_size)
+    found: F32 = 0.5 + 0.5 * (undeformed - place) / np.where(size == 0.0, np.float32(1.0), size)
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    if np.allclose(found, (positions - low) / np.maximum(high - low, 1e-6), atol=1e-4):
+        return None
+    return found[triangles]
 
 
 def _get(items: Any, name: str, kind: Any, size: int) -> Any:

@@ -34,6 +34,8 @@ class Mesh:
         UV map of nodes that name none; empty where there is none.
     active_colour : str
         Attribute of nodes that name none; empty where there is none.
+    generated : (N, 3, 3) float32 or None
+        Generated coordinates of corners; None where they are the place within the bounds.
     """
 
     positions: F32
@@ -44,6 +46,7 @@ class Mesh:
     materials: I32
     active_uv: str = ""
     active_colour: str = ""
+    generated: F32 | None = None
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -59,6 +62,7 @@ class Mesh:
             uvs={name: uv[keep] for name, uv in self.uvs.items()},
             colours={name: colour[keep] for name, colour in self.colours.items()},
             materials=self.materials[keep],
+            generated=None if self.generated is None else self.generated[keep],
         )
 
     def transformed(self, matrix: npt.NDArray[np.float64]) -> Mesh:
@@ -80,6 +84,7 @@ class Mesh:
             normals=self.normals[:, ::-1],
             uvs={name: uv[:, ::-1] for name, uv in self.uvs.items()},
             colours={name: colour[:, ::-1] for name, colour in self.colours.items()},
+            generated=None if self.generated is None else self.generated[:, ::-1],
         )
 
     def mirrored(self, uv: str) -> npt.NDArray[np.bool_]:

@@ -21,7 +21,11 @@ MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
 SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
 WHITE = (1.0, 1.0, 1.0, 1.0)
-TARGET = "enfilade target"
+TARGET, GENERATED = "enfilade target", "enfilade generated"
+TEXTURES = {  # whose coordinates are generated ones where none are linked
+    "TEX_GRADIENT", "TEX_NOISE", "TEX_GABOR", "TEX_VORONOI", "TEX_MUSGRAVE", "TEX_WAVE", "TEX_MAGIC",
+    "TEX_CHECKER", "TEX_BRICK",
+}  # fmt: skip
 
 
 class BakeScene:
@@ -54,6 +58,10 @@ class BakeScene:
         data.use_auto_texspace = False
         data.texspace_location = 0.5 * (low + high)
         data.texspace_size = np.maximum(0.5 * (high - low), 1e-6)
+        if mesh.generated is not None:
+            data.attributes.new(GENERATED, "FLOAT_VECTOR", "CORNER").data.foreach_set(
+                "vector", np.ascontiguousarray(mesh.generated, np.float32).ravel()
+            )
         with self._canvas(data, placed.matrices[0], placed.colour, placed.index) as canvas:
             yield canvas
 
@@ -120,6 +128,8 @@ class Canvas:
         groups = set(bpy.data.node_groups)
         copy = material.copy()
         put_stand_ins(copy.node_tree)
+        if GENERATED in self._object.data.attributes:
+            _take_generated(copy.node_tree)
         _wire(copy.node_tree, output, image, is_normal=is_normal)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
@@ -151,6 +161,24 @@ def _data(mesh: Mesh) -> Any:
     data.update(calc_edges=True)
     data.normals_split_custom_set(mesh.normals.reshape(-1, 3))
     return data
+
+
+def _take_generated(tree: Any) -> None:
+    """Link the attribute of generated coordinates where these are used, in groups, too, which are copies."""
+    ends = [link.to_socket for link in tree.links if _is_generated(link)]
+    for node in tree.nodes:
+        if node.type == "GROUP" and node.node_tree is not None:
+            _take_generated(node.node_tree)
+        elif node.type in TEXTURES and not node.inputs["Vector"].is_linked:
+            ends.append(node.inputs["Vector"])
+    attribute = tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = GENERATED
+    for end in ends:
+        tree.links.new(attribute.outputs["Vector"], end)
+
+
+def _is_generated(link: Any) -> bool:
+    return link.from_node.type == "TEX_COORD" and link.from_socket.name == "Generated"
 
 
 def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:

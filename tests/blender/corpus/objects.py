@@ -10,12 +10,15 @@ from corpus.stage import (
     aim,
     camera,
     cube,
+    fill,
     finish,
     image,
     new_file,
+    node_of,
     plane,
     principled,
     save,
+    shader,
     sphere,
     stage,
     three,
@@ -55,6 +58,24 @@ def modifiers(folder):
     hidden.hide_render = True
     only_viewport = sphere("Viewport only", (0.8, -1.5, 0.5), 0.3, principled("viewport"))
     only_viewport.hide_viewport = True  # is rendered
+
+
+def modified_and_generated(folder):
+    """Patterns in generated coordinates, which are those before modifiers, with and without a link."""
+    stage()
+    waves, tree, diffuse = shader("waves", "BsdfDiffuse")
+    fill(
+        tree, diffuse, {"Color": node_of(tree, "TexChecker", Scale=4.0, Color1=COLOURS[0], Color2=COLOURS[1])}
+    )
+    row = cube("Row", (-1.6, 0.0, 0.3), 0.5, waves)
+    array = row.modifiers.new("Array", "ARRAY")
+    array.count, array.relative_offset_displace = 4, (1.2, 0.0, 0.0)
+    cells, tree, diffuse = shader("cells", "BsdfDiffuse")
+    place = node_of(tree, "TexCoord").outputs["Generated"]
+    fill(tree, diffuse, {"Color": node_of(tree, "TexChecker", Scale=6.0, Vector=place, Color2=COLOURS[2])})
+    ball = sphere("Ball", (1.2, 0.2, 0.6), 0.5, cells)
+    cast = ball.modifiers.new("Cast", "CAST")
+    cast.cast_type, cast.factor = "CUBOID", 0.9
 
 
 def geometry_nodes(folder):
