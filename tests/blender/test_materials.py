@@ -152,7 +152,7 @@ def test_generated_coordinates_are_those_before_modifiers(blender):
     )
     wanted, found = read_exr(theirs / "cycles-0001.exr"), render(out, 64, 1)
     difference = found - wanted
-    # 0.019 of noise and interpolated edges of the patterns; with those of the objects after modifiers it is 0.056.
+    # 0.019 of noise and interpolated edges; with coordinates of the modified objects it is 0.056.
     assert np.sqrt(np.square(difference).mean()) < 0.03
 
 
