@@ -15,6 +15,7 @@ from enfilade_blender.lights import Sun
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.image_pixels import linear_pixels
 from enfilade_blender.materials.stand_ins import put_stand_ins
+from enfilade_blender.materials.table import VIEW_SOCKETS
 from enfilade_blender.materials.values import Constant, Emission, Nothing
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection
@@ -143,6 +144,11 @@ def _for_light(world: Any, notes: Notes) -> Any:
     """A copy of a world as diffuse light sees it: no ray is one of the camera, which may see it."""
     copy = world.copy()
     copy.cycles_visibility.camera = True
+    for link in world.node_tree.links:
+        node, output = link.from_node, link.from_socket.name
+        if node.type == "LIGHT_PATH" or output in VIEW_SOCKETS.get(node.type, ()):
+            what, effect = f"{output} is left out", "the camera sees the world that lights the scene"
+            notes.add("approximated", world.name, node.name, what, effect)
     for node in put_stand_ins(copy.node_tree):
         name = node.image.name if node.image is not None else "none"
         what, effect = f"the image {name} is missing", "a mid grey is in its place"

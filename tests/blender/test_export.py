@@ -210,9 +210,11 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("DejaVu Sans Mono Book", "Font"),
         ("ViewLayer", "Override"),
         ("Second", ""),
+        ("metal", "Metallic BSDF"),
         ("coated", "Principled BSDF: Coat Tint"),
         ("coated", "Principled BSDF: Coat Normal"),
     }
+    assert ("World", "Is Camera Ray is left out") in notes(result, "approximated")
 
 
 def test_a_coat_is_even_over_a_bumpy_base(exported):

@@ -151,6 +151,8 @@ class Graph:
         if kind.note:
             self._notes.add("approximated", self._owner, node.name, kind.note, kind.effect)
 
+        self._note_metal(node)
+
         def named(name: str, default: tuple[float, ...]) -> Value:
             return self.value(node.inputs[name], groups) if name in node.inputs else Constant(default)
 
@@ -187,6 +189,15 @@ class Graph:
         effect = "the surface is seen, lights and casts shadows for all rays"
         self._notes.add("approximated", self._owner, mix.name, what, effect)
         return second if is_clear else first
+
+    def _note_metal(self, node: Any) -> None:
+        stretch = node.inputs.get("Anisotropy")
+        if stretch is not None and (stretch.is_linked or stretch.default_value != 0.0):
+            what, effect = "its anisotropy is left out", "highlights are round"
+            self._notes.add("not-carried", self._owner, node.name, what, effect)
+        if getattr(node, "fresnel_type", "") == "PHYSICAL_CONDUCTOR":
+            what, effect = "its indices of refraction are left out", "the metal has the node's base colour"
+            self._notes.add("not-carried", self._owner, node.name, what, effect)
 
     def _note_coat_normal(self, node: Any, groups: tuple[Any, ...]) -> None:
         weight = node.inputs["Coat Weight"]

@@ -173,6 +173,12 @@ def left_out(folder):
     for layer in scene.view_layers:
         layer.layer_collection.children["Seen in mirrors"].indirect_only = True
     scene.render.use_freestyle = True
+    metal, _, bsdf = shader("metal", "BsdfMetallic", Anisotropy=0.5)
+    bsdf.fresnel_type = "PHYSICAL_CONDUCTOR"
+    plane("Metal", (5.0, 0.0, 0.0), 1.0, metal)
+    sky = world((0.5, 0.5, 0.5)).node_tree
+    ray = sky.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
+    fill(sky, sky.nodes["Background"], {"Strength": node_of(sky, "Math", Value=ray)})
     editor = scene.sequence_editor_create()
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # before Blender 4.4
     strips.new_effect(name="White", type="COLOR", channel=1, frame_start=1, frame_end=3)
