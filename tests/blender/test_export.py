@@ -37,6 +37,7 @@ FILES = (
     "mirrored_camera",
     "lamp_nodes",
     "left_out",
+    "frozen",
     "simplified",
 )
 
@@ -215,6 +216,14 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("coated", "Principled BSDF: Coat Normal"),
     }
     assert ("World", "Is Camera Ray is left out") in notes(result, "approximated")
+
+
+def test_what_changes_is_noted(exported):
+    _, result = exported("frozen")
+    changes = {note["object"] for note in result["notes"] if note["node"] == "Animation"}
+    assert changes == {"Blinking", "driven", "film", "Growing"}
+    (blocked,) = (note["what"] for note in result["notes"] if note["node"] == "Drivers")
+    assert "drivers that need Python don't run" in blocked
 
 
 def test_a_coat_is_even_over_a_bumpy_base(exported):

@@ -173,6 +173,7 @@ def test_a_running_run_is_shown_as_far_as_it_is_finished(tmp_path):
     notes, text, data = written(folder, tmp_path)
     assert "state-unfinished" in text
     assert "4 of 10 frames, last result" in text
+    assert "rays per pixel so far" in text
     lock = Lock(folder)
     try:
         assert re.search(r"state-running.*4 of 10 frames, .*; process \d+ on", written(folder, tmp_path)[1])

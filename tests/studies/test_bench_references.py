@@ -57,6 +57,15 @@ def test_a_small_image_is_refused(job):
         draw_windows(walk)
 
 
+def test_a_path_that_shows_no_surface_has_no_windows(job):
+    away = np.eye(4)
+    away[:3, 3] = 1e6, 1e6, 1e6
+    cameras = tuple(replace(camera, world_from_camera=away) for camera in job.path.cameras)
+    walk = Walkthrough(replace(job.path, cameras=cameras), job.settings, job.open_renderer())
+    with pytest.raises(InputError, match="choose other frames"):
+        draw_windows(walk)
+
+
 @pytest.mark.parametrize("kind", FILTERS)
 def test_both_filters_are_those_of_the_renderer(job, held, kind):
     """Path traced by the renderer's own filters: equal within the noise, no bias over the window."""

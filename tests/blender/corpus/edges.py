@@ -192,6 +192,30 @@ def left_out(folder):
     return Path(lost).unlink
 
 
+def frozen(folder):
+    """What changes from frame to frame, by other ways than the keyframes of a pose."""
+    scene = new_file()
+    scene.frame_start, scene.frame_end = 1, 5
+    blinking = plane("Blinking", (0.0, 0.0, 0.0), 1.0, principled("grey"))
+    for frame in (1, 3):
+        blinking.hide_render = frame == 3
+        blinking.keyframe_insert("hide_render", frame=frame)
+    driven = principled("driven")
+    roughness = driven.node_tree.nodes["Principled BSDF"].inputs["Roughness"]
+    roughness.driver_add("default_value").driver.expression = "frame / 10"
+    by_script = plane("Driven", (2.0, 0.0, 0.0), 1.0, driven).driver_add("location", 0).driver
+    by_script.expression = "bpy.data.scenes[0].frame_current * 0.1"
+    film = image("film", tiles, 16)
+    film.filepath_raw, film.file_format = str(folder / "film0001.png"), "PNG"
+    film.save()
+    film.source = "SEQUENCE"
+    plane("Screen", (4.0, 0.0, 0.0), 1.0, principled("screen", film))
+    lamp = light("POINT", "Growing", (0.0, 0.0, 3.0), 10.0).data
+    for frame, radius in ((1, 0.1), (5, 0.5)):
+        lamp.shadow_soft_size = radius
+        lamp.keyframe_insert("shadow_soft_size", frame=frame)
+
+
 def simplified(_folder):
     """A subdivision that Simplify lowers, below an image on normalized coordinates."""
     scene = new_file()
