@@ -83,22 +83,28 @@ def geometry_nodes(folder):
     pebble = sphere("Pebble", (0.0, 0.0, -5.0), 0.12, principled("pebble", (0.6, 0.2, 0.5, 1), Roughness=0.4))
     pebble.hide_render = True
     ground = plane("Ground", (0.0, 0.0, 0.05), 3.0, principled("ground", Roughness=0.9))
-    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
-    points.inputs["Density"].default_value = 8.0
+    tree, start, points, end = _scattering("Scatter", density=8.0)
     info = tree.nodes.new("GeometryNodeObjectInfo")
     info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = pebble, True
     copies, join = tree.nodes.new("GeometryNodeInstanceOnPoints"), tree.nodes.new("GeometryNodeJoinGeometry")
-    tree.links.new(start.outputs[0], points.inputs["Mesh"])
     tree.links.new(points.outputs["Points"], copies.inputs["Points"])
     tree.links.new(info.outputs["Geometry"], copies.inputs["Instance"])
     tree.links.new(copies.outputs[0], join.inputs[0])
     tree.links.new(start.outputs[0], join.inputs[0])
     tree.links.new(join.outputs[0], end.inputs[0])
     ground.modifiers.new("Scatter", "NODES").node_group = tree
+
+
+def _scattering(name, density):
+    """A tree of geometry nodes that distributes points on a surface; its input, points and output."""
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
+    points.inputs["Density"].default_value = density
+    tree.links.new(start.outputs[0], points.inputs["Mesh"])
+    return tree, start, points, end
 
 
 def instances_of_meshes(folder):
@@ -110,12 +116,7 @@ def instances_of_meshes(folder):
     lent.hide_render = True
     for x, has_surface in ((-1.1, True), (1.1, False)):
         ground = plane("Pedestal", (x, 0.0, 0.4), 1.6, principled("pedestal", Roughness=0.9))
-        tree = bpy.data.node_groups.new("Cubes", "GeometryNodeTree")
-        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-        points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
-        points.inputs["Density"].default_value = 6.0
+        tree, start, points, end = _scattering("Cubes", density=6.0)
         box, painted = tree.nodes.new("GeometryNodeMeshCube"), tree.nodes.new("GeometryNodeSetMaterial")
         box.inputs["Size"].default_value = (0.2, 0.2, 0.2)
         painted.inputs["Material"].default_value = red
@@ -124,7 +125,6 @@ def instances_of_meshes(folder):
         made, lents, join = (
             tree.nodes.new(f"GeometryNode{n}") for n in (*["InstanceOnPoints"] * 2, "JoinGeometry")
         )
-        tree.links.new(start.outputs[0], points.inputs["Mesh"])
         tree.links.new(box.outputs["Mesh"], painted.inputs["Geometry"])
         for copies, source in ((made, painted.outputs[0]), (lents, info.outputs["Geometry"])):
             tree.links.new(points.outputs["Points"], copies.inputs["Points"])
