@@ -1,4 +1,4 @@
-"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5] [--workers 1]`.
+"""Time and memory of the metric: `python benchmarks/metric.py [--repeats 5]`.
 
 One table: CPU and wall time of a pair, of the first pair with the set-up, and the peak memory of the
 process. Each row runs in a process of its own. All sizes have 27.93 px/deg; "sequence" adds motion vectors
@@ -20,7 +20,7 @@ CASES = ("still", "moving", "moving and noisy", "sequence")
 KIB_PER_MIB = 1024
 
 
-def measure(width: int, height: int, mode: str, case: str, repeats: int, workers: int) -> dict[str, float]:
+def measure(width: int, height: int, mode: str, case: str, repeats: int) -> dict[str, float]:
     """Compare one pair `repeats` times; the best time counts, since others use the machine too."""
     import numpy as np
 
@@ -40,12 +40,16 @@ def measure(width: int, height: int, mode: str, case: str, repeats: int, workers
 
     started = time.process_time()
     viewing = Viewing(640, 480).cropped(width, height)
-    aqm = (Aqm.paper if mode == "paper" else Aqm.modern)(viewing, workers=workers)
+    aqm = (Aqm.paper if mode == "paper" else Aqm.modern)(viewing)
     sequence = SequenceAqm(aqm)
 
     def pair() -> None:
         if case == "sequence":
-            sequence.compare(test, reference, backward_flow_px=-viewing.flow_px(maps["velocity"]))
+            sequence.compare(
+                test,
+                reference,
+                backward_flow_px=-maps["velocity"] * (viewing.pixels_per_degree / viewing.fps),
+            )
         else:
             aqm.compare(test, reference, **maps)
 
@@ -69,11 +73,10 @@ def main() -> None:
     """Run every row in a process of its own and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--workers", type=int, default=1, help="threads of the FFT")
     parser.add_argument("--row", type=json.loads, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.row is not None:
-        print(json.dumps(measure(*options.row, options.repeats, options.workers)))
+        print(json.dumps(measure(*options.row, options.repeats)))
         return
     print(
         f"{'size':>10}  {'mode':<7}  {'case':<16}  {'CPU s':>7}  {'wall s':>7}  {'first CPU s':>11}  peak MiB"
@@ -81,8 +84,7 @@ def main() -> None:
     for width, height in SIZES:
         for mode, case in itertools.product(MODES, CASES):
             command = [sys.executable, str(Path(__file__).resolve())]
-            command += ["--row", json.dumps([width, height, mode, case])]
-            command += ["--repeats", str(options.repeats), "--workers", str(options.workers)]
+            command += ["--row", json.dumps([width, height, mode, case]), "--repeats", str(options.repeats)]
             output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
             row = json.loads(output)
             print(

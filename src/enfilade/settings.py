@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 from enfilade.errors import SettingsError
+from enfilade.viewing import Viewing
 
 S = TypeVar("S", bound="Section")
 
@@ -163,6 +164,25 @@ class ViewingSettings(Section):
         1.0, "Share of a frame's time for which the display shows it.", least=0.0, most=1.0
     )
     exposure_ev: float = option(0.0, "Exposure before the view transform, in stops.", least=-32.0, most=32.0)
+
+    def conditions(self, width_px: int, height_px: int, fps: float) -> Viewing:
+        """Viewing conditions of images of a size.
+
+        Raises
+        ------
+        InputError
+            They are not consistent.
+        """
+        return Viewing(
+            width_px,
+            height_px,
+            diagonal_m=self.diagonal_m,
+            distance_m=self.distance_m,
+            fps=fps,
+            peak_cd_m2=self.peak_cd_m2,
+            black_cd_m2=self.black_cd_m2,
+            persistence=self.persistence,
+        )
 
 
 @dataclass(frozen=True)

@@ -88,10 +88,6 @@ class Viewing:
         """Image velocity in degrees per second, from image flow in pixels per frame."""
         return flow_px_per_frame * (self.fps / self.pixels_per_degree)
 
-    def flow_px(self, velocity_deg_s: Quantity) -> Quantity:
-        """Image flow in pixels per frame, from image velocity in degrees per second."""
-        return velocity_deg_s * (self.pixels_per_degree / self.fps)
-
     def cropped(self, width_px: int, height_px: int) -> Viewing:
         """Conditions for an image of another size shown with the same pixels, pixel for pixel.
 

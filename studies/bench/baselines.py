@@ -1,4 +1,4 @@
-"""Baselines as methods: path tracing denoised frame by frame, and keyframes interpolated by FFmpeg."""
+"""Baselines as methods: path tracing, denoised frame by frame."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from enfilade.images import exact_fps
-from enfilade.methods.analysis import Analysis, keyframes_of
+from enfilade.methods.analysis import Analysis
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
 from enfilade.methods.denoise import denoise, denoiser_name, why_no_denoiser
 from enfilade.methods.reference import Reference
@@ -16,7 +15,6 @@ from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U8, Frame, Provenance
 from enfilade.renderer import Renderer
 from enfilade.settings import (
-    KeyframeSettings,
     LimitSettings,
     Section,
     Settings,
@@ -26,7 +24,6 @@ from enfilade.settings import (
 )
 from studies.bench.accumulation import History, accumulate
 from studies.bench.guides import Guides
-from studies.bench.interpolate import interpolate, why_no_interpolation
 
 VARIANTS: dict[str, dict[str, str]] = {  # of denoised baselines: settings
     "": {},
@@ -122,58 +119,6 @@ def _traced_everywhere(color: F32) -> U8:
     return np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8)
 
 
-class Interpolated(Method):
-    """Path-traced keyframes, with in-betweens interpolated by FFmpeg from the images alone.
-
-    The keyframes are the initial ones of the paper's method. A task holds all frames of a shot in memory.
-    """
-
-    name = "interpolated"
-    settings = (*Reference.settings, KeyframeSettings, ViewingSettings)
-    passes = (
-        Pass("keyframes", Frame),
-        Pass("shots", Frame, reads=("keyframes",)),
-        Pass(FRAMES, Frame, reads=("shots",)),
-    )
-
-    def tasks(self, analysis: Analysis) -> Iterable[Task]:
-        """Keyframes; a task for each shot; its frames."""
-        shots = zip(analysis.path.shots(), analysis.segments(), strict=True)
-        for number, (shot, segments) in enumerate(shots):
-            keyframes = [TaskId("keyframes", frame) for frame in keyframes_of(segments)]
-            yield from (Task("keyframes", of.frame, number) for of in keyframes)
-            yield Task("shots", shot.start, number, tuple(keyframes))
-            yield from (Task(FRAMES, frame, number, (TaskId("shots", shot.start),)) for frame in shot)
-
-    def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
-        """Run a task of any pass."""
-        match task.pass_name:
-            case "keyframes":
-                return Reference().run(task, inputs, walk)
-            case "shots":
-                return Output(_interpolated(task, inputs, walk))
-            case _:
-                return Output({task.frame: inputs.record("shots", task.frame)})
-
-
-def _interpolated(task: Task, inputs: Inputs, walk: Walkthrough) -> dict[int, Frame]:
-    """All frames of a shot; keyframes and repeated poses as traced."""
-    path, shot = walk.path, walk.path.shots()[task.shot]
-    numbers = keyframes_of(inputs.analysis.segments()[task.shot])
-    traced = {frame: inputs.record("keyframes", frame) for frame in numbers}
-    static = {frame: path.static_frame(frame) for frame in shot}
-    keyframes = {frame: traced[first] for frame, first in static.items() if first in traced}
-    frames = {frame: keyframes[max(k for k in keyframes if k <= frame)] for frame in shot}
-    if len(keyframes) > 1:
-        # The filter expects exposed images.
-        exposure = np.float32(2.0 ** walk.settings[ViewingSettings].exposure_ev)
-        exposed = {frame: of.color * exposure for frame, of in keyframes.items()}
-        reused = np.full((path.height, path.width), Provenance.REUSED, np.uint8)
-        for frame, image in interpolate(exposed, exact_fps(path.fps)):
-            frames[frame] = keyframes.get(frame, Frame(image / exposure, reused))
-    return frames
-
-
 def why_missing(family: str) -> str:
     """Reason why a baseline is not available, and how to install it; empty if it is available."""
-    return {"denoised": why_no_denoiser, "interpolated": why_no_interpolation}.get(family, str)()
+    return why_no_denoiser() if family == "denoised" else ""

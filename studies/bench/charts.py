@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, Figure, save
 from studies.bench.configurations import BASELINES
 from studies.bench.measures import LEAST_ERROR, QUALITIES
 from studies.bench.ratios import Point, front
@@ -20,7 +20,6 @@ COLUMNS = 3  # of the chart of one scene
 STYLES: dict[str, dict[str, Any]] = {  # by family; they differ in marker, too
     "traced": {"color": "#7A7A7A", "marker": "o", "label": "path tracing"},
     "denoised": {"color": ORANGE, "marker": "s", "label": "path tracing, Open Image Denoise"},
-    "interpolated": {"color": VERMILION, "marker": "X", "label": "minterpolate"},
     "paper": {"color": GREEN, "marker": "^", "label": "enfilade, paper (2000)"},
     "decoupled": {"color": BLUE, "marker": "D", "label": "enfilade, decoupled"},
 }

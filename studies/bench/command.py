@@ -101,10 +101,9 @@ def command(
 ) -> None:
     """Compare enfilade's methods with baselines on SCENE (Mitsuba 3 XML), all on one path tracer.
 
-    The configurations are path tracing, path tracing denoised by Open Image Denoise, keyframes interpolated
-    by FFmpeg's minterpolate, and the methods paper and decoupled, each at several settings. Each renders
-    whole frames in its own process, and is measured in a few windows against a reference of the same pixel
-    filter.
+    The configurations are path tracing, path tracing denoised by Open Image Denoise, and the methods paper
+    and decoupled, each at several settings. Each renders whole frames in its own process, and is measured in
+    a few windows against a reference of the same pixel filter.
     The command writes bench.json, bench.png (quality over CPU time) and crops.png.
     """
     mark_resumable(ctx)

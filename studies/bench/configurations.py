@@ -15,14 +15,12 @@ from studies.bench.baselines import VARIANTS, DenoiserSettings
 FAMILIES = {  # in the order of tables: title
     "traced": "path tracing",
     "denoised": "path tracing, denoised",
-    "interpolated": "minterpolate",
     "paper": "paper",
     "decoupled": "decoupled",
 }
 BASELINES = {
     "traced": "reference",
     "denoised": "studies.bench.baselines:Denoised",
-    "interpolated": "studies.bench.baselines:Interpolated",
 }
 NO_SPLITS = {"split_percent": 100.0}
 PRESETS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # of enfilade's methods: settings that differ
@@ -59,7 +57,7 @@ class Configuration:
         One of :data:`FAMILIES`; its configurations form one curve.
     job : Job
     variant : str
-        Quality of the denoiser, which distinguishes configurations of equal spp.
+        Of the denoised baseline: a name in :data:`VARIANTS`; empty for others.
     """
 
     name: str
@@ -89,18 +87,12 @@ class Configuration:
 
 
 def all_configurations(job: Job, *, traced: Iterable[int], denoised: Iterable[int]) -> list[Configuration]:
-    """All configurations: baselines at the given spp, and the presets applied to the job's settings.
-
-    Interpolated keyframes have the largest spp of `traced`.
-    """
-    spps = sorted(set(traced))
-    found = [_baseline("traced", f"traced-{n}", job, n) for n in spps]
+    """All configurations: baselines at the given spp, and the presets applied to the job's settings."""
+    found = [_baseline("traced", f"traced-{n}", job, n) for n in sorted(set(traced))]
     for n in sorted(set(denoised)):
         for variant in VARIANTS:
             name = f"denoised-{n}-{variant}".removesuffix("-")
             found.append(_baseline("denoised", name, job, n, variant))
-    if spps:
-        found.append(_baseline("interpolated", f"minterpolate-{spps[-1]}", job, spps[-1]))
     for name, (method, tables) in PRESETS.items():
         preset = replace(job, method=method, settings=_overridden(job.settings, tables))
         found.append(Configuration(name, method, preset))

@@ -8,11 +8,11 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, lanes, matrix3, opaque, vector3
+from enfilade.arrays import Array2f, Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.camera.pinhole import Camera
 from enfilade.errors import SettingsError
 from enfilade.kernels.random import PaddedSobolSampler, samplers
-from enfilade.kernels.rays import pinhole_directions
+from enfilade.kernels.rays import camera_rays
 from enfilade.kernels.replay import padded, recorded
 from enfilade.records import F32, SurfaceClass
 from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
@@ -138,8 +138,7 @@ def _stratified_rays(camera: Camera, pixels: npt.NDArray[np.uint32], random: Ran
     sampler = samplers(pixel, lane - slot * RAYS, random)
     row = pixel // opaque(camera.width)
     at = Array2f(pixel - row * opaque(camera.width), row) + sampler.next_2d()
-    direction = pinhole_directions(at.x, at.y, direction_from_pixel=matrix3(camera.direction_from_pixel))
-    return Rays(vector3(camera.eye), direction), sampler
+    return camera_rays(camera, at), sampler
 
 
 def _guides_of(hit: Surfaces) -> tuple[Any, Any]:

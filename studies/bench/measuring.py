@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ import scipy.ndimage
 
 from enfilade.camera.path import CameraPath
 from enfilade.comparison.measures import display_pair
-from enfilade.comparison.measures import why_missing as why_no_measure
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
@@ -26,6 +26,7 @@ from studies.bench.measures import QUALITIES, WindowPair, open_measure
 from studies.bench.references import ReferenceFrame, References
 from studies.bench.windows import Window
 
+FLIP_IS_MISSING = "FLIP is left out; install it with: pip install flip-evaluator"
 # Of each axis. Variances, square pixels: 1/12 of a box, .2433 of the Gaussian that ends at three deviations.
 GAUSSIAN_OF_BOX = (0.08, 0.84, 0.08)
 
@@ -40,7 +41,9 @@ def available(requested: Sequence[str], job: Job) -> tuple[list[str], list[str]]
     """
     path = job.path
     reasons = dict.fromkeys(QUALITIES, "")
-    reasons |= {"cvvdp": colorvideovdp.why_missing(), "flip": why_no_measure("flip")}
+    reasons["cvvdp"] = colorvideovdp.why_missing()
+    if find_spec("flip_evaluator") is None:
+        reasons["flip"] = FLIP_IS_MISSING
     if not any(path.neighbours(frame)[0] for frame in range(len(path))):
         reasons["flicker"] = "flicker is left out: it needs consecutive frames"
     for name in requested:

@@ -11,8 +11,8 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import Float, UInt, lanes, matrix3, vector3
-from enfilade.kernels.rays import pinhole_directions
+from enfilade.arrays import Array2f, UInt, lanes, vector3
+from enfilade.kernels.rays import camera_rays
 from enfilade.records import Geometry, Mask, SurfaceClass
 from enfilade.renderer import Rays, Renderer
 
@@ -39,11 +39,7 @@ def reflected_geometry(renderer: Renderer, geometry: Geometry) -> Geometry:
     camera = geometry.camera
     lane = lanes(pixels)
     row = lane // camera.width
-    direction = pinhole_directions(
-        Float(lane - row * camera.width) + 0.5,
-        Float(row) + 0.5,
-        direction_from_pixel=matrix3(camera.direction_from_pixel),
-    )
+    direction = camera_rays(camera, Array2f(lane - row * camera.width, row) + 0.5).direction
     depth = lanes(geometry.depth.ravel()[pixels])
     normal = lanes(np.ascontiguousarray(geometry.normal.reshape(-1, 1, 3)[pixels]))
 

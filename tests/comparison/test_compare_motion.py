@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from enfilade.comparison.motion import flow_of_layers
+from enfilade.comparison.motion import KINDS
 from enfilade.errors import ImageError
 from enfilade.images import write_exr
 from support.sequences import SIZE, Notes, compared, textured, write_run
@@ -26,6 +26,10 @@ def layers_of(kind):
     # Cycles: previous - now in x and (upwards) y, then now - next
     x, y, z, w = -RIGHT, DOWN, -RIGHT, DOWN
     return {f"{kind}": np.stack([plane(x), plane(y), plane(z)], axis=-1), f"{kind}.W": plane(w)}
+
+
+def flow_of_layers(layers):
+    return next((flow for flow in (kind.read(layers) for kind in KINDS) if flow is not None), None)
 
 
 @pytest.mark.parametrize("kind", ["own", "motion", "Vector", "View Layer.Vector"])

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from enfilade.metric.pooling import Pool, detection_probability, percent_visible, raised
+from enfilade.metric.pooling import Pool, percent_visible, raised
 
 
-def test_calibration():
+@pytest.mark.parametrize(("jnd", "probability"), [(0.0, 0.0), (1.0, 0.75), (2.0, 0.9375)])
+def test_calibration(jnd, probability):
     # §6: 1 JND is 75 %, 2 JND are 93.75 %.
-    assert detection_probability(np.float32([0, 1, 2])).tolist() == pytest.approx([0, 0.75, 0.9375])
+    pool = Pool(1, np.ones((2, 2), bool), 3.5)
+    pool.add(1, raised(np.full((2, 2), jnd**2, np.float32)), 1)
+    np.testing.assert_allclose(pool.comparison().probability, probability, rtol=1e-5)
 
 
 def test_channels_pool_with_exponent_3_5():

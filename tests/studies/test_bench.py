@@ -1,7 +1,6 @@
 """The bench on a small room, from the command line to its files; and its baselines."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,6 @@ from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
 from enfilade.methods.denoise import why_no_denoiser
-from enfilade.monitor import Silence
-from enfilade.runs.render import render
 from enfilade.settings import (
     DecoupledSettings,
     KeyframeSettings,
@@ -21,17 +18,15 @@ from enfilade.settings import (
     Placement,
     ReferenceSettings,
     SampleFilter,
-    SamplingSettings,
 )
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
 from studies.bench.bench import Place, bench, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
-from studies.bench.measuring import available, gaussian_of_box
+from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
 from studies.bench.tables import bench_tables
 from support.console import as_text
-from support.example_scenes import room_walk
 from support.study_runs import room_files, room_job
 
 MEASURES = ("aqm", "psnr", "flicker")
@@ -147,12 +142,12 @@ def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
         bench(
             job, all_configurations(job, traced=(), denoised=(1,)), Place(tmp_path, tmp_path), reference_spp=4
         )
-    monkeypatch.setattr("studies.bench.measuring.why_no_measure", lambda name: f"no {name}")
+    monkeypatch.setattr("studies.bench.measuring.find_spec", lambda _: None)
     monkeypatch.setattr("studies.bench.colorvideovdp.why_missing", lambda: "no cvvdp")
-    assert available((), job) == (["aqm", "psnr", "relrmse", "flicker"], ["no cvvdp", "no flip"])
+    assert available((), job) == (["aqm", "psnr", "relrmse", "flicker"], ["no cvvdp", FLIP_IS_MISSING])
     with pytest.raises(SettingsError, match=r"no measure 'ssim'; known are: cvvdp"):
         available(("ssim",), job)
-    with pytest.raises(SettingsError, match="no flip"):
+    with pytest.raises(SettingsError, match=FLIP_IS_MISSING):
         available(("flip",), job)
 
 
@@ -180,7 +175,7 @@ def test_all_configurations(tmp_path):
     found = all_configurations(room_job(tmp_path, 2), traced=(4, 1), denoised=(2,))
     names = [c.name for c in found]
     variants = ("", "-fast", "-followed", "-accumulated", "-accumulated-fast", "-accumulated-after")
-    assert names[:9] == ["traced-1", "traced-4", *(f"denoised-2{v}" for v in variants), "minterpolate-4"]
+    assert names[:8] == ["traced-1", "traced-4", *(f"denoised-2{v}" for v in variants)]
     assert [c.name for c in selected(found, ["traced-*", "paper-16"])] == ["traced-1", "traced-4", "paper-16"]
     denoised, accumulated, paper, decoupled = (
         found[names.index(name)]
@@ -196,26 +191,3 @@ def test_all_configurations(tmp_path):
     assert unsplit.settings[MaskSettings].split_percent == 100.0
     assert uniform.settings[KeyframeSettings].placement is Placement.UNIFORM
     assert uniform.settings[KeyframeSettings].spacing == 6
-
-
-def interpolated(folder, path=None, **tables):
-    job = room_job(folder, 5, method="studies.bench.baselines:Interpolated", **tables)
-    render(job if path is None else replace(job, path=path), folder / "run", Silence())
-    return frames_of(folder / "run")
-
-
-def test_interpolated_frames_keep_keyframes_and_highlights(tmp_path):
-    found = interpolated(tmp_path, viewing={"exposure_ev": -2.0})
-    traced = room_job(tmp_path, 5, method="reference", viewing={"exposure_ev": -2.0})
-    assert traced.settings[SamplingSettings].spp == 4
-    render(traced, tmp_path / "traced", Silence())
-    np.testing.assert_array_equal(found[[0, 4]], frames_of(tmp_path / "traced")[[0, 4]])
-    assert found[2].max() > 1.05  # in-betweens are not clipped at white before they are exposed
-
-
-def test_interpolation_rests_where_the_camera_does(tmp_path):
-    walk = room_walk(10, size=(48, 36))
-    cameras = (*walk.cameras[:4], *[walk.cameras[3]] * 6, *walk.cameras[4:])
-    found = interpolated(tmp_path, replace(walk, cameras=cameras, numbers=tuple(range(1, 17))))
-    assert all((found[frame] == found[3]).all() for frame in range(4, 10))
-    assert (found[10] != found[3]).any()

@@ -95,15 +95,7 @@ class CompareOptions:
         """Viewing conditions of an image of a size."""
         if self.display is not None:
             return self.display.viewing(*size, fps)
-        return Viewing(
-            *size,
-            diagonal_m=self.viewing.diagonal_m,
-            distance_m=self.viewing.distance_m,
-            fps=fps,
-            peak_cd_m2=self.viewing.peak_cd_m2,
-            black_cd_m2=self.viewing.black_cd_m2,
-            persistence=self.viewing.persistence,
-        )
+        return self.viewing.conditions(*size, fps)
 
 
 def compare(

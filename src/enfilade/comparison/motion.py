@@ -157,21 +157,6 @@ KINDS = (
 )
 
 
-def flow_of_layers(layers: Layers) -> Flow | None:
-    """Flow from the layers of an OpenEXR frame; None if none of a known kind is among them.
-
-    Known are our own ``forward.u/v`` with ``backward.u/v``; the Vector pass of Blender, whatever view
-    layer stands before its name; and ``motion.u/v``, pixels to the next frame, x right, y down.
-
-    Parameters
-    ----------
-    layers
-        From :func:`enfilade.images.read_exr`.
-    """
-    found = (kind.read(layers) for kind in KINDS)
-    return next((flow for flow in found if flow is not None), None)
-
-
 def _kind_of(sequence: Sequence) -> _Kind | None:
     if not sequence.name(0).lower().endswith(".exr"):
         return None

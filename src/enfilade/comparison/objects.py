@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import F32, F64, U32
 
-LUMINANCE = np.array((0.2126, 0.7152, 0.0722))  # Rec. ITU-R BT.709-6
 LEAST_PIXELS = 48  # of an object: the statistics of fewer say little
 HIGHLIGHT_SHARE = 0.02  # brightest pixels of an object
 DARKEST = 0.01  # of the mean of all pixels: differences of darker objects are relative to this
@@ -99,10 +99,10 @@ def _difference(
 ) -> ObjectDifference:
     ref_a, ref_b, test_a, test_b = (image[pixels] for image in images)
     reference, test = (ref_a + ref_b) / 2.0, (test_a + test_b) / 2.0
-    mean = max(float((reference @ LUMINANCE).mean()), floor, 1e-9)
+    mean = max(float((reference @ REC709_LUMINANCE).mean()), floor, 1e-9)
     noise = np.sqrt(_variance_of_mean(ref_a - ref_b) + _variance_of_mean(test_a - test_b))
-    of_ref = ref_a @ LUMINANCE, ref_b @ LUMINANCE
-    of_test = test_a @ LUMINANCE, test_b @ LUMINANCE
+    of_ref = ref_a @ REC709_LUMINANCE, ref_b @ REC709_LUMINANCE
+    of_test = test_a @ REC709_LUMINANCE, test_b @ REC709_LUMINANCE
     levels, contrasts = zip(*(_statistics(*halves) for halves in (of_ref, of_test)), strict=True)
     highlights = -_highlights(of_ref, of_test), _highlights(of_test, of_ref)
 

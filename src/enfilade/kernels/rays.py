@@ -36,21 +36,7 @@ def camera_rays(camera: Camera, at: Any) -> Rays:
     at : Array2f
         Image coordinates, pixels.
     """
-    matrix = matrix3(camera.direction_from_pixel)
-    return Rays(vector3(camera.eye), pinhole_directions(at.x, at.y, direction_from_pixel=matrix))
-
-
-def pinhole_directions(x: Any, y: Any, *, direction_from_pixel: Any) -> Any:
-    """World directions of unit depth through image points; Array3f.
-
-    Parameters
-    ----------
-    x, y : Float
-        Image coordinates, pixels.
-    direction_from_pixel : Matrix3f
-        Of :class:`enfilade.camera.Camera`.
-    """
-    return direction_from_pixel @ Array3f(x, y, 1)
+    return Rays(vector3(camera.eye), matrix3(camera.direction_from_pixel) @ Array3f(at.x, at.y, 1))
 
 
 def box_offsets(sample_point: Any) -> Any:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from enfilade.records import F32, Mask
+
+MISS_AT_ONE_JND = 0.25  # §6: 1 JND is seen in 75 % of cases
 
 
 @dataclass(frozen=True)
@@ -30,8 +34,6 @@ class Comparison:
     jnd : (H, W) float32
         Differences pooled over the channels (in the modern mode also over the aperture around each
         pixel), in just noticeable differences; 0 where not valid.
-    probability : (H, W) float32
-        Probability of detection, 1 - 0.25^jnd; 0 where not valid.
     valid : (H, W) bool
         Pixels that were compared.
     percent_visible : float
@@ -51,10 +53,14 @@ class Comparison:
     """
 
     jnd: F32
-    probability: F32
     valid: Mask
     percent_visible: float
     band_jnd: tuple[float, ...]
     score: float
     steady: Part
     transient: Part
+
+    @property
+    def probability(self) -> F32:
+        """Probability that each pixel's difference is seen, 1 - 0.25^J (§6), (H, W); 0 where not valid."""
+        return np.asarray(-np.expm1(self.jnd * np.float32(np.log(MISS_AT_ONE_JND))), np.float32)

@@ -51,8 +51,10 @@ class HalvesAqm:
 
     Parameters
     ----------
-    viewing, mask_slope, workers
+    viewing, mask_slope
         As in `Aqm.paper`.
+    workers
+        Threads of the FFT, 1 or more.
     """
 
     def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE, workers: int = 1) -> None:

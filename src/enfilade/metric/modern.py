@@ -40,7 +40,7 @@ class ModernMetric:
     7. Sensitivity corrected for the direction of motion within a channel: `direction`.
     8. Masking by a transducer, over orientations and bands (Legge and Foley 1980, Foley 1994): `transducer`.
     9. Errors that change from frame to frame, by the transient channel of castleCSF: `transient`.
-    10. Pooling over channels and probability of detection (§6): `pooling`.
+    10. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
 
     Parameters
     ----------

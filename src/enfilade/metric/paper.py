@@ -33,7 +33,7 @@ class PaperMetric:
     4. Spatiovelocity contrast sensitivity (Eq. 4): `csf`, `sensitivity`.
     5. Differences that Monte Carlo noise explains are not counted: `noise`.
     6. Mutual visual masking by threshold elevation (Daly 1993): `masking`.
-    7. Pooling over channels and probability of detection (§6): `pooling`.
+    7. Pooling over channels and probability of detection (§6): `pooling`, `comparison`.
 
     Parameters
     ----------

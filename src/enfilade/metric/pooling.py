@@ -1,4 +1,4 @@
-"""Pooling over channels and pixels, probability of detection, percentages and scores (§3.4, §6; Fig. 6)."""
+"""Pooling over channels and pixels, percentages and scores (§3.4, §6; Fig. 6)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from enfilade.metric.pyramid import Pyramid, double, halved_shape
 from enfilade.records import F32, Mask
 
 POOLING_EXPONENT = 3.5  # b, no unit: slope of the psychometric function (Daly 1993)
-MISS_AT_ONE_JND = 0.25  # §6: 1 JND is seen in 75 % of cases
-DETECTION_JND = 1.0  # §6: the paper counts a difference above this as visible
+DETECTION_JND = 1.0  # §6: seen in 75 % of cases; the paper counts a difference above this as visible
 
 
 def raised(squared: F32) -> F32:
@@ -19,12 +18,6 @@ def raised(squared: F32) -> F32:
     power = squared * rooted
     power *= np.sqrt(rooted, out=rooted)
     return power
-
-
-def detection_probability(jnd: F32) -> F32:
-    """Probability that the difference is seen: P = 1 - 0.25^J, 75 % at 1 and 93.75 % at 2 JND (§6)."""
-    probability = -np.expm1(jnd * np.float32(np.log(MISS_AT_ONE_JND)))
-    return np.asarray(probability, dtype=np.float32)
 
 
 def percent_visible(jnd: F32, valid: Mask) -> float:
@@ -68,7 +61,7 @@ class Pool:
         self._band_sums[is_transient][level - 1] += mean
 
     def comparison(self) -> Comparison:
-        """Finish: maps, probabilities, scores."""
+        """Finish: maps and scores."""
         jnd = self._map(False)
         score = steady = self._score(jnd)
         transient = 0.0
@@ -78,7 +71,6 @@ class Pool:
             score = self._score(jnd)
         return Comparison(
             jnd=jnd,
-            probability=detection_probability(jnd),
             valid=self._valid,
             percent_visible=percent_visible(jnd, self._valid),
             band_jnd=self._band_jnd(False, True),

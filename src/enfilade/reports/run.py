@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import CompareOptions
 from enfilade.errors import ImageError, RunFolderError, SceneError
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
@@ -92,9 +91,8 @@ class ReportedRun:
         self.there = tuple(i for i, number in enumerate(self.numbers) if self._run.line(FRAMES, number))
         job = read_table(folder)
         self.viewing_settings, self.video = _settings(job, folder)
-        self.viewing = CompareOptions(viewing=self.viewing_settings).conditions(
-            tuple(path["size"]), path["fps"]
-        )
+        width, height = path["size"]
+        self.viewing = self.viewing_settings.conditions(width, height, path["fps"])
         self.holder = holder_of(folder)
         ledger = folder / LEDGER_FILE
         changed = ledger if ledger.exists() else folder / RUN_FILE

@@ -21,7 +21,6 @@ from enfilade.images import check_encodable
 from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
 from enfilade.methods.opener import open_method
-from enfilade.methods.walkthrough import viewing_of
 from enfilade.renderer import Renderer, why_inseparable
 from enfilade.scene.opener import Scene
 from enfilade.settings import (
@@ -58,7 +57,7 @@ class Job:
     @property
     def viewing(self) -> Viewing:
         """Viewing conditions of the video."""
-        return viewing_of(self.path, self.settings)
+        return self.settings[ViewingSettings].conditions(self.path.width, self.path.height, self.path.fps)
 
     def opened_method(self) -> Method:
         """A new instance of the method.

@@ -12,9 +12,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
-from enfilade.comparison.measures.base import Measure, Scale
+from enfilade.comparison.measures.base import Measure
 from enfilade.comparison.measures.colorvideovdp import ColorVideoVdp
 from enfilade.comparison.measures.displayed import DisplayedPair, display_pair
 from enfilade.comparison.measures.flip import Flip
@@ -23,19 +21,17 @@ from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
 __all__ = [
-    "SCALES",
+    "MEASURES",
     "ColorVideoVdp",
     "DisplayedPair",
     "Flip",
     "Measure",
     "Psnr",
-    "Scale",
     "display_pair",
     "open_measure",
-    "why_missing",
 ]
 
-SCALES: dict[str, Scale] = {of.SCALE.name: of.SCALE for of in (Flip, Psnr, ColorVideoVdp)}
+MEASURES = (Flip.name, Psnr.name, ColorVideoVdp.name)
 
 
 def open_measure(name: str, viewing: Viewing) -> Measure:
@@ -44,7 +40,7 @@ def open_measure(name: str, viewing: Viewing) -> Measure:
     Parameters
     ----------
     name
-        One of :data:`SCALES`.
+        One of :data:`MEASURES`.
     viewing
         Viewing conditions.
 
@@ -61,13 +57,4 @@ def open_measure(name: str, viewing: Viewing) -> Measure:
         case "cvvdp":
             return ColorVideoVdp(viewing)
         case _:
-            raise SettingsError(f"there is no measure {name!r}; choose one of {', '.join(SCALES)}")
-
-
-def why_missing(name: str) -> str:
-    """Reason why a measure is not available, with the remedy; empty where it is."""
-    if name == "flip" and find_spec("flip_evaluator") is None:
-        return "FLIP is left out; install it with: pip install flip-evaluator"
-    if name == "cvvdp" and find_spec("pycvvdp") is None:
-        return "ColorVideoVDP is left out; install it with: pip install cvvdp"
-    return ""
+            raise SettingsError(f"there is no measure {name!r}; choose one of {', '.join(MEASURES)}")

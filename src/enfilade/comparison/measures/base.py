@@ -2,35 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Protocol
 
 from enfilade.comparison.measures.displayed import DisplayedPair
-
-
-@dataclass(frozen=True)
-class Scale:
-    """The scale of a measure.
-
-    Attributes
-    ----------
-    name : str
-        Short, for files and programs.
-    title : str
-        For tables and charts.
-    unit : str
-    is_more_better : bool
-    error_of : callable
-        Maps a score to an error, 0 or more, 0 for identical sequences, which is interpolated on a
-        logarithmic axis.
-    """
-
-    name: str
-    title: str
-    unit: str
-    is_more_better: bool = False
-    error_of: Callable[[float], float] = float
 
 
 class Measure(Protocol):

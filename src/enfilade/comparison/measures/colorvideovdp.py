@@ -8,17 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.comparison.measures.base import Scale
 from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
 
-PERFECT_JOD = 10.0
 BLACK_LEAST_CD_M2 = 1e-4  # the display model takes a contrast ratio
-
-
-def _lost(jod: float) -> float:
-    return max(PERFECT_JOD - jod, 0.0)
 
 
 class ColorVideoVdp:
@@ -40,8 +34,7 @@ class ColorVideoVdp:
     Keeps all frames until the end as half floats: 12 bytes for a pixel of a pair.
     """
 
-    SCALE = Scale("cvvdp", "ColorVideoVDP", "JOD", is_more_better=True, error_of=_lost)
-    name = SCALE.name
+    name = "cvvdp"
 
     def __init__(self, viewing: Viewing) -> None:
         try:

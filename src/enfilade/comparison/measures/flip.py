@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enfilade.comparison.measures.base import Scale
 from enfilade.comparison.measures.displayed import DisplayedPair
 from enfilade.errors import SettingsError
 from enfilade.viewing import Viewing
@@ -27,8 +26,7 @@ class Flip:
         ``flip-evaluator`` is not installed.
     """
 
-    SCALE = Scale("flip", "FLIP", "mean")
-    name = SCALE.name
+    name = "flip"
 
     def __init__(self, viewing: Viewing) -> None:
         try:

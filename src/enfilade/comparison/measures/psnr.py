@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from enfilade.comparison.measures.base import Scale
 from enfilade.comparison.measures.displayed import DisplayedPair
 
 
@@ -26,8 +25,7 @@ class Psnr:
     Infinite for identical frames. Noise counts in full, wherever it is and whether or not it is seen.
     """
 
-    SCALE = Scale("psnr", "PSNR", "dB", is_more_better=True, error_of=_rms)
-    name = SCALE.name
+    name = "psnr"
 
     def measure(self, pair: DisplayedPair) -> float:
         """PSNR of the next frame, dB."""
