@@ -9,6 +9,8 @@ from typing import Generic, TypeVar
 K = TypeVar("K")
 V = TypeVar("V")
 
+CACHED_PIXELS = 1 << 24  # of cached images: two of 3840x2160
+
 
 class LruCache(Generic[K, V]):
     """The least recently used value is dropped first.
@@ -36,3 +38,8 @@ class LruCache(Generic[K, V]):
         self._values.move_to_end(key)
         if len(self._values) > self._size:
             self._values.popitem(last=False)
+
+
+def images_within_memory(pixels: int, most: int) -> int:
+    """Number of images of a size to cache: `most`, or fewer large ones, at least one."""
+    return min(max(CACHED_PIXELS // pixels, 1), most)

@@ -8,38 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.cache import LruCache
+from enfilade.cache import LruCache, images_within_memory
 from enfilade.camera.path import CameraPath
 from enfilade.gbuffer import View, find_geometry
 from enfilade.kernels.tone import display_luminance
 from enfilade.records import F32, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Renderer
 from enfilade.settings import Settings, TraceSettings, ViewingSettings
-from enfilade.viewing import Viewing
 
 Timed = Callable[[str], AbstractContextManager[Any]]
 CACHED_VIEWS = 4  # computing a view again costs one ray a pixel
-
-
-def viewing_of(path: CameraPath, settings: Settings) -> Viewing:
-    """Viewing conditions of the video of a path.
-
-    Raises
-    ------
-    InputError
-        They are not consistent.
-    """
-    of = settings[ViewingSettings]
-    return Viewing(
-        width_px=path.width,
-        height_px=path.height,
-        diagonal_m=of.diagonal_m,
-        distance_m=of.distance_m,
-        fps=path.fps,
-        peak_cd_m2=of.peak_cd_m2,
-        black_cd_m2=of.black_cd_m2,
-        persistence=of.persistence,
-    )
 
 
 class Walkthrough:
@@ -68,9 +46,11 @@ class Walkthrough:
         self.path = path
         self.settings = settings
         self.renderer = renderer
-        self.viewing = viewing_of(path, settings)
+        self.viewing = settings[ViewingSettings].conditions(path.width, path.height, path.fps)
         self._timed = timed
-        self._views: LruCache[int, View] = LruCache(CACHED_VIEWS)
+        self._views: LruCache[int, View] = LruCache(
+            images_within_memory(path.width * path.height, CACHED_VIEWS)
+        )
 
     def view(self, frame: int) -> View:
         """G-buffer and motion vectors of a frame."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.arrays import release_memory
-from enfilade.cache import LruCache
+from enfilade.cache import LruCache, images_within_memory
 from enfilade.errors import RunFolderError
 from enfilade.images.records import read_record, write_record
 from enfilade.methods.analysis import Analysis, analyze, to_table
@@ -123,7 +123,9 @@ class _Inputs:
         self._passes = {of.name: of for of in passes}
         self._reader: Pass | None = None
         self._stopwatch = stopwatch
-        self._records: LruCache[tuple[str, int], Any] = LruCache(CACHED_RECORDS)
+        self._records: LruCache[tuple[str, int], Any] = LruCache(
+            images_within_memory(job.path.width * job.path.height, CACHED_RECORDS)
+        )
 
     @cached_property
     def analysis(self) -> Analysis:

@@ -90,7 +90,10 @@ def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
     assert abs(standard_errors(ours, reference)) < 4.0
 
 
-def test_bump_maps_keep_their_energy_and_change_no_albedo(tmp_path):
+METAL = '<bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf>'
+
+
+def test_below_maps_energy_is_kept_and_the_albedo_is_that_of_the_nested_bsdf(tmp_path):
     waves = np.uint8(127 + 120 * np.sin(np.arange(64) * 0.8))
     Image.fromarray(np.broadcast_to(waves, (64, 64)).copy()).save(tmp_path / "waves.png")
     tilted = np.broadcast_to(np.uint8([200, 128, 230]), (4, 4, 3)).copy()
@@ -102,19 +105,26 @@ def test_bump_maps_keep_their_energy_and_change_no_albedo(tmp_path):
             '<boolean name="raw" value="true"/></texture>'
         )
 
-    paint = MATERIALS["diffuse"]
+    paint, color = MATERIALS["diffuse"], '<rgb name="base_color" value="0.6, 0.4, 0.2"/>'
+    bumps = f'{texture("height", "waves.png")}<float name="scale" value="0.1"/>'
+    tilt = texture("normalmap", "tilted.png")
+    half_metal = f'<bsdf type="blendbsdf"><float name="weight" value="0.5"/>{METAL}{paint}</bsdf>'
+    principled = f'<bsdf type="principled">{color}<float name="metallic" value="0.75"/></bsdf>'
     balls = {
-        "bumpy": f'<bsdf type="bumpmap">{texture("height", "waves.png")}<float name="scale" value="0.1"/>'
-        f"{paint}</bsdf>",
-        "tilted": f'<bsdf type="normalmap">{texture("normalmap", "tilted.png")}{paint}</bsdf>',
+        "bumpy": f'<bsdf type="bumpmap">{bumps}{paint}</bsdf>',
+        "tilted": f'<bsdf type="normalmap">{tilt}{paint}</bsdf>',
+        "bumpy half metal": f'<bsdf type="bumpmap">{bumps}{half_metal}</bsdf>',
+        "tilted both sides": f'<bsdf type="twosided"><bsdf type="normalmap">{tilt}{half_metal}</bsdf></bsdf>',
+        "tilted mostly metal": f'<bsdf type="normalmap">{tilt}{principled}</bsdf>',
     }
+    part = {"bumpy half metal": 0.5, "tilted both sides": 0.5, "tilted mostly metal": 0.25}
     renderer, camera = opened_scene(tmp_path, balls), front_camera()
     geometry, names = find_geometry(renderer, camera), renderer.describe().shapes
     ours, reference = shaded(renderer, EMPTY, camera, 256), traced(renderer, camera, 256)
     for name in balls:
         here = geometry.shape_index == names.index(name) + 1
         assert np.ptp(geometry.albedo[here], axis=0).max() < 1e-5
-        assert geometry.albedo[here][0] == pytest.approx([0.6, 0.4, 0.2])
+        assert geometry.albedo[here][0] == pytest.approx(np.array([0.6, 0.4, 0.2]) * part.get(name, 1.0))
         assert abs(standard_errors(ours, reference, here.ravel())) < 4.0
 
 

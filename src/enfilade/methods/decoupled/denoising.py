@@ -9,12 +9,37 @@ import scipy.ndimage
 from enfilade.arrays import Array3f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.irradiance_cache import guide_of
+from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.wavelet import smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 
 MARGIN = 8  # pixels around those with light, which are denoised with them
+NOISE_SHARE = 0.25  # of the variance of irradiance: low-discrepancy samples have less noise than it tells
+OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
+
+
+def denoise_irradiance(geometry: Geometry, image: IrradianceImage, quality: str) -> IrradianceImage:
+    """An irradiance image whose layers are denoised apart; its variance is 0.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the image.
+    image
+    quality
+        Of the denoiser.
+    """
+    direct, indirect = (
+        Shading(
+            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=OUTLIER),
+            np.zeros_like(layer.variance),
+            layer.dropped,
+        )
+        for layer in (image.direct, image.indirect)
+    )
+    return IrradianceImage(direct, indirect, image.is_known)
 
 
 def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: str, outlier: float) -> F32:
@@ -43,14 +68,11 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     -------
     (H, W, 3) float32
     """
-    # Denoise the part of the image that has light.
-    white = np.repeat(where[..., None], 3, axis=2).astype(np.float32)
-    normal = np.where(where[..., None], geometry.normal, np.float32(0))
-    above, below = np.zeros_like(light.color), np.zeros_like(light.color)
-    for sign, clean in ((1, above), (-1, below)):
-        signed = np.maximum(sign * light.color, np.float32(0))
-        for part in _bounding_box(np.any(signed, axis=2)):
-            clean[part] = denoise(signed[part], white[part], normal[part], quality=quality)
+    # Denoise, light below zero apart.
+    above = _denoised(np.maximum(light.color, np.float32(0)), geometry, where, quality)
+    below: F32 | np.float32 = np.float32(0)
+    if light.color.min() < 0.0:
+        below = _denoised(np.maximum(-light.color, np.float32(0)), geometry, where, quality)
 
     # Smooth the difference.
     clean, lowest = above - below, -np.float32(outlier) * below
@@ -66,6 +88,17 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
     bounded: F32 = np.maximum(corrected, lowest)
     return bounded
+
+
+def _denoised(color: F32, geometry: Geometry, where: Mask, quality: str) -> F32:
+    """Denoise the part of an image that has light; the guides are an albedo of one, and the normals."""
+    clean = np.zeros_like(color)
+    for part in _bounding_box(np.any(color, axis=2)):
+        is_sampled = where[part][..., None]
+        white = np.repeat(is_sampled, 3, axis=2).astype(np.float32)
+        normal = np.where(is_sampled, geometry.normal[part], np.float32(0))
+        clean[part] = denoise(color[part], white, normal, quality=quality)
+    return clean
 
 
 def _bounding_box(mask: Mask) -> list[tuple[slice, slice]]:

@@ -253,17 +253,19 @@ class Integrator:
             scatter_add(target, layer, lane)
         return Samples(layers)
 
-    def entries_of(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any]:
-        """Keys of the hash grid's entries at the next surfaces of paths, and which of them lack irradiance.
+    def entries_of(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
+        """Keys of the hash grid's entries at the next surfaces of paths, and their irradiance in the images.
 
         Returns
         -------
         keys : tuple of UInt64
             One a level.
-        is_missing : Bool
-            Whether a surface is diffuse, and not in the images of the cache.
+        irradiance : Array3f
+            Over pi; 0 where the images do not show the surface.
+        is_known, is_missing : Bool
+            Whether a surface is diffuse, and in the images of the cache, or not.
         """
-        found: tuple[tuple[Any, ...], Any] = self._kernels.find_entries(cache, path)
+        found: tuple[tuple[Any, ...], Any, Any, Any] = self._kernels.find_entries(cache, path)
         return found
 
     def _gathered(

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from enfilade.camera.path import Segment
 from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
-from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
-from enfilade.records import Geometry, Mask, Shading
+from enfilade.records import Mask
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-NOISE_SHARE = 0.25  # of the samples' variance: low-discrepancy samples have less noise than it tells
-OUTLIER = 64.0  # times the denoised value: brighter estimates are limited where the mean is kept
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
@@ -53,9 +49,8 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
         layers=2,
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
-    layers = [shading.to_image(where) for shading in estimate.shadings]
-    direct, indirect = (replace(s, variance=np.float32(NOISE_SHARE) * s.variance) for s in layers)
-    return IrradianceImage(direct, indirect, where), estimate.paths
+    direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
+    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), estimate.paths
 
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
@@ -63,21 +58,8 @@ def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     geometry = shot.irradiance_geometry(frame)
     image, paths = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
-        image = _denoised(geometry, image, shot.settings.denoiser)
+        image = denoise_irradiance(geometry, image, shot.settings.denoiser)
     return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
-
-
-def _denoised(geometry: Geometry, image: IrradianceImage, quality: str) -> IrradianceImage:
-    """A denoised image, whose variance is 0."""
-    direct, indirect = (
-        Shading(
-            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=OUTLIER),
-            np.zeros_like(layer.variance),
-            layer.dropped,
-        )
-        for layer in (image.direct, image.indirect)
-    )
-    return IrradianceImage(direct, indirect, image.is_known)
 
 
 def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:

@@ -209,13 +209,14 @@ class PathKernels:
         emitted, vertex = self._intersect(cache, extended)
         return Array3f(sample.direct + emitted), vertex
 
-    def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any]:
-        """Keys of the next surface in the hash grid; whether it is diffuse and not in the images."""
+    def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
+        """Keys of the next surface in the hash grid; its irradiance in the images; if known, if missing."""
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index
-        _, is_known = cache.lookup(*at)
+        irradiance, is_known = cache.lookup(*at)
         is_diffuse = point.surfaces.is_hit & (dr.max(point.surfaces.albedo) > MIN_DIFFUSE_ALBEDO)
-        return _keys(point, path), Bool(path.is_active & is_diffuse & ~is_known)
+        is_diffuse &= path.is_active
+        return _keys(point, path), irradiance, Bool(is_diffuse & is_known), Bool(is_diffuse & ~is_known)
 
     def _estimate(self, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.

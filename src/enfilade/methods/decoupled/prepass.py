@@ -11,12 +11,13 @@ import numpy as np
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.denoising import denoise_irradiance
 from enfilade.methods.decoupled.light_camera import light_camera, reduced
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry
 from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
-from enfilade.settings import LimitSettings
+from enfilade.settings import DecoupledSettings, LimitSettings
 
 REDUCTION = 2  # of width and height, from those of the light camera
 SPP = 4
@@ -44,5 +45,9 @@ def trace_prepass(walk: Walkthrough, renderer: LobeRenderer, frame: int) -> Outp
     )
     estimate.add(SPP)
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
-    facts = {"rays": {"prepass": estimate.paths}, "dropped": direct.dropped}
-    return Output({frame: IrradianceImage(direct, indirect, where)}, facts)
+    image = IrradianceImage(direct, indirect, where)
+    if (denoiser := walk.settings[DecoupledSettings].denoiser) != "none":
+        # Without noise: all of the light that the denoiser loses is added again, since many paths gather it.
+        image = denoise_irradiance(geometry, image.with_noise(0.0), denoiser)
+    facts = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped}
+    return Output({frame: image}, facts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,14 @@ class IrradianceImage:
     def __post_init__(self) -> None:
         if self.is_known.shape != self.direct.variance.shape:
             raise ValueError(f"is_known is {self.is_known.shape}, expected {self.direct.variance.shape}")
+
+    def with_noise(self, share: float) -> IrradianceImage:
+        """The same image with a part of its variances."""
+        direct, indirect = (
+            replace(layer, variance=np.float32(share) * layer.variance)
+            for layer in (self.direct, self.indirect)
+        )
+        return replace(self, direct=direct, indirect=indirect)
 
 
 @dataclass(frozen=True, eq=False)

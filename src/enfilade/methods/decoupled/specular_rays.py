@@ -62,13 +62,19 @@ def shade_specular(
     # Trace over the whole pixel; beside another surface through its centre, unless it shows a virtual image.
     is_edge, is_thin = surface_edges(frame_rays.geometry)
     is_centre = where & (is_edge | is_thin) & ~is_seen_in
-    parts = (
+    traced = [
+        Shading(np.zeros((*where.shape, 3), np.float32), no_variance.copy()) for _ in range(SPECULAR_AOVS)
+    ]
+    paths = dropped = 0
+    for pixels, pixel_filter, purpose in (
         (where & ~is_centre, PixelFilter.GAUSSIAN, Purpose.SPECULAR),
         (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
-    )
-    images, counts = zip(*(frame_rays.traced(*part) for part in parts), strict=True)
-    traced = [Shading(a.color + b.color, a.variance + b.variance) for a, b in zip(*images, strict=True)]
-    paths, dropped = map(sum, zip(*counts, strict=True))
+    ):
+        estimate = frame_rays.traced(pixels, pixel_filter, purpose)
+        for aov, found in zip(traced, estimate.shadings, strict=True):
+            aov.color[pixels], aov.variance[pixels] = found.color, found.variance
+        paths, dropped = paths + estimate.paths, dropped + estimate.dropped
+        del estimate  # its sums take 80 bytes a pixel
 
     # Filter the AOVs along the surfaces that are seen in them.
     count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
@@ -140,13 +146,8 @@ class _FrameRays:
         """G-buffer of the frame."""
         return self.shot.walk.view(self.frame).geometry
 
-    def traced(
-        self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose
-    ) -> tuple[list[Shading], tuple[int, int]]:
-        """Trace as many rays in each of some pixels, (H, W), as the quality asks for.
-
-        Returns images of both AOVs, and the numbers of rays and of those that were not finite.
-        """
+    def traced(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose) -> Estimate:
+        """An estimate of pixels, (H, W), by as many rays as the quality asks for."""
 
         def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance(
@@ -155,7 +156,7 @@ class _FrameRays:
 
         found = self._estimate(pixels, pixel_filter, purpose, radiance)
         found.add(specular_spp(self.shot.settings))
-        return [layer.to_image(pixels) for layer in found.shadings], (found.paths, found.dropped)
+        return found
 
     def looked_up(self, pixels: Mask, aovs: Any) -> Estimate:
         """An estimate of pixels, (H, W), by lookups of uploaded AOVs, without rays yet."""

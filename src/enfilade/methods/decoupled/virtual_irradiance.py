@@ -12,19 +12,18 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from enfilade.arrays import lanes
+from enfilade.arrays import lanes, rows
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled.denoising import denoise_light
+from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
 from enfilade.methods.decoupled.integrator import OnMiss
-from enfilade.methods.decoupled.irradiance import NOISE_SHARE, OUTLIER
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
-from enfilade.records import Geometry
+from enfilade.records import Geometry, Shading
 from enfilade.renderer import PixelFilter, Purpose, Rays
 from enfilade.settings import LimitSettings
 
@@ -69,10 +68,12 @@ def _gather(
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return [], 0, 0
-    keys, is_missing = shot.integrator.entries_of(cache, path)
+    keys, irradiance, is_known, is_missing = shot.integrator.entries_of(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
         return [], 0, 0
+    known = np.array(is_known)
+    known_pixels, known_irradiance = pixels[lane[known]], rows(irradiance)[known]
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
     pixels = pixels[lane[chosen]]
 
@@ -92,18 +93,19 @@ def _gather(
     )
     estimate.add(SPP)
 
-    # Denoise it; a denoised pixel is as reliable as many samples.
-    where = np.zeros(virtual.shape_index.shape, np.bool_)
-    where.flat[pixels] = True
-    light = [layer.to_image(where) for layer in estimate.shadings]
-    light = [replace(layer, variance=np.float32(NOISE_SHARE) * layer.variance) for layer in light]
-    colors, times = [layer.color for layer in light], 1
+    # Denoise it together with what the prepass images show, whose pixels would be black among these; a
+    # denoised pixel is as reliable as many samples.
+    direct, indirect = estimate.shadings
+    gathered, times = direct.color + indirect.color, 1
     if (denoiser := shot.settings.denoiser) != "none":
+        is_gathered, is_shown = (np.zeros(virtual.shape_index.shape, np.bool_) for _ in range(2))
+        is_gathered.flat[pixels], is_shown.flat[[*pixels, *known_pixels]] = True, True
+        variance = np.float32(NOISE_SHARE) * (direct.variance + indirect.variance)
+        light = Shading(gathered, variance).to_image(is_gathered)
+        light.color.reshape(-1, 3)[known_pixels] = known_irradiance
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
-        colors = [denoise_light(guide, layer, where, quality=denoiser, outlier=OUTLIER) for layer in light]
-        times = RELIABLE_SAMPLES
-    direct, indirect = (color[where] for color in colors)
-    irradiance = direct + indirect
-    found = [Entries.of(np.array(key)[chosen], irradiance).repeated(times) for key in keys]
+        denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
+        gathered, times = denoised[is_gathered], RELIABLE_SAMPLES
+    found = [Entries.of(np.array(key)[chosen], gathered).repeated(times) for key in keys]
     return found, estimate.paths, estimate.dropped

@@ -3,8 +3,8 @@
 Most BSDFs of Mitsuba evaluate and sample their diffuse component alone when a context selects it. Their
 albedo is the value of that component for light along the normal. It includes the transmittance of a coat
 towards the viewer, so that the quotient of the diffuse component and the albedo does not depend on the view.
-Below a bump or normal map it is the reflectance alone: the quotient would contain the map's slopes, which
-have to stay out of what is cached and filtered.
+Below masks, bump and normal maps it is that of the nested BSDF: with that of the map, the quotient would
+contain the map's slopes, and could not be filtered.
 
 Some BSDFs can't be split by a context: ``principled`` evaluates all of itself, and ``mask`` samples its
 diffuse component wrongly. Their diffuse lobe is a Lambertian one with their own albedo, reduced by
@@ -23,10 +23,10 @@ import numpy as np
 from enfilade.arrays import Bool, Float, UInt
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
-from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe
+from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe, registry_index
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
-MAPPED = {"BumpMap", "NormalMap"}
+WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the BSDF nested in them
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
@@ -61,7 +61,14 @@ class Lobes:
             bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.FrontSide)),
             bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.BackSide)),
         )
-        self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE | MAPPED))
+        self._masked = bsdf_table(scene, lambda bsdf: "MaskBSDF" in _classes(bsdf))
+        self._has_masked = bool(dr.any(self._masked))
+        self._bases = (
+            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(_base(bsdf, is_front=True))), UInt),
+            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(_base(bsdf, is_front=False))), UInt),
+        )
+        self._turned = bsdf_table(scene, _is_turned)
+        self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._has_whole = bool(dr.any(self._whole))
         self._has_own_albedo = bool(dr.any(self._own_albedo))
@@ -70,8 +77,8 @@ class Lobes:
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        tables = self._whole, self._lambertian, self._own_albedo, self._sides, self._clear
-        return tables, self._specular_albedo
+        albedos = self._own_albedo, self._bases, self._turned, self._masked, self._specular_albedo
+        return self._whole, self._lambertian, self._sides, self._clear, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -98,20 +105,31 @@ class Lobes:
     def albedo(self, si: Any, bsdf: Any, active: Any) -> Any:
         """Albedo of the diffuse lobe, 0..1; Color3f."""
         is_diffuse = active & has_lobe(bsdf.flags(), "DiffuseReflection", "DiffuseTransmission")
-        is_own = _of(self._own_albedo, si, bsdf)
-        along_normal = mi.Vector3f(0.0, 0.0, dr.copysign(mi.Float(1.0), si.wi.z))
-        albedo = dr.pi * bsdf.eval(self._diffuse, si, along_normal, is_diffuse & ~is_own)
+        is_front = si.wi.z > 0.0
+
+        # Look through masks and maps, along the normal: below a coat that is seen at a grazing angle the
+        # albedo would be nearly 0, while a map's slopes reflect more.
+        base: Any = dr.reinterpret_array(
+            mi.BSDFPtr, dr.select(is_front, *(_of(table, si, bsdf) for table in self._bases))
+        )
+        is_outside = is_front | _of(self._turned, si, bsdf)
+        along_normal = mi.Vector3f(0.0, 0.0, dr.select(is_outside, mi.Float(1.0), -1.0))
+        inner = mi.SurfaceInteraction3f(si)
+        inner.wi = dr.select(_number(base) != _number(bsdf), along_normal, si.wi)
+
+        # Evaluate the diffuse component, or the reflectance where a BSDF does not tell it apart.
+        is_own = is_diffuse & _of(self._own_albedo, si, base)
+        albedo = dr.pi * base.eval(self._diffuse, inner, along_normal, is_diffuse & ~is_own)
         if self._has_own_albedo:
-            is_own &= is_diffuse
-            own = bsdf.eval_diffuse_reflectance(si, is_own)
-            own *= _opacity(si, bsdf, is_own)
+            own = base.eval_diffuse_reflectance(inner, is_own)
             for name, scale in NOT_DIFFUSE.items():
-                has_it = is_own & bsdf.has_attribute(name, is_own)
-                own *= 1.0 - dr.select(has_it, scale * bsdf.eval_attribute_1(name, si, has_it), 0.0)
-            own = dr.select(
-                dr.select(si.wi.z > 0.0, *(_of(side, si, bsdf) for side in self._sides)), own, 0.0
-            )
-            albedo = dr.select(is_own, own, albedo)
+                has_it = is_own & base.has_attribute(name, is_own)
+                own *= 1.0 - dr.select(has_it, scale * base.eval_attribute_1(name, inner, has_it), 0.0)
+            is_on_side = dr.select(is_front, *(_of(side, si, bsdf) for side in self._sides))
+            albedo = dr.select(is_own, dr.select(is_on_side, own, 0.0), albedo)
+        if self._has_masked:
+            is_masked = is_diffuse & _of(self._masked, si, bsdf)
+            albedo *= dr.select(is_masked, _opacity(si, bsdf, is_masked), 1.0)
         parts = (albedo.x, albedo.y, albedo.z)
         return mi.Color3f(*(dr.select(is_diffuse & dr.isfinite(c), dr.clip(c, 0.0, 1.0), 0.0) for c in parts))
 
@@ -237,8 +255,8 @@ def _lambert(si: Any, wo: Any, albedo: Any) -> tuple[Any, Any]:
 
 
 def _of(table: Any, si: Any, bsdf: Any) -> Any:
-    """Entries of a table of BSDFs; Bool."""
-    return dr.gather(Bool, table, _number(bsdf), si.is_valid())
+    """Entries of a table of BSDFs; Bool or UInt."""
+    return dr.gather(type(table), table, _number(bsdf), si.is_valid())
 
 
 def _number(bsdf: Any) -> Any:
@@ -255,6 +273,29 @@ def _albedo_entry(number: Any, cosine: Any) -> Any:
 def _classes(bsdf: Any) -> set[str]:
     """Mitsuba's classes of a BSDF and of those nested in it."""
     return {n.class_name() for n in mi.traverse(bsdf).hierarchy if isinstance(n, mi.BSDF)}
+
+
+def _nested(bsdf: Any) -> list[Any]:
+    """BSDFs nested directly in a BSDF."""
+    hierarchy = mi.traverse(bsdf).hierarchy.items()
+    return [node for node, (_, depth) in hierarchy if depth == 1 and isinstance(node, mi.BSDF)]
+
+
+def _is_turned(bsdf: Any) -> bool:
+    """Whether the base of a BSDF is below a two-sided BSDF, which turns directions to the front."""
+    if bsdf.class_name() in WRAPPERS:
+        return _is_turned(_nested(bsdf)[0])
+    is_two_sided = bsdf.class_name() == "TwoSidedBRDF"
+    return is_two_sided and any(side.class_name() in WRAPPERS for side in _nested(bsdf))
+
+
+def _base(bsdf: Any, *, is_front: bool) -> Any:
+    """The BSDF below masks and maps, and below a two-sided BSDF outside of these, on a side."""
+    if bsdf.class_name() in WRAPPERS:
+        return _base(_nested(bsdf)[0], is_front=is_front)
+    if _is_turned(bsdf):
+        return _base(_nested(bsdf)[0 if is_front else -1], is_front=True)
+    return bsdf
 
 
 def _is_diffuse_on(bsdf: Any, side: Any) -> bool:

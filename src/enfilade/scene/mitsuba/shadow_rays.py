@@ -30,13 +30,6 @@ class ShadowRays:
         self._scene = scene
         self.pass_null = pass_null
 
-    def sample_emitter(self, si: Any, sample_point: Any, active: Any) -> tuple[Any, Any]:
-        """Sample the emitters: a direction (DirectionSample3f), and radiance over its density (Color3f)."""
-        sample, radiance = self._scene.sample_emitter_direction(si, sample_point, False, active)
-        is_lit = active & (sample.pdf != 0.0)
-        share = self.transmittance(si, sample.p, is_lit)
-        return sample, dr.select(is_lit, radiance * share, 0.0)
-
     def transmittance(self, si: Any, target: Any, active: Any) -> Any:
         """Share of light that reaches a surface from a point; Color3f."""
         ray = si.spawn_ray_to(target)

@@ -38,7 +38,7 @@ class Shapes:
     def __init__(self, merged: MergedScene) -> None:
         scene = merged.scene
         shapes = scene.shapes()
-        registry = [_registry_index(mi.ShapePtr(shape)) for shape in shapes]
+        registry = [registry_index(mi.ShapePtr(shape)) for shape in shapes]
         sizes = [len(source) for source in merged.sources]
         first, count = np.zeros((2, max(registry) + 1), np.uint32)
         first[registry] = np.cumsum([0, *sizes[:-1]])
@@ -96,13 +96,22 @@ def is_lamp(shape: Any) -> bool:
     return bool(shape.is_emitter() and bsdf.class_name() == "Null" and bsdf.id() == LAMP)
 
 
-def bsdf_table(scene: Any, predicate: Callable[[Any], bool]) -> Any:
-    """A predicate of all BSDFs of a scene, nested ones and those of instances included; Bool."""
+def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any:
+    """A value of all BSDFs of a scene, nested ones and those of instances included, by registry index.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+    value
+        Of a BSDF.
+    kind
+        Bool or UInt.
+    """
     bsdfs = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
-    registry = [_registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
-    table = np.zeros(max(registry, default=0) + 1, bool)
-    table[registry] = [predicate(bsdf) for bsdf in bsdfs]
-    return Bool(table)
+    registry = [registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
+    table = np.zeros(max(registry, default=0) + 1, bool if kind is Bool else np.uint32)
+    table[registry] = [value(bsdf) for bsdf in bsdfs]
+    return kind(table)
 
 
 def surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
@@ -126,6 +135,7 @@ def has_lobe(flags: Any, *lobes: str) -> Any:
     return (flags & sum(int(getattr(mi.BSDFFlags, lobe)) for lobe in lobes)) != 0
 
 
-def _registry_index(pointer: Any) -> int:
+def registry_index(pointer: Any) -> int:
+    """Number of an object in Dr.Jit's registry, by a pointer to it such as ``BSDFPtr``."""
     index: Any = dr.reinterpret_array(mi.UInt32, pointer)
     return int(index[0])

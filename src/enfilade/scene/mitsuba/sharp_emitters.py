@@ -12,12 +12,11 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import BELOW_ONE, Discrete
-from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
 from enfilade.scene.mitsuba.shadow_rays import ShadowRays
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
-CANDIDATES = 8  # emitters of a group, at most, of which one is chosen
 
 
 class SharpEmitters:
@@ -27,6 +26,11 @@ class SharpEmitters:
     ----------
     scene : mitsuba.Scene
     shadow_rays
+
+    Attributes
+    ----------
+    count, soft_count : int
+        Number of emitters that are sampled, and of soft ones among them.
     """
 
     def __init__(self, scene: Any, shadow_rays: ShadowRays) -> None:
@@ -46,6 +50,8 @@ class SharpEmitters:
         soft = np.where(is_delta, 0.0, pmf)
         self._soft_share = opaque(max(float(soft.sum()), 1e-30))
         self._soft = Discrete.of(soft) if soft.any() else None
+        self.soft_count = int((soft > 0.0).sum())
+        self.count = int((weights > 0.0).sum())
 
     @property
     def is_empty(self) -> bool:
@@ -62,8 +68,8 @@ class SharpEmitters:
         """Radiance that a surface reflects of the light of sharp emitters.
 
         Up to :data:`SHADOW_RAYS` emitters have a shadow ray each. More are divided into groups with one
-        shadow ray each, to an emitter that is chosen in proportion to its contribution without occluders, by
-        resampled importance sampling (Talbot et al. 2005). The sun has a shadow ray of its own.
+        shadow ray each, to an emitter that is chosen in proportion to its contribution without occluders.
+        The sun has a shadow ray of its own.
 
         Parameters
         ----------
@@ -79,26 +85,18 @@ class SharpEmitters:
         """
         groups = min(self._count, SHADOW_RAYS)
         size = self._count / max(groups, 1)  # emitters of a group
-        candidates = min(math.ceil(size), CANDIDATES)
         found = Array3f(0)
         for group in range(groups):
-            chosen, chosen_weight, total, target = Array3f(0), Float(0), Float(0), mi.Point3f(0)
-            for candidate in range(candidates):
-                within = (candidate + sampler.next_1d()) / candidates
-                number = dr.minimum(UInt((group + within) * size), self._count - 1)
+
+            def candidate(place: Any, group: int = group) -> tuple[Any, Any]:
+                number = dr.minimum(UInt((group + place.x) * size), self._count - 1)
                 index = dr.gather(UInt, self._delta, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
-                square = mi.Point2f(sampler.next_2d())
-                sample, radiance = emitter.sample_direction(si, square, active)
-                contribution = Array3f(evaluate(sample.d) * radiance) * (size / candidates)
-                weight = dr.dot(contribution, Array3f(*REC709_LUMINANCE))
-                total += weight
-                is_taken = sampler.next_1d() * total < weight
-                chosen = dr.select(is_taken, contribution, chosen)
-                chosen_weight = dr.select(is_taken, weight, chosen_weight)
-                target = dr.select(is_taken, sample.p, target)
-            chosen *= dr.select(chosen_weight > 0.0, total / chosen_weight, 0.0)
-            found += self._unoccluded(si, target, chosen, active & (chosen_weight > 0.0))
+                sample, radiance = emitter.sample_direction(si, place, active)
+                return sample.p, Array3f(evaluate(sample.d) * radiance) * size
+
+            target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler)
+            found += self._unoccluded(si, target, chosen, active & (dr.max(chosen) > 0.0))
         if self._sun is not None:
             direction, radiance = self._sun.sample(sampler)
             target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
@@ -113,14 +111,14 @@ class SharpEmitters:
         -------
         sample : mitsuba.DirectionSample3f
         radiance : Color3f
-            Divided by the density; 0 where occluded.
+            Divided by the density; without occluders.
         """
         if self._soft is None:
             return dr.zeros(mi.DirectionSample3f, dr.width(si)), mi.Color3f(0)
         index, within, _ = self._soft.sample(sample_point.x)
         first, pmf = dr.gather(Float, self._first, index), dr.gather(Float, self._pmf, index)
         point = mi.Point2f(dr.minimum(first + within * pmf, BELOW_ONE), sample_point.y)
-        sample, radiance = self._shadow_rays.sample_emitter(si, point, active)
+        sample, radiance = self._scene.sample_emitter_direction(si, point, False, active)
         is_soft = active & ~sample.delta & ~(self._is_environment(sample) & self.is_sun(sample.d))
         sample.pdf = dr.select(is_soft, self.soft_pdf(sample.pdf), 0.0)
         return sample, dr.select(is_soft, radiance * self._soft_share, 0.0)

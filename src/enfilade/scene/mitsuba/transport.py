@@ -12,6 +12,7 @@ from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
+from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
 
@@ -155,18 +156,28 @@ class LightTransport:
         albedo: Any = None,
         soft_only: bool = False,
     ) -> Any:
-        """Radiance of a lobe from one sampled point on the emitters, MIS-weighted, divided by the albedo."""
-        sample_point = mi.Point2f(sampler.next_2d())
-        if soft_only:
-            emitter, radiance = self.sharp_emitters.sample_soft(si, sample_point, active)
-        else:
-            emitter, radiance = self._shadow_rays.sample_emitter(si, sample_point, active)
-        active = active & (emitter.pdf != 0.0)
-        value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), active)
-        if albedo is not None:
-            value = _divided(value, albedo)
-        weight = dr.select(emitter.delta, 1.0, _mis_weight(emitter.pdf, pdf))
-        return dr.select(active, value * radiance * weight, 0.0)
+        """Radiance of a lobe from one point on the emitters, MIS-weighted, divided by the albedo.
+
+        The point is chosen among one candidate for each of the emitters, or :data:`MOST_CANDIDATES`.
+        """
+
+        def candidate(place: Any) -> tuple[Any, Any]:
+            if soft_only:
+                emitter, radiance = self.sharp_emitters.sample_soft(si, place, active)
+            else:
+                emitter, radiance = self._scene.sample_emitter_direction(si, place, False, active)
+            is_lit = active & (emitter.pdf != 0.0)
+            value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), is_lit)
+            if albedo is not None:
+                value = _divided(value, albedo)
+            weight = dr.select(emitter.delta, 1.0, _mis_weight(emitter.pdf, pdf))
+            return emitter.p, Array3f(dr.select(is_lit, value * radiance * weight, 0.0))
+
+        emitters = self.sharp_emitters.soft_count if soft_only else self.sharp_emitters.count
+        target, light = resample(candidate, min(max(emitters, 1), MOST_CANDIDATES), sampler)
+        is_lit = active & (dr.max(dr.abs(light)) > 0.0)
+        share = self._shadow_rays.transmittance(si, target, is_lit)
+        return dr.select(is_lit, light * Array3f(share), 0.0)
 
 
 def _divided(lobe: Any, albedo: Any) -> Any:
