@@ -21,7 +21,7 @@ _REQUIREMENT = re.compile(r"^\s*([A-Za-z0-9._-]+)(.*?)(?:;.*extra\s*==\s*['\"]([
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked for.
+    """One check.
 
     Attributes
     ----------

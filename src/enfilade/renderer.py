@@ -133,8 +133,8 @@ class ShadingPoint:
     may_pass : Bool
         Whether one of these is a null interaction: a cut-out, opaque in part or not at all.
     specular_albedo : Float
-        Rough estimate of the share of light that these scatter towards the ray's origin. Russian roulette
-        weighs what goes on from here by it; it changes no mean.
+        Rough estimate of the share of light that these scatter towards the ray's origin: it sets the
+        probability of survival in Russian roulette, and changes no mean.
     bounce : Bounce or None
         The previous vertex; None for camera rays.
     native : Any

@@ -203,7 +203,7 @@ def test_nothing_to_compare_is_wrong_input(run, folders, tmp_path, what):
     [
         (("--display", "imax"), "unknown display 'imax'; known are: paper"),
         (("--heatmap", "heat.gif"), "give a folder, or a file .mp4"),
-        (("--graph", "graph.pdf"), "it is written as .png"),
+        (("--graph", "graph.pdf"), "give a file name that ends in .png"),
         (("--fps", "0"), "fps"),
         (("--layer", "a", "--layer", "b", "--layer", "c"), "--layer is given 3 times"),
     ],

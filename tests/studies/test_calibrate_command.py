@@ -42,7 +42,7 @@ def test_without_noise_no_threshold_may_suffice(run, line):
 
 @pytest.mark.parametrize(
     ("flags", "message"),
-    [(("--spp", "1"), "needs --spp 2 or more"), (("--plot", "curve.svg"), "it is written as .png")],
+    [(("--spp", "1"), "needs --spp 2 or more"), (("--plot", "curve.svg"), "file name that ends in .png")],
 )
 def test_refusals(run, line, flags, message):
     result = run(*line, *flags)

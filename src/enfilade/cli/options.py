@@ -337,4 +337,4 @@ def check_png(flag: str, file: Path | None) -> None:
     SettingsError
     """
     if file is not None and file.suffix.lower() != ".png":
-        raise SettingsError(f"{flag} {file}: it is written as .png")
+        raise SettingsError(f"{flag} {file}: give a file name that ends in .png")

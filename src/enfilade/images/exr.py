@@ -150,7 +150,7 @@ def _channels(layers: Mapping[str, Array]) -> dict[str, Array]:
         channels.update(zip(names, map(np.ascontiguousarray, planes), strict=True))
     sizes = {plane.shape for plane in channels.values()}
     if len(sizes) != 1 or 0 in next(iter(sizes)):
-        raise ValueError(f"layers of one size that is not 0 can be written, not {sorted(sizes)}")
+        raise ValueError(f"all layers must have the same size, which is not 0, not {sorted(sizes)}")
     return channels
 
 

@@ -55,7 +55,9 @@ class Workers:
                 "ray: lacks the address of a cluster; ray:HOST:PORT joins one, ray starts one"
             )
         if (self.count is not None and self.count < 1) or self.threads < 0:
-            raise SettingsError(f"{self.count} workers of {self.threads} threads each can't do anything")
+            raise SettingsError(
+                f"{self.count} workers of {self.threads} threads: give 1 worker or more, 0 threads or more"
+            )
         if self.executor == EXECUTORS[0] and (self.count or 1) > 1:
             raise SettingsError(
                 f"--workers {self.count}: in-process is one worker; add --executor processes, or leave it out"
