@@ -14,10 +14,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from enfilade.errors import SettingsError
-from enfilade.viewing import Viewing
+
+if TYPE_CHECKING:
+    from enfilade.viewing import Viewing
 
 S = TypeVar("S", bound="Section")
 
@@ -173,6 +175,8 @@ class ViewingSettings(Section):
         InputError
             They are not consistent.
         """
+        from enfilade.viewing import Viewing  # loads NumPy, which `--help` does without
+
         return Viewing(
             width_px,
             height_px,

@@ -173,7 +173,7 @@ def test_layers_of_parts_have_the_names_of_their_parts(tmp_path):
     ],
 )
 def test_layers_that_can_not_be_written(tmp_path, layers):
-    with pytest.raises(ValueError, match=r"can't be written|must have the same size"):
+    with pytest.raises(ValueError, match=r"can be written|can't be written|same size"):
         write_exr(tmp_path / "a.exr", layers)
     with pytest.raises(ValueError, match="itself writes: type"):
         write_exr(tmp_path / "a.exr", NOISE, attributes={"type": "x"})
