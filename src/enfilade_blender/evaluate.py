@@ -165,7 +165,7 @@ def _too_many(limits: Limits, name: str) -> ExportError:
 def _place(instance: Any, notes: Notes) -> Placed | None:
     obj = instance.object
     _note_object(instance, notes)
-    mesh = read_mesh(obj.data)
+    mesh = read_mesh(obj.data, obj.name, notes)
     if len(mesh) == 0:
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)

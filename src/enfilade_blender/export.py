@@ -10,6 +10,7 @@ import bpy
 
 from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
+from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.left_out import note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
@@ -33,7 +34,7 @@ def export(job: Job) -> dict[str, Any]:
     Raises
     ------
     ExportError
-        The file can't be opened, or passes a limit.
+        The file can't be opened, passes a limit, or has nothing to render.
     """
     notes = Notes()
     report_progress(0.0, "open")
@@ -47,6 +48,11 @@ def export(job: Job) -> dict[str, Any]:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
     report_progress(0.1, "meshes")
     evaluated = evaluate(selection, job.limits, notes)
+    if not evaluated.placed:
+        raise ExportError(
+            "there is nothing to render: no object has a surface that renders show", selection.scene.name,
+            "add a mesh to the scene, or choose another scene or view layer",
+        )  # fmt: skip
     note_inputs(selection, notes)
     report_progress(0.3, "materials")
     shapes = Shapes(job, selection, views, notes)

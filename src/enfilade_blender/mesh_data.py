@@ -3,19 +3,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from enfilade_blender.notes import Notes
 from enfilade_blender.ply import F32, Mesh
 
+UNIT = 1e-2  # deviation of a normal's length from 1
 
-def read_mesh(data: Any) -> Mesh:
+
+def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
     """Triangles of an evaluated mesh, with normals, UV maps and colours.
+
+    Triangles with a vertex that is not finite, which Mitsuba refuses, are left out with a note.
 
     Parameters
     ----------
     data : bpy.types.Mesh
+    owner : str
+        Name of its object, for notes.
+    notes
     """
     data.calc_loop_triangles()
     count = len(data.loop_triangles)
@@ -37,7 +46,7 @@ def read_mesh(data: Any) -> Mesh:
     active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
     active_colour = data.color_attributes.render_color_index if colours else -1
     triangles = corners[loops].reshape(-1, 3)
-    return Mesh(
+    mesh = Mesh(
         positions=positions,
         triangles=triangles,
         normals=normals[loops].reshape(-1, 3, 3),
@@ -48,6 +57,24 @@ def read_mesh(data: Any) -> Mesh:
         active_colour=list(colours)[active_colour] if 0 <= active_colour < len(colours) else "",
         generated=_generated(data, positions, triangles),
     )
+    is_finite = np.isfinite(positions).all(axis=1)[triangles].all(axis=1)
+    return mesh if is_finite.all() else _without_broken(mesh, is_finite, owner, notes)
+
+
+def _without_broken(mesh: Mesh, is_finite: Any, owner: str, notes: Notes) -> Mesh:
+    """The triangles whose positions are finite; normals that others have made void are those of triangles."""
+    count = np.count_nonzero(~is_finite)
+    what = f"triangles with a vertex that is NaN or infinite are left out: {count} of {len(mesh)}"
+    notes.add("not-carried", owner, "Mesh", what, "they are missing from the picture")
+    mesh = mesh.select(is_finite)
+    edges = np.diff(mesh.positions[mesh.triangles], axis=1)
+    flat = np.cross(edges[:, 0], edges[:, 1])
+    flat /= np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-30)
+    is_unit = np.abs(np.linalg.norm(mesh.normals, axis=-1, keepdims=True) - 1.0) < UNIT
+    generated = mesh.generated
+    if generated is not None and not np.isfinite(generated).all():
+        generated = None
+    return replace(mesh, normals=np.where(is_unit, mesh.normals, flat[:, None]), generated=generated)
 
 
 def _generated(data: Any, positions: F32, triangles: Any) -> F32 | None:

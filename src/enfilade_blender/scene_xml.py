@@ -26,6 +26,11 @@ def plugin(tag: str, kind: str, *children: Element, **properties: Property) -> E
         Nested elements without a name.
     **properties
         Three numbers are a colour, a 4x4 or 3x3 array is a transform, an element is nested with that name.
+
+    Raises
+    ------
+    TypeError
+        A property is of another type, such as a scalar of NumPy: its element would be a wrong one.
     """
     element = ET.Element(tag, type=kind)
     for name, value in properties.items():
@@ -94,7 +99,9 @@ def _property(name: str, value: Property) -> Element:
         return ET.Element("string", name=name, value=value)
     if isinstance(value, tuple):
         return ET.Element("rgb", name=name, value=" ".join(_text(number) for number in value))
-    return ET.Element("float", name=name, value=_text(value))
+    if isinstance(value, float):
+        return ET.Element("float", name=name, value=_text(value))
+    raise TypeError(f"{name} is a {type(value).__name__}, for which Mitsuba's XML has no element")
 
 
 def _transform(name: str, matrix: np.ndarray) -> Element:

@@ -201,6 +201,7 @@ def test_settings_that_are_left_out_are_noted(exported):
     _, result = exported("left_out")
     assert {(note["object"], note["node"]) for note in result["notes"] if note["kind"] == "not-carried"} == {
         ("No gloss", "Ray visibility"),
+        ("Torn", "Mesh"),
         ("Scene", "Render Region"),
         ("Scene", "Sequencer"),
         ("Scene", "Freestyle"),
@@ -230,6 +231,22 @@ def test_a_coat_is_even_over_a_bumpy_base(exported):
     bsdf = ET.parse(exported("left_out")[0] / "scene.xml").find("bsdf[@id='material coated']")
     kinds = [nested.get("type") for nested in bsdf.find("bsdf").findall("bsdf")]
     assert kinds == ["normalmap", "conductor"]
+
+
+def test_triangles_without_a_place_are_left_out(exported):
+    out, result = exported("left_out")
+    assert ("Torn", "triangles with a vertex that is NaN or infinite are left out: 1 of 3") in notes(
+        result, "not-carried"
+    )
+    torn = shapes(out)["Torn"]
+    assert torn.face_count() == 2
+    normals = np.array(mi.traverse(torn)["vertex_normals"]).reshape(-1, 3)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_file_of_nothing_is_refused(blender):
+    code, _, error = blender.job(blender.make("nothing")[0], "nothing")
+    assert (code, "there is nothing to render" in error["what"]) == (3, True)
 
 
 def test_a_library_of_another_folder_is_refused_unless_it_is_allowed(blender, files, tmp_path):

@@ -69,6 +69,13 @@ def test_a_rewritten_image_is_looked_up_as_the_image(made):
     assert "the extension Clip is taken as Extend" in notes["half"]
 
 
+def test_a_baked_colour_above_1_is_kept(made):
+    _, elements, _ = made
+    texture = elements["material bright: bright"].find(".//texture")
+    assert texture.find("boolean[@name='raw']").get("value") == "true"
+    assert texture.find("string[@name='filename']").get("value").endswith(".exr")
+
+
 def test_brushed_metal_is_stretched_along_its_uv_map(made):
     out, _, notes = made
     assert b"property float u" in (out / "meshes" / "brushed.ply").read_bytes()

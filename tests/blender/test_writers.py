@@ -103,6 +103,12 @@ def test_ids_are_unique_and_without_reserved_characters():
     ]
 
 
+def test_scalars_of_numpy_are_no_properties():
+    for value in (np.bool_(True), np.float32(1.0), np.int64(1)):
+        with pytest.raises(TypeError, match="raw is a"):
+            plugin("texture", "bitmap", raw=value)
+
+
 def test_mitsuba_loads_what_is_written(tmp_path):
     metal = plugin(
         "bsdf", "roughconductor", material="none", alpha=0.1, specular_reflectance=colour((1.5, 1.0, 0.2))

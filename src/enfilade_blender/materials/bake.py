@@ -155,7 +155,7 @@ class Bakery:
             return Constant(colour)
         if covered is not None:
             pixels = np.where(covered[..., None], pixels, mean)
-        is_data = output.socket.type != "RGBA" or pixels.max() > 1.0
+        is_data = output.socket.type != "RGBA" or bool(pixels.max() > 1.0)
         file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
         self._note(output, name, len(pixels))
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))

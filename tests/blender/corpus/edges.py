@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials that are easily lost: one plane of each."""
 
+import math
 import shutil
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
@@ -183,6 +184,7 @@ def left_out(folder):
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # before Blender 4.4
     strips.new_effect(name="White", type="COLOR", channel=1, frame_start=1, frame_end=3)
     scene.cycles.caustics_reflective, scene.cycles.sample_clamp_indirect = False, 2.0
+    _torn()
     text = bpy.data.curves.new("Text", "FONT")
     lost = shutil.copy(
         next(Path(bpy.utils.system_resource("DATAFILES", path="fonts")).glob("DejaVu*")), folder
@@ -190,6 +192,22 @@ def left_out(folder):
     text.body, text.font = "a", bpy.data.fonts.load(lost)
     add("Text", text)
     return Path(lost).unlink
+
+
+def _torn():
+    """A smooth roof of three triangles, one of which has a vertex nowhere; that of its ridge is shared."""
+    data = bpy.data.meshes.new("Torn")
+    ridge, eaves = [(0.0, -1.0, 1.0), (0.0, 1.0, 1.0)], [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    data.from_pydata([*ridge, *eaves, (math.nan, 0.0, 0.0)], [], [(0, 1, 2), (1, 0, 3), (0, 3, 4)])
+    data.materials.append(principled("roof", (0.5, 0.2, 0.1, 1)))
+    data.shade_smooth()
+    add("Torn", data)
+
+
+def nothing(_folder):
+    """A scene without any object."""
+    camera = new_file().camera
+    bpy.data.objects.remove(camera)
 
 
 def frozen(folder):
@@ -289,6 +307,14 @@ def _bumpy_plastic(half):
     matt = node_of(tree, "BsdfDiffuse", Normal=node_of(tree, "Bump", Height=half))
     gloss = node_of(tree, "BsdfAnisotropic", Color=(1.0, 0.5, 0.5, 1), Roughness=0.2)
     fill(tree, mix, {0: node_of(tree, "Fresnel", IOR=1.5), 1: matt, 2: gloss})
+    return material
+
+
+def _bright(_half):
+    """Colours of 0 to 2."""
+    material, tree, bsdf = shader("bright", "BsdfDiffuse")
+    checker = node_of(tree, "TexChecker", Color1=(0.5, 0.5, 0.5, 1), Color2=(2, 2, 2, 1))
+    fill(tree, bsdf, {"Color": checker})
     return material
 
 
