@@ -57,7 +57,7 @@ def export(job: Job) -> dict[str, Any]:
     report_progress(0.3, "materials")
     shapes = Shapes(job, selection, views, notes)
     elements = shapes.write(evaluated.placed)
-    note_light(selection, notes, has_glass=bool(shapes.kinds & GLASS))
+    note_light(selection, evaluated.lamps, notes, has_glass=bool(shapes.kinds & GLASS))
     report_progress(0.9, "lights")
     lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
     note_sun(sun, views, selection, notes)

@@ -10,9 +10,13 @@ import bpy
 
 from enfilade_blender.job import Job
 from enfilade_blender.notes import Notes
-from enfilade_blender.records import Selection
+from enfilade_blender.records import Lamp, Selection
 
 PASSED_ON = {"R_LAYERS", "COMPOSITE", "VIEWER", "GROUP_OUTPUT", "REROUTE", "FRAME"}  # compositor nodes
+FAST_GI_EFFECTS = {
+    "REPLACE": "indirect light is computed, not approximated: it may be brighter or darker",
+    "ADD": "indirect light is darker: the approximation adds light of the world",
+}
 LEAST_CLAMP = 10.0  # Cycles' own limit of indirect light; a lower one makes pictures darker
 
 
@@ -32,9 +36,8 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
         ("Compositor", "its compositor", picture): render.use_compositing and _has_compositor(scene),
         ("Sequencer", "its video sequencer", picture): render.use_sequencer and _has_strips(scene),
         ("Freestyle", "its lines", picture): render.use_freestyle,
-        ("Render Region", "its crop to the render region", "the whole frame is rendered"): (
-            render.use_border and render.use_crop_to_border
-        ),
+        ("Render Region", "its render region", "the whole frame is rendered"): render.use_border,
+        ("Stereoscopy", "its pair of views", "there is one, of the camera itself"): render.use_multiview,
         ("Frame Step", f"its step of {scene.frame_step}", "every frame is rendered"): scene.frame_step != 1,
     }
     for (name, what, effect), is_used in settings.items():
@@ -81,7 +84,7 @@ def note_inputs(selection: Selection, notes: Notes) -> None:
         notes.add("not-carried", selection.scene.name, "Drivers", what, "what they drive is 0")
 
 
-def note_light(selection: Selection, notes: Notes, *, has_glass: bool) -> None:
+def note_light(selection: Selection, lamps: list[Lamp], notes: Notes, *, has_glass: bool) -> None:
     """Note light that Cycles leaves out by its settings."""
     scene, cycles = selection.scene, selection.scene.cycles
     indirect = cycles.sample_clamp_indirect
@@ -93,7 +96,16 @@ def note_light(selection: Selection, notes: Notes, *, has_glass: bool) -> None:
         ("Clamping", "bright paths are brighter"): (
             cycles.sample_clamp_direct > 0.0 or 0.0 < indirect < LEAST_CLAMP
         ),
+        ("Fast GI Approximation", FAST_GI_EFFECTS[cycles.fast_gi_method]): cycles.use_fast_gi,
     }
     for (name, effect), is_left_out in settings.items():
         if is_left_out:
             notes.add("not-carried", scene.name, f"Light Paths: {name}", "the setting is left out", effect)
+    lights = [(lamp.name, lamp.data.cycles) for lamp in lamps]
+    if scene.world is not None:
+        lights.append((scene.world.name, scene.world.cycles))
+    for name, light in lights:
+        if light.max_bounces < cycles.max_bounces:
+            what = f"its limit of bounces, {light.max_bounces}, is left out"
+            effect = "its light is reflected further, and indirect light is brighter"
+            notes.add("not-carried", name, "Max Bounces", what, effect)

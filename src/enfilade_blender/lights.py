@@ -158,9 +158,13 @@ def needs_passing(made: list[Element], sun: Sun | None) -> bool:
 
 
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
-    """Elements of one lamp; none for a dark one."""
+    """Elements of one lamp; none for one that is dark, or takes light away."""
     data, name = lamp.data, lamp.name
-    colour = lamp_colour(lamp, notes)
+    r, g, b = lamp_colour(lamp, notes)
+    if min(r, g, b) < 0.0:
+        what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
+        notes.add("not-carried", name, "Power", what, effect)
+    colour = max(r, 0.0), max(g, 0.0), max(b, 0.0)
     if max(colour) <= 0.0:
         return []
     _note_unusual(lamp, notes)

@@ -201,6 +201,10 @@ def test_settings_that_are_left_out_are_noted(exported):
     _, result = exported("left_out")
     assert {(note["object"], note["node"]) for note in result["notes"] if note["kind"] == "not-carried"} == {
         ("No gloss", "Ray visibility"),
+        ("No gloss", "Max Bounces"),
+        ("Dimmer", "Power"),
+        ("Scene", "Stereoscopy"),
+        ("Scene", "Light Paths: Fast GI Approximation"),
         ("Torn", "Mesh"),
         ("Scene", "Render Region"),
         ("Scene", "Sequencer"),

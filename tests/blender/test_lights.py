@@ -72,7 +72,17 @@ def test_power_does_not_change_with_the_scale_of_the_object(tmp_path):
 
 
 def test_a_dark_lamp_is_left_out():
-    assert emitters(lamp("POINT", energy=0.0), Identifiers(), Notes()) == []
+    notes = Notes()
+    assert emitters(lamp("POINT", energy=0.0), Identifiers(), notes) == []
+    assert notes.to_list() == []
+
+
+def test_a_lamp_that_takes_light_away_is_left_out_and_noted():
+    notes = Notes()
+    assert emitters(lamp("POINT", "Dimmer", energy=-10.0), Identifiers(), notes) == []
+    assert [(note["object"], note["what"]) for note in notes.to_list()] == [
+        ("Dimmer", "its negative light is left out")
+    ]
 
 
 def test_a_material_may_have_the_name_of_the_lamps():

@@ -165,7 +165,7 @@ LIGHTS = (
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, light and shadow linking, patterns of nodes of lights",
+        "Spread, negative power, light and shadow linking, patterns of nodes of lights",
         "not carried",
         "light is distributed as without them",
     ),
@@ -189,10 +189,14 @@ OBJECTS = (
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
-    ("Caustics switched off, clamping", "not carried", "all light counts"),
+    (
+        "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",
+        "not carried",
+        "all light counts",
+    ),
     ("Compositor, sequencer, Freestyle", "not carried", "left out"),
     (
-        "Overrides of the view layer, further view layers, crop to the render region",
+        "Overrides of the view layer, further view layers, render region, stereoscopy",
         "not carried",
         "left out",
     ),

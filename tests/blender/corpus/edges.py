@@ -155,8 +155,10 @@ def painted(_folder):
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
-    light("AREA", "No gloss", (0.0, 2.0, 3.0), 10.0).visible_glossy = False
-    scene.render.use_border = scene.render.use_crop_to_border = True
+    lamp = light("AREA", "No gloss", (0.0, 2.0, 3.0), 10.0)
+    lamp.visible_glossy, lamp.data.cycles.max_bounces = False, 0
+    light("POINT", "Dimmer", (2.0, 2.0, 3.0), -5.0)
+    scene.render.use_border = scene.render.use_multiview = scene.cycles.use_fast_gi = True
     scene.view_layers.new("Second")
     scene.view_layers[0].material_override = principled("clay")
     coat = {"Coat_Weight": 1.0, "Coat_Tint": (1.0, 0.1, 0.1, 1.0)}
