@@ -16,17 +16,21 @@ LISTED = 20  # objects that are named
 TOLERANCE = 1e-5
 SIZES = ("shadow_soft_size", "size", "size_y", "spot_size", "spot_blend", "angle")  # of lamps
 DEFORMING = ("ARMATURE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY", "OCEAN", "WAVE", "FLUID")
+CARRYING = ("CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE")  # types without a surface
+TARGETS = ("object", "target", "origin", "mirror_object", "offset_object", "texture_coords_object")
 
 
 def note_motion(selection: Selection, notes: Notes) -> None:
-    """Note every object but cameras whose pose, shape or light changes, and animated materials and worlds."""
+    """Note every object with a surface or light that changes, and animated materials and worlds."""
     first, last = selection.frames
     if first == last:
         return
     frames = sorted({int(frame) for frame in np.linspace(first, last, SAMPLES)})
     poses, lights = zip(*[_state(selection, frame) for frame in frames], strict=True)
-    moving = _changing(poses)
-    deforming = [obj.name for obj in selection.scene.objects if obj.name not in moving and _deforms(obj)]
+    changing = _changing(poses)
+    shown = [obj for obj in selection.scene.objects if _is_shown(obj)]
+    moving = [obj.name for obj in shown if obj.name in changing]
+    deforming = [obj.name for obj in shown if obj.name not in changing and _deforms(obj, changing)]
     effect = f"it stays as in frame {first}"
     for name in moving[:LISTED]:
         notes.add("not-carried", name, "Animation", "its motion is left out", effect)
@@ -37,7 +41,10 @@ def note_motion(selection: Selection, notes: Notes) -> None:
     world, lamps = selection.scene.world, [lamp for lamp in bpy.data.lights if lamp.users and lamp.use_nodes]
     used = [material for material in bpy.data.materials if material.users] + ([world] if world else [])
     for data in used + lamps:
-        if any(map(_is_animated, [*([] if data in lamps else [data]), *_trees(data.node_tree)])):
+        trees = _trees(data.node_tree)
+        places = {node.object.name for tree in trees for node in tree.nodes if getattr(node, "object", None)}
+        is_animated = any(map(_is_animated, [*([] if data in lamps else [data]), *trees]))
+        if is_animated or not places.isdisjoint(changing):
             notes.add("not-carried", data.name, "Animation", "its animation is left out", effect)
     for image in bpy.data.images:
         if image.users and image.source in ("SEQUENCE", "MOVIE"):
@@ -51,7 +58,7 @@ def note_motion(selection: Selection, notes: Notes) -> None:
 def _state(selection: Selection, frame: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Poses and visibility of objects, and power, colour and size of lamps, by name."""
     selection.scene.frame_set(frame)
-    objects = [obj for obj in selection.scene.objects if obj.type != "CAMERA"]
+    objects = selection.scene.objects
     lamps = [obj for obj in objects if obj.type == "LIGHT"]
     lights = {
         obj.name: np.array(
@@ -60,6 +67,11 @@ def _state(selection: Selection, frame: int) -> tuple[dict[str, np.ndarray], dic
         for obj in lamps
     }
     return {obj.name: np.append(np.array(obj.matrix_world), obj.hide_render) for obj in objects}, lights
+
+
+def _is_shown(obj: Any) -> bool:
+    """Whether an object has a surface, light or instances, rather than carrying others, or a camera."""
+    return obj.type not in CARRYING or obj.instance_type != "NONE"
 
 
 def _changing(states: tuple[dict[str, np.ndarray], ...]) -> list[str]:
@@ -84,7 +96,10 @@ def _differs(pose: np.ndarray, other: Any) -> bool:
     return other is not None and bool(np.abs(pose - other).max() > TOLERANCE)
 
 
-def _deforms(obj: Any) -> bool:
+def _deforms(obj: Any, changing: list[str]) -> bool:
+    """Whether the shape of an object changes, by itself or by an object that changes."""
     keys = getattr(obj.data, "shape_keys", None)
     has_keys = keys is not None and keys.animation_data is not None
-    return has_keys or any(modifier.type in DEFORMING and modifier.show_render for modifier in obj.modifiers)
+    modifiers = [modifier for modifier in obj.modifiers if modifier.show_render]
+    targets = {getattr(getattr(m, name, None), "name", "") for m in modifiers for name in TARGETS}
+    return has_keys or any(m.type in DEFORMING for m in modifiers) or not targets.isdisjoint(changing)

@@ -226,9 +226,18 @@ def test_settings_that_are_left_out_are_noted(exported):
 def test_what_changes_is_noted(exported):
     _, result = exported("frozen")
     changes = {note["object"] for note in result["notes"] if note["node"] == "Animation"}
-    assert changes == {"Blinking", "driven", "film", "Growing"}
+    assert changes == {"Blinking", "driven", "film", "Growing", "Hooked", "sliding"}
     (blocked,) = (note["what"] for note in result["notes"] if note["node"] == "Drivers")
     assert "drivers that need Python don't run" in blocked
+
+
+def test_a_sequence_of_images_is_baked_as_in_the_first_frame(exported):
+    out, result = exported("frozen")
+    assert notes(result, "approximated") == []
+    (film,) = (out / "textures").glob("screen*")
+    dark, bright = np.percentile(np.array(mi.Bitmap(str(film)))[..., 0], [1, 99])
+    # Tiles of 0.1 and 0.9 in sRGB, to half a step of 8 bits each.
+    assert bright / dark == pytest.approx((0.955 / 1.055) ** 2.4 / (0.155 / 1.055) ** 2.4, rel=0.05)
 
 
 def test_a_coat_is_even_over_a_bumpy_base(exported):

@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 
 from enfilade_blender.image_files import F32
 
 RAW_SPACES = ("Non-Color", "Raw", "Linear Rec.709", "Linear")
+FRAMES = ("SEQUENCE", "MOVIE")  # sources whose pixels Blender has for a node alone, which chooses the frame
 OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 
 
 def is_missing(image: Any) -> bool:
     """Whether an image has no pixels: there is none, or no file of it."""
+    if image is not None and image.source in FRAMES and image.filepath:
+        return not Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
     return image is None or not (image.has_data or (image.size[0] > 0 and len(image.pixels) > 0))  # loads it
 
 

@@ -230,6 +230,18 @@ def frozen(folder):
     film.save()
     film.source = "SEQUENCE"
     plane("Screen", (4.0, 0.0, 0.0), 1.0, principled("screen", film))
+    scene.camera.parent = add("Dolly", None)
+    hooked = plane("Hooked", (0.0, 2.0, 0.0), 1.0, bpy.data.materials["grey"])
+    hooked.modifiers.new("Hook", "HOOK").object = handle = add("Handle", None)
+    for carrier in (scene.camera.parent, handle):
+        for frame in (1, 5):
+            carrier.location.x = 0.1 * frame
+            carrier.keyframe_insert("location", frame=frame)
+    sliding, tree, bsdf = shader("sliding", "BsdfDiffuse")
+    place = node_of(tree, "TexCoord")
+    place.object = handle
+    fill(tree, bsdf, {"Color": place.outputs["Object"]})
+    plane("Sliding", (6.0, 0.0, 0.0), 1.0, sliding)
     lamp = light("POINT", "Growing", (0.0, 0.0, 3.0), 10.0).data
     for frame, radius in ((1, 0.1), (5, 0.5)):
         lamp.shadow_soft_size = radius
