@@ -15,6 +15,7 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
 MM = 1000.0
+KINDS = {"ORTHO": "an orthographic", "PANO": "a panoramic"}
 
 
 def read_views(selection: Selection, notes: Notes) -> list[View]:
@@ -26,9 +27,10 @@ def read_views(selection: Selection, notes: Notes) -> list[View]:
         if camera is None:
             return []
         if camera.type != "CAMERA" or camera.data.type != "PERSP":
-            kind = camera.data.type.lower() if camera.type == "CAMERA" else camera.type.lower()
+            kind = camera.data.type if camera.type == "CAMERA" else f"{camera.type.lower()} as a"
             effect = "there is no camera path of the file: give one"
-            notes.add("not-carried", camera.name, "Camera", f"a camera of the kind {kind}", effect)
+            what = f"{KINDS.get(kind, kind)} camera can't be exported"
+            notes.add("not-carried", camera.name, "Camera", what, effect)
             return []
         views.append(_view(camera, selection, notes))
     _note_lenses(views, selection, notes)

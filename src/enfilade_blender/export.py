@@ -66,6 +66,9 @@ def export(job: Job) -> dict[str, Any]:
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)
     elements += environment(selection, sun, job.out, notes)
+    if not any(True for element in elements for _ in element.iter("emitter")):
+        effect = "every frame would be black: add a lamp, or a world with light"
+        notes.add("not-carried", selection.scene.name, "Light", "there is no light", effect)
     shapes.textures.remove_unused(elements)
     write_scene(
         job.out / "scene.xml", [_integrator(selection, shapes.kinds, is_volumetric=is_volumetric), *elements]

@@ -151,8 +151,8 @@ def _select(job: Job) -> Selection:
     layer = _by_name(scene.view_layers, job.view_layer, "view layer", job) if job.view_layer else layers[0]
     bpy.context.window.view_layer = layer
     if job.camera:
-        camera = _by_name(scene.objects, job.camera, "camera", job)
-        scene.camera = camera
+        cameras = {obj.name: obj for obj in scene.objects if obj.type == "CAMERA"}
+        scene.camera = _by_name(cameras, job.camera, "camera", job)
         for marker in scene.timeline_markers:
             marker.camera = None
     render = scene.render
@@ -165,6 +165,7 @@ def _select(job: Job) -> Selection:
 
 def _by_name(items: Any, name: str, kind: str, job: Job) -> Any:
     if name not in items:
-        names = ", ".join(sorted(item.name for item in items))
-        raise ExportError(f"it has no {kind} {name!r}", str(job.source), f"choose one of {names}")
+        names = ", ".join(sorted(items.keys()))
+        advice = f"choose one of {names}" if names else f"add a {kind} to it"
+        raise ExportError(f"it has no {kind} {name!r}", str(job.source), advice)
     return items[name]

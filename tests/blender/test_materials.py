@@ -131,6 +131,7 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert code == 0, result
     root = ET.parse(out / "scene.xml").getroot()
     found = {element.get("id"): element for element in root}
+    assert not [note for note in result["notes"] if note["node"] == "Light"]  # one surface shines
     radiance = found["unlit"].find("emitter/rgb").get("value").split()
     assert [float(number) for number in radiance] == pytest.approx([1.0, 0.5, 0.2])
     assert found["material shadowless"].find("bsdf").get("type") == "diffuse"
@@ -138,6 +139,9 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert found["material by ray: by ray"].find(".//rgb").get("value") == "0.5 0.5 0.5"
     noted = {note["object"] for note in result["notes"] if "transparent for some rays" in note["what"]}
     assert noted == {"unlit", "shadowless"}
+    (ray,) = (note for note in result["notes"] if note["node"] == "Light Path")
+    assert (ray["object"], ray["what"]) == ("by number", "Is Diffuse Ray is taken as 0")
+    assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
 @pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way"])
@@ -182,6 +186,11 @@ def test_pictures_that_mitsuba_reads_wrongly_are_written_anew(blender):
         Image.new("RGB", (8, 8), (153, 153, 153)).convert(mode).save(files / f"foreign.{ending}")
     code, out, result = blender.job(blender.make("picture_files")[0], "picture files")
     assert code == 0, result
+    left_out = {(note["object"], note["node"], note["what"]) for note in result["notes"]}
+    assert left_out >= {
+        ("Camera", "Camera", "an orthographic camera can't be exported"),
+        ("Scene", "Light", "there is no light"),
+    }
     copies = sorted((out / "textures").iterdir())
     assert [file.suffix for file in copies] == [".png"] * len(kinds)
     for file in copies:

@@ -77,6 +77,14 @@ def test_a_check_names_the_objects_that_differ(run, shot, tmp_path):
     assert "--check-frames needs --check" in alone.stderr
 
 
+def test_a_check_that_fails_keeps_the_scene_and_says_where(run, shot, tmp_path):
+    out = tmp_path / "s"
+    result = run("import", shot(), "--out", out, "--check", "--check-frames", "99", "--quiet")
+    assert result.exit_code == 2
+    assert f"The imported scene is kept in {out}" in result.stderr
+    assert (out / "scene.xml").is_file()
+
+
 def test_strict_is_an_error_of_the_input(run, shot, tmp_path):
     result = run("import", shot(notes=[{"kind": "not-carried", **NOTE}]), "--out", tmp_path / "s", "--strict")
     assert result.exit_code == 2
@@ -175,6 +183,15 @@ def test_a_file_without_a_camera_needs_a_path(run, shot, tmp_path, jobs, camera_
     result = run("render", shot(camera=""), "--out", tmp_path / "run")
     assert result.exit_code == 2
     assert "my shot.blend has no camera that can be used" in result.stderr
+    unusable = {
+        **NOTE,
+        "object": "Plan",
+        "node": "Camera",
+        "what": "an orthographic camera can't be exported",
+    }
+    source = shot(camera="", notes=[{"kind": "not-carried", **unusable}])
+    result = run("render", source, "--out", tmp_path / "run2", "--quiet")
+    assert "Plan: an orthographic camera can't be exported" in result.stderr
     run("render", shot(camera=""), "--out", tmp_path / "run", "--path", camera_path)
     assert len(jobs) == 1
 

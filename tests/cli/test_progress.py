@@ -38,6 +38,19 @@ def test_items_done_before_are_not_part_of_the_pace():
     assert lines == ["frames: 9 to do", "frames: 92/100, 0:20 passed, about 1:20 left"]
 
 
+def test_nothing_is_estimated_before_there_is_progress():
+    lines, clock = [], Clock()
+    monitor = LineMonitor(lines.append, clock)
+    for done in (0, 0, 50):
+        monitor.progress("Cycles", done, 100)
+        clock.now += 8.0
+    assert lines == [
+        "Cycles: 100 to do",
+        "Cycles: 0/100, 0:08 passed",
+        "Cycles: 50/100, 0:16 passed, about 0:16 left",
+    ]
+
+
 def test_messages_are_lines():
     lines = []
     LineMonitor(lines.append).message("continued")

@@ -258,7 +258,7 @@ def test_kernels_of_masked_materials_serve_any_number_of_lanes(tmp_path):
             "gone",
         ),
         ("<scene version='3.0.0'></scene>", "no shapes"),
-        ("<scene version='3.0.0'><shape type='sphere'/></scene>", "no light"),
+        ("<scene version='3.0.0'><shape type='sphere'/></scene>", "add an <emitter>; or, in Blender, a lamp"),
         ("", "scene.xml"),
         ("just words", "scene.xml"),
     ],

@@ -21,7 +21,7 @@ from enfilade.cli.options import (
     settings_of,
     settings_options,
 )
-from enfilade.errors import SettingsError
+from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings
 
 if TYPE_CHECKING:
@@ -101,7 +101,12 @@ def command(
             source, folder, choices, settings[LimitSettings], monitor,
             program=blender.program, is_strict=blender.strict, is_replaced=is_replaced,
         )  # fmt: skip
-        checked = _checked(imported, source, settings, choices, monitor, **checking)
+    try:
+        with watch(quiet=quiet) as monitor:
+            checked = _checked(imported, source, settings, choices, monitor, **checking)
+    except EnfiladeError:
+        click.echo(f"The imported scene is kept in {folder}; its check failed.", err=True)
+        raise
     spent = Source.read(folder)
     if as_json:
         found = _table(imported, spent) | ({"check": checked} if checked else {})

@@ -93,8 +93,10 @@ class LineMonitor:
             self._write(f"{name}: {done}/{total}, took {clock_time(now - stage.started_s)}")
         elif now - stage.shown_s >= self._every_s:
             stage.shown_s, passed = now, now - stage.started_s
-            left = passed / max(done - stage.first, 1) * (total - done)
-            times = f"{clock_time(passed)} passed, about {clock_time(left)} left"
+            times = f"{clock_time(passed)} passed"
+            if done > stage.first:
+                left = passed / (done - stage.first) * (total - done)
+                times += f", about {clock_time(left)} left"
             self._write(f"{name}: {done}/{total}, {times}")
 
     def message(self, text: str) -> None:

@@ -208,7 +208,7 @@ class Graph:
 
     def _note_light_path(self, found: Output) -> None:
         what = f"{found.socket.name} is taken as 0"
-        effect = "all rays see the material as diffuse light does"
+        effect = "all rays see it as those do in Blender for which that is 0"
         self._notes.add("approximated", self._owner, found.node.name, what, effect)
 
 

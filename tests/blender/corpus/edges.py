@@ -60,7 +60,9 @@ def kinds_of_rays(folder):
     scaled.operation = "ADD"
     fill(tree, scaled, {1: node_of(tree, "LightPath").outputs["Is Camera Ray"]})
     fill(tree, node, {"Color": scaled})
-    for number, material in enumerate((unlit, shadowless, by_ray)):
+    by_number, tree, node = shader("by number", "BsdfDiffuse")
+    fill(tree, node, {"Roughness": node_of(tree, "LightPath").outputs["Is Diffuse Ray"]})
+    for number, material in enumerate((unlit, shadowless, by_ray, by_number)):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
@@ -84,8 +86,8 @@ def missing_images(_folder):
 
 
 def picture_files(folder):
-    """A plane of each picture of the name foreign that is in the folder."""
-    new_file()
+    """A plane of each picture of the name foreign in the folder, in the dark, for a camera without a path."""
+    new_file().camera.data.type = "ORTHO"
     for number, file in enumerate(sorted(folder.glob("foreign.*"))):
         material = principled(file.name, bpy.data.images.load(str(file)), Metallic=1.0)
         plane(file.name, (2.0 * number, 0.0, 0.0), 1.5, material)

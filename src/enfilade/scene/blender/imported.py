@@ -16,6 +16,7 @@ from enfilade.settings import read_tables
 FORMAT, VERSION = "enfilade-import", 1
 SCENE_FILE, PATH_FILE, SETTINGS_FILE = "scene.xml", "camera_path.json", "settings.toml"
 CHECK_PAGE = "check.html"
+CAMERA_NODE = "Camera"  # of the note on a camera that is not exported
 
 
 @dataclass(frozen=True)
@@ -101,9 +102,12 @@ class ImportedScene:
             The file has no camera.
         """
         if self.path_file is None:
+            left_out = self.notes_of(NoteKind.NOT_CARRIED)
+            reasons = [f"{note.object}: {note.what}" for note in left_out if note.node == CAMERA_NODE]
+            about = ", ".join([f"scene {self.scene!r}", *reasons])
             raise CameraPathError(
-                f"{self.source} has no camera that can be used (scene {self.scene!r}); add one to it, choose "
-                "one by --set blender.camera=NAME, or give a path by --path"
+                f"{self.source} has no camera that can be used ({about}); add a perspective one to it, "
+                "choose one by --set blender.camera=NAME, or give a path by --path"
             )
         return self.path_file
 

@@ -48,5 +48,8 @@ def load_scene(file: Path) -> Any:
     if not scene.shapes():
         raise SceneError(f"{file} has no shapes: there is nothing to render")
     if not scene.emitters():
-        raise SceneError(f"{file} has no light, every frame would be black: add an <emitter>")
+        raise SceneError(
+            f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "
+            "world with light, and import it again"
+        )
     return scene
