@@ -217,10 +217,8 @@ def _spot(lamp: Lamp, colour: Colour, notes: Notes) -> Element:
     if data.shadow_soft_size > TINY:
         what, effect = f"its radius of {data.shadow_soft_size:.3g} is left out", "shadows have sharp edges"
         notes.add("approximated", lamp.name, "Radius", what, effect)
-    matrix = lamp.matrix @ FORWARD
-    matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
     return plugin(
-        "emitter", "spot", intensity=_scaled(colour, point_intensity(1.0)), to_world=matrix,
+        "emitter", "spot", intensity=_scaled(colour, point_intensity(1.0)), to_world=lamp.matrix @ FORWARD,
         cutoff_angle=math.degrees(outer), beam_width=math.degrees(inner),
     )  # fmt: skip
 

@@ -71,6 +71,18 @@ def test_power_does_not_change_with_the_scale_of_the_object(tmp_path):
     assert irradiance(tmp_path, large) == pytest.approx(100.0 / math.pi / 4.0, rel=0.01)
 
 
+@pytest.mark.parametrize(("place", "is_lit"), [((0.8, 0.0), True), ((0.0, 0.8), False), ((0.0, 0.3), True)])
+def test_a_spot_of_uneven_scale_is_an_ellipse(tmp_path, place, is_lit):
+    """As Cycles has it: half of its angle is a radius of 1.1 along x on the ground, and of 0.4 along y."""
+    matrix = ABOVE @ np.diag([1.0, 0.35, 1.0, 1.0])
+    matrix[:2, 3] = place
+    squared = 4.0 + np.square(place).sum()
+    expected = 100.0 / (4.0 * math.pi) * 2.0 / squared**1.5 if is_lit else 0.0
+    assert irradiance(tmp_path, lamp("SPOT", matrix=matrix, spot_blend=0.0)) == pytest.approx(
+        expected, rel=0.01
+    )
+
+
 def test_a_dark_lamp_is_left_out():
     notes = Notes()
     assert emitters(lamp("POINT", energy=0.0), Identifiers(), notes) == []

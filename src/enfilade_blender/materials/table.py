@@ -151,7 +151,7 @@ LIGHTS = (
     (
         "Spot",
         "approximated",
-        "`spot`: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
+        "`spot`, also oval: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
     ),
     (
         "Area: square, rectangle, disk, ellipse",
