@@ -12,6 +12,7 @@ from enfilade_blender.camera import camera_path, read_views
 from enfilade_blender.evaluate import evaluate
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
+from enfilade_blender.lamp_nodes import LampNodes
 from enfilade_blender.left_out import note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
@@ -59,6 +60,9 @@ def export(job: Job) -> dict[str, Any]:
     elements = shapes.write(evaluated.placed)
     note_light(selection, evaluated.lamps, notes, has_glass=bool(shapes.kinds & GLASS))
     report_progress(0.9, "lights")
+    nodes = LampNodes(job, selection, notes)
+    for lamp in evaluated.lamps:
+        lamp.factor = nodes.factor(lamp)
     lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
     note_sun(sun, views, selection, notes)
     note_clipping(views, selection, notes)

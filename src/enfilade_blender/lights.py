@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.mapping import spot_ramp
-from enfilade_blender.materials.values import Constant, Emission, Procedural, Value
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp
 from enfilade_blender.scene_xml import LAMP, Element, Identifiers, plugin, reference
@@ -62,13 +60,12 @@ def area_radiance(power: float, area: float) -> float:
     return power / (math.pi * area)
 
 
-def lamp_colour(lamp: Lamp, notes: Notes) -> Colour:
-    """Colour times power (or strength), with temperature, exposure and an emission node of constants."""
+def lamp_colour(lamp: Lamp) -> Colour:
+    """Colour times power (or strength), with temperature, exposure and the factor of nodes."""
     data = lamp.data
     scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0) * _unnormalized(data)
     tint = data.temperature_color if getattr(data, "use_temperature", False) else (1.0, 1.0, 1.0)
-    nodes = _node_colour(lamp, notes)
-    r, g, b = (float(c) * float(t) * n * scale for c, t, n in zip(data.color, tint, nodes, strict=True))
+    r, g, b = (float(c) * float(t) * n * scale for c, t, n in zip(data.color, tint, lamp.factor, strict=True))
     return r, g, b
 
 
@@ -82,51 +79,6 @@ def _unnormalized(data: Any) -> float:
     return 4.0 * math.pi * radius**2 if radius > 0.0 else 4.0
 
 
-def _node_colour(lamp: Lamp, notes: Notes) -> Colour:
-    """Factor of a light's nodes: an emission's colour and strength, each 1 where it is no constant."""
-    data = lamp.data
-    if not data.use_nodes or data.node_tree is None:
-        return 1.0, 1.0, 1.0
-    outputs = [node for node in data.node_tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
-    shader = Graph(lamp.name, notes).shader(outputs[0].inputs["Surface"], ()) if outputs else None
-    factors: list[Constant | None] = [None, None]
-    if isinstance(shader, Emission):
-        factors = [_constant(value, lamp, notes) for value in (shader.colour, shader.strength)]
-    if None in factors:
-        what, effect = "a pattern of its nodes is left out", "light is even, and may be brighter or darker"
-        notes.add("not-carried", lamp.name, "Nodes", what, effect)
-    colour, strength = (factor or Constant((1.0,)) for factor in factors)
-    return _scaled(colour.colour, strength.number)
-
-
-def _constant(value: Value, lamp: Lamp, notes: Notes) -> Constant | None:
-    """A constant, a black body of constant temperature, or the constant strength of Light Falloff."""
-    if isinstance(value, Constant) or not isinstance(value, Procedural):
-        return value if isinstance(value, Constant) else None
-    node, output = value.output.node, value.output.socket.name
-    if node.type == "BLACKBODY" and not node.inputs["Temperature"].is_linked:
-        return _blackbody(node.inputs["Temperature"].default_value)
-    if node.type == "LIGHT_FALLOFF" and not node.inputs["Strength"].is_linked:
-        if output != "Quadratic" or node.inputs["Smooth"].default_value > 0.0:
-            what, effect = "its falloff is quadratic", "it is brighter near the lamp, and darker far from it"
-            notes.add("approximated", lamp.name, node.name, what, effect)
-        return Constant((float(node.inputs["Strength"].default_value),))
-    return None
-
-
-def _blackbody(kelvin: float) -> Constant | None:
-    """Colour of a black body, as Blender has it from 4.5 on."""
-    import bpy
-
-    light = bpy.data.lights.new("enfilade", "POINT")
-    found = None
-    if hasattr(light, "use_temperature"):
-        light.use_temperature, light.temperature = True, kelvin
-        found = Constant(tuple(float(c) for c in light.temperature_color))
-    bpy.data.lights.remove(light)
-    return found
-
-
 def is_portal(lamp: Lamp) -> bool:
     """Whether a lamp emits nothing: it tells Cycles where the world's light comes in."""
     return lamp.data.type == "AREA" and bool(lamp.data.cycles.is_portal)
@@ -137,17 +89,17 @@ def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]
     soft = [
         lamp
         for lamp in lamps
-        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp, notes)) > 0
+        if lamp.data.type == "SUN" and lamp.data.angle > TINY and max(lamp_colour(lamp)) > 0
     ]
     if not soft:
         return lamps, None
-    brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp, notes)))
+    brightest = max(soft, key=lambda lamp: sum(lamp_colour(lamp)))
     for lamp in soft:
         if lamp is not brightest:
             what, effect = "a sun beside a brighter one has no disc", "its shadows have sharp edges"
             notes.add("approximated", lamp.name, "Angle", what, effect)
     direction = _axis(brightest.matrix)
-    sun = Sun(brightest.name, direction, lamp_colour(brightest, notes), float(brightest.data.angle))
+    sun = Sun(brightest.name, direction, lamp_colour(brightest), float(brightest.data.angle))
     return [lamp for lamp in lamps if lamp is not brightest], sun
 
 
@@ -160,7 +112,7 @@ def needs_passing(made: list[Element], sun: Sun | None) -> bool:
 def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element]:
     """Elements of one lamp; none for one that is dark, or takes light away."""
     data, name = lamp.data, lamp.name
-    r, g, b = lamp_colour(lamp, notes)
+    r, g, b = lamp_colour(lamp)
     if min(r, g, b) < 0.0:
         what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
         notes.add("not-carried", name, "Power", what, effect)

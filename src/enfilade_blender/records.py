@@ -94,11 +94,12 @@ class Placed:
 
 @dataclass(eq=False)
 class Lamp:
-    """A light of the scene: its data and its matrix (4, 4) float64."""
+    """A light of the scene: its data, its matrix (4, 4) float64, and the factor (RGB) of its nodes."""
 
     name: str
     data: Any
     matrix: np.ndarray
+    factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(eq=False)

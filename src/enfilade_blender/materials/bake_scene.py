@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -21,6 +22,7 @@ MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
 SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
 WHITE = (1.0, 1.0, 1.0, 1.0)
+LIT_PX = 8  # of a square in even light
 TARGET, GENERATED = "enfilade target", "enfilade generated"
 TEXTURES = {  # whose coordinates are generated ones where none are linked
     "TEX_GRADIENT", "TEX_NOISE", "TEX_GABOR", "TEX_VORONOI", "TEX_MUSGRAVE", "TEX_WAVE", "TEX_MAGIC",
@@ -44,7 +46,7 @@ class BakeScene:
         scene.frame_set(frame)
         scene.render.engine = "CYCLES"
         scene.cycles.samples, scene.cycles.use_denoising = samples, False
-        scene.cycles.use_adaptive_sampling = False
+        scene.cycles.use_adaptive_sampling, scene.cycles.light_sampling_threshold = False, 0.0
         scene.render.bake.margin = MARGIN_PX
         scene.render.bake.use_selected_to_active = False
         scene.render.bake.normal_space = "TANGENT"
@@ -77,6 +79,28 @@ class BakeScene:
             _data(Mesh(corners, triangles, normals, {name: uv}, {}, slots, name)), np.eye(4)
         ) as canvas:
             yield canvas
+
+    def light_colour(self, light: Any, output: Output) -> tuple[float, float, float]:
+        """Value of an output of a light's nodes that is even: a sun of that colour lights a white square."""
+        groups = set(bpy.data.node_groups)
+        sun = light.copy()
+        name, sun.type = sun.name, "SUN"
+        sun = bpy.data.lights[name]  # of another type now
+        sun.energy, sun.color, sun.angle = math.pi, (1.0, 1.0, 1.0), 0.0
+        if hasattr(sun, "use_temperature"):  # from Blender 4.5 on
+            sun.use_temperature, sun.exposure = False, 0.0
+        emission = sun.node_tree.nodes.new("ShaderNodeEmission")
+        sun.node_tree.links.new(_exposed(sun.node_tree, output.groups, output), emission.inputs["Color"])
+        for end in [node for node in sun.node_tree.nodes if node.type == "OUTPUT_LIGHT"]:
+            sun.node_tree.links.new(emission.outputs[0], end.inputs["Surface"])
+        above = bpy.data.objects.new(name, sun)
+        self._scene.collection.objects.link(above)
+        with self.square("") as canvas:
+            colour = canvas.bake_light()
+        bpy.data.objects.remove(above)
+        bpy.data.lights.remove(sun)
+        bpy.data.batch_remove(set(bpy.data.node_groups) - groups)
+        return colour
 
     @contextmanager
     def _canvas(
@@ -140,6 +164,21 @@ class Canvas:
         bpy.data.images.remove(image)
         return rgba[..., :3], rgba[..., 3] > 0.5
 
+    def bake_light(self) -> tuple[float, float, float]:
+        """Radiance of the object, were it white and diffuse, in the light of the scene's lamps alone."""
+        image = bpy.data.images.new(TARGET, LIT_PX, LIT_PX, alpha=True, float_buffer=True)
+        image.colorspace_settings.name = "Non-Color"
+        material = bpy.data.materials.new(TARGET)
+        material.use_nodes = True
+        _aim(material.node_tree, image)
+        self._object.data.materials.clear()
+        self._object.data.materials.append(material)
+        bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, use_clear=False)
+        r, g, b = linear_pixels(image)[..., :3].mean(axis=(0, 1))
+        bpy.data.materials.remove(material)
+        bpy.data.images.remove(image)
+        return float(r), float(g), float(b)
+
 
 def _data(mesh: Mesh) -> Any:
     """A mesh of Blender, with normals, texture coordinates and colours."""
@@ -182,7 +221,7 @@ def _is_generated(link: Any) -> bool:
 
 
 def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:
-    """Connect an output to the surface, and make an image the target of the bake."""
+    """Connect an output to the surface, which is baked into an image."""
     source = _exposed(tree, output.groups, output)
     if is_normal:
         shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
@@ -194,6 +233,11 @@ def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:
         tree.nodes.remove(node)
     end = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(shader.outputs[0], end.inputs["Surface"])
+    _aim(tree, image)
+
+
+def _aim(tree: Any, image: Any) -> None:
+    """Make an image the target of the bake."""
     target = tree.nodes.new("ShaderNodeTexImage")
     target.image = image
     for node in tree.nodes:

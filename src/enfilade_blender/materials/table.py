@@ -160,7 +160,11 @@ LIGHTS = (
     ),
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
-    ("Nodes of lights: constants, black bodies, Light Falloff", "mapped", "a factor; falloff is quadratic"),
+    (
+        "Nodes of lights: constants and what is computed of them, Light Falloff",
+        "mapped",
+        "a factor; falloff is quadratic",
+    ),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),

@@ -126,12 +126,24 @@ def lamp_nodes(_folder):
         "Pattern": ("TexNoise", "Color", "Color", {}),
         "Warm": ("Blackbody", "Color", "Color", {"Temperature": 2700.0}),
     }
-    for number, (name, (kind, output, socket, inputs)) in enumerate(kinds.items()):
-        lamp = light("POINT", name, (float(number), 0.0, 3.0), 10.0, shadow_soft_size=0.0).data
-        lamp.use_nodes = True
-        emission = lamp.node_tree.nodes["Emission"]
-        fill(lamp.node_tree, emission, {"Color": (1.0, 0.5, 0.5, 1.0), "Strength": 5.0})
-        fill(lamp.node_tree, emission, {socket: node_of(lamp.node_tree, kind, **inputs).outputs[output]})
+    for name, (kind, output, socket, inputs) in kinds.items():
+        tree, emission = _lamp_of_nodes(name)
+        fill(tree, emission, {socket: node_of(tree, kind, **inputs).outputs[output]})
+    tree, emission = _lamp_of_nodes("Computed")
+    product, mixed = node_of(tree, "Math"), node_of(tree, "MixRGB")
+    product.operation = "MULTIPLY"
+    fill(tree, product, {0: 3.0, 1: 5.0})
+    fill(tree, mixed, {0: 0.25, 1: (1.0, 0.0, 0.0, 1.0), 2: (0.0, 0.0, 1.0, 1.0)})
+    fill(tree, emission, {"Color": mixed, "Strength": node_of(tree, "LightFalloff", Strength=product)})
+
+
+def _lamp_of_nodes(name):
+    """A point lamp of 10 W; the tree of its nodes, and the emission in it."""
+    data = light("POINT", name, (0.0, 0.0, 3.0), 10.0, shadow_soft_size=0.0).data
+    data.use_nodes = True
+    emission = data.node_tree.nodes["Emission"]
+    fill(data.node_tree, emission, {"Color": (1.0, 0.5, 0.5, 1.0), "Strength": 5.0})
+    return data.node_tree, emission
 
 
 def painted(_folder):

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the nodes of lamps make of their light: a factor of constants."""
+
+from __future__ import annotations
+
+from enfilade_blender.job import Job
+from enfilade_blender.materials.bake_scene import BakeScene
+from enfilade_blender.materials.graph import Graph, upstream
+from enfilade_blender.materials.table import COLOUR_NODES
+from enfilade_blender.materials.values import Constant, Emission, Procedural, Value
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp, Selection
+
+
+class LampNodes:
+    """Reads nodes of lamps; Cycles evaluates what they compute of constants.
+
+    Parameters
+    ----------
+    job, selection, notes
+    """
+
+    def __init__(self, job: Job, selection: Selection, notes: Notes) -> None:
+        self._job, self._frame, self._notes = job, selection.frames[0], notes
+        self._stage: BakeScene | None = None
+
+    def factor(self, lamp: Lamp) -> tuple[float, float, float]:
+        """Factor of a lamp's nodes: an emission's colour and strength, each 1 where it is no constant."""
+        tree = lamp.data.node_tree if lamp.data.use_nodes else None
+        if tree is None:
+            return 1.0, 1.0, 1.0
+        outputs = [node for node in tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
+        graph = Graph(lamp.name, self._notes)
+        shader = graph.shader(outputs[0].inputs["Surface"], ()) if outputs else None
+        factors: list[Constant | None] = [None, None]
+        if isinstance(shader, Emission):
+            factors = [self._constant(value, lamp, graph) for value in (shader.colour, shader.strength)]
+        if None in factors:
+            what, effect = (
+                "a pattern of its nodes is left out",
+                "light is even, and may be brighter or darker",
+            )
+            self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
+        colour, strength = (factor or Constant((1.0,)) for factor in factors)
+        r, g, b = (c * strength.number for c in colour.colour)
+        return r, g, b
+
+    def _constant(self, value: Value, lamp: Lamp, graph: Graph) -> Constant | None:
+        """A constant, what nodes compute of constants, or such a strength of Light Falloff."""
+        if isinstance(value, Constant) or not isinstance(value, Procedural):
+            return value if isinstance(value, Constant) else None
+        node, output = value.output.node, value.output.socket.name
+        if node.type == "LIGHT_FALLOFF":
+            smooth = node.inputs["Smooth"]
+            if output != "Quadratic" or smooth.is_linked or smooth.default_value > 0.0:
+                what, effect = (
+                    "its falloff is quadratic",
+                    "it is brighter near the lamp, and darker far from it",
+                )
+                self._notes.add("approximated", lamp.name, node.name, what, effect)
+            return self._constant(graph.value(node.inputs["Strength"], value.output.groups), lamp, graph)
+        if any(found.node.type not in COLOUR_NODES for found in upstream(value.output)):
+            return None
+        if self._stage is None:
+            self._stage = BakeScene(self._job.bake_samples, self._frame)
+        return Constant(self._stage.light_colour(lamp.data, value.output))
