@@ -99,6 +99,13 @@ def test_transparency_that_is_lost_is_noted(made):
     assert kinds == ["blendbsdf", "mask", "twosided", "diffuse", "twosided", "roughconductor"]
 
 
+def test_a_rough_plastic_keeps_its_highlight_below_a_coat(made):
+    _, elements, _ = made
+    rough = [e for e in elements["material varnished"].iter("bsdf") if e.get("type").startswith("rough")]
+    alphas = {e.get("type"): float(e.find("float[@name='alpha']").get("value")) for e in rough}
+    assert alphas == pytest.approx({"roughplastic": 0.25, "roughconductor": 0.01})
+
+
 def test_plastic_by_fresnel_keeps_its_normals(made):
     _, elements, notes = made
     plastic = elements["material bumpy plastic"].find(".//bsdf[@type='bumpmap']/bsdf")

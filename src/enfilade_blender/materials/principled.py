@@ -12,7 +12,6 @@ from enfilade_blender.materials.bsdfs import (
     blend,
     conductor_bsdf,
     glass_bsdf,
-    is_one,
     is_zero,
     layered,
     plastic_bsdf,
@@ -23,17 +22,12 @@ from enfilade_blender.notes import Kind
 from enfilade_blender.scene_xml import Element, Property
 
 SHEEN_IOR, SHEEN_ROUGHNESS = 1.5, Constant((0.7,))
-ENAMEL_ROUGHNESS = 0.5  # a base of more is diffuse below its coat
 
 
 def principled_bsdf(shader: Principled, context: Context) -> Element:
     """BSDF of the Principled BSDF, without its emission and opacity."""
-    coat_ior, coat_roughness = shader.number("Coat IOR"), shader["Coat Roughness"]
-    is_enamel = _is_enamel(shader)
 
     def plastic() -> Element:
-        if is_enamel:
-            return plastic_bsdf(shader["Base Color"], coat_roughness, coat_ior, context)
         ior = mapping.interface_ior(shader.number("IOR"), shader.number("Specular IOR Level"))
         return plastic_bsdf(shader["Base Color"], shader["Roughness"], ior, context)
 
@@ -42,20 +36,12 @@ def principled_bsdf(shader: Principled, context: Context) -> Element:
 
     whole = blend(shader["Transmission Weight"], opaque, lambda: _glass(shader, context), context)
     whole = with_normal(whole, shader.normal, context)  # which a coat has not
-    if not is_enamel:
-        whole = layered(whole, shader["Coat Weight"], coat_ior, coat_roughness, WHITE, context)
+    coat_ior, coat_roughness = shader.number("Coat IOR"), shader["Coat Roughness"]
+    whole = layered(whole, shader["Coat Weight"], coat_ior, coat_roughness, WHITE, context)
     tint = context.textures.mean(shader["Sheen Tint"])
     whole = layered(whole, shader["Sheen Weight"], SHEEN_IOR, SHEEN_ROUGHNESS, tint, context)
     _note_principled(shader, context)
     return whole
-
-
-def _is_enamel(shader: Principled) -> bool:
-    """Whether a coat hides the interface of a rough base: the coat's `roughplastic` is sampled well."""
-    roughness = shader["Roughness"]
-    is_rough = isinstance(roughness, Constant) and roughness.number >= ENAMEL_ROUGHNESS
-    is_plastic = is_zero(shader["Metallic"]) and is_zero(shader["Transmission Weight"])
-    return is_rough and is_plastic and is_one(shader["Coat Weight"]) and shader.normal is None
 
 
 def _glass(shader: Principled, context: Context) -> Element:

@@ -102,7 +102,7 @@ PRINCIPLED = (
     (
         "Coat",
         "mapped",
-        "`roughplastic` over rough plastics; else `blendbsdf` with a `roughconductor` of k = 0",
+        "`blendbsdf` with a `roughconductor` of k = 0",
     ),
     ("Coat Tint, Coat Normal", "not carried", "the coat is clear and even"),
     ("Sheen", "approximated", "a rough dielectric layer"),

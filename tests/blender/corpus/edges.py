@@ -37,6 +37,7 @@ def uncommon_materials(folder):
         principled("brushed by image", Metallic=1.0, Anisotropic=half),
         principled("green mirror", Metallic=1.0, Roughness=image("green", _green, 16, space="Non-Color")),
         principled("faint glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=4.0, Alpha=0.25),
+        principled("varnished", Roughness=0.5, Coat_Weight=1.0, Coat_Roughness=0.1),
         principled("picture", bpy.data.images.load(str(folder / "picture.png"))),
     ]
     for number, material in enumerate(materials):
