@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 
 from enfilade_blender.image_files import F32
@@ -19,6 +18,8 @@ OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 def is_missing(image: Any) -> bool:
     """Whether an image has no pixels: there is none, or no file of it."""
     if image is not None and image.source in FRAMES and image.filepath:
+        import bpy  # tests import this module without it
+
         return not Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
     return image is None or not (image.has_data or (image.size[0] > 0 and len(image.pixels) > 0))  # loads it
 
