@@ -191,6 +191,7 @@ OBJECTS = (
     ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
+    ("Triangles with a vertex that is NaN or infinite", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
     (
