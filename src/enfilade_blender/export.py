@@ -60,10 +60,10 @@ def export(job: Job) -> dict[str, Any]:
     elements = shapes.write(evaluated.placed)
     note_light(selection, evaluated.lamps, notes, has_glass=bool(shapes.kinds & GLASS))
     report_progress(0.9, "lights")
-    nodes = LampNodes(job, selection, notes)
-    for lamp in evaluated.lamps:
+    lamps, nodes = [lamp for lamp in evaluated.lamps if not is_portal(lamp)], LampNodes(job, selection, notes)
+    for lamp in lamps:
         lamp.factor = nodes.factor(lamp)
-    lamps, sun = split_suns([lamp for lamp in evaluated.lamps if not is_portal(lamp)], notes)
+    lamps, sun = split_suns(lamps, notes)
     note_sun(sun, views, selection, notes)
     note_clipping(views, selection, notes)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]

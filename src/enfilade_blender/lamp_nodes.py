@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
 from enfilade_blender.materials.graph import Graph, upstream
@@ -23,6 +25,7 @@ class LampNodes:
     def __init__(self, job: Job, selection: Selection, notes: Notes) -> None:
         self._job, self._frame, self._notes = job, selection.frames[0], notes
         self._stage: BakeScene | None = None
+        self._computed: dict[Any, Constant] = {}  # by outputs: lamps may share their nodes
 
     def factor(self, lamp: Lamp) -> tuple[float, float, float]:
         """Factor of a lamp's nodes: an emission's colour and strength, each 1 where it is no constant."""
@@ -61,6 +64,8 @@ class LampNodes:
             return self._constant(graph.value(node.inputs["Strength"], value.output.groups), lamp, graph)
         if any(found.node.type not in COLOUR_NODES for found in upstream(value.output)):
             return None
-        if self._stage is None:
-            self._stage = BakeScene(self._job.bake_samples, self._frame)
-        return Constant(self._stage.light_colour(lamp.data, value.output))
+        key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
+        if key not in self._computed:
+            self._stage = self._stage or BakeScene(self._job.bake_samples, self._frame)
+            self._computed[key] = Constant(self._stage.light_colour(lamp.data, value.output))
+        return self._computed[key]
