@@ -25,7 +25,6 @@ from enfilade.errors import EnfiladeError, SettingsError
 from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings
 
 if TYPE_CHECKING:
-    from enfilade.monitor import Monitor
     from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.blender.notes import Note
     from enfilade.scene.blender.source import Choices, Source
@@ -102,8 +101,7 @@ def command(
             program=blender.program, is_strict=blender.strict, is_replaced=is_replaced,
         )  # fmt: skip
     try:
-        with watch(quiet=quiet) as monitor:
-            checked = _checked(imported, source, settings, choices, monitor, **checking)
+        checked = _checked(imported, source, settings, choices, quiet=quiet, **checking)
     except EnfiladeError:
         click.echo(f"The imported scene is kept in {folder}; its check failed.", err=True)
         raise
@@ -121,8 +119,8 @@ def _checked(
     source: Path,
     settings: Settings,
     choices: Choices,
-    monitor: Monitor,
     *,
+    quiet: bool,
     is_checked: bool,
     check_frames: str | None,
     check_spp: int,
@@ -131,6 +129,7 @@ def _checked(
     if not is_checked:
         return {}
     from enfilade.camera import parse_frames
+    from enfilade.cli.progress import watch
     from enfilade.device import activate
     from enfilade.reports.fidelity import differences_of, write_check
     from enfilade.runs.fidelity import check_import
@@ -139,7 +138,10 @@ def _checked(
     activate("auto")
     numbers = None if check_frames is None else parse_frames(check_frames)
     blender, limits = find_blender(settings[BlenderSettings].program), settings[LimitSettings]
-    made = check_import(imported, source, blender, choices, limits, monitor, numbers=numbers, spp=check_spp)
+    with watch(quiet=quiet) as monitor:
+        made = check_import(
+            imported, source, blender, choices, limits, monitor, numbers=numbers, spp=check_spp
+        )
     differences = differences_of(made)
     page = write_check(imported, made, differences)
     return {"page": str(page), "spp": made.spp, "differences": [asdict(of) for of in differences]}
