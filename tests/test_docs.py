@@ -21,7 +21,6 @@ DOCUMENTS = [
     ROOT / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "studies").rglob("*.md")),
-    *sorted((ROOT / "benchmarks").glob("*.md")),
 ]
 FLAG = re.compile(r"(?<![\w!-])--[a-z][a-z0-9-]*")
 FLAGS_OF_OTHER_PROGRAMS = {
@@ -30,7 +29,6 @@ FLAGS_OF_OTHER_PROGRAMS = {
     "make bench": "--scenes --keep",
     "make case-studies": "--scenes --items --preset",
     "benchmarks/faults.py": "--count --quick",
-    "git": "--depth",
 }
 BEGIN, END = "<!-- settings: written by tests/test_docs.py -->\n", "<!-- end of settings -->"
 SCENE = """<scene version="3.0.0">

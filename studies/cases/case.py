@@ -81,7 +81,7 @@ class Case:
     Parameters
     ----------
     name : {"room", "atrium"}
-    terms
+    extent
     folder
         Folder of this scene: ``scene/``, a run folder for each walkthrough, traced frames in ``windows/``,
         results as JSON.

@@ -26,7 +26,7 @@ def write_document(
     Parameters
     ----------
     results
-    terms
+    extent
         Extent of the results, stated in each block.
     folder
         Folder of the results, with the images of the examples.

@@ -48,7 +48,7 @@ def measure(
         Of ``room`` and ``atrium``.
     items
         Of :data:`ITEMS`.
-    terms
+    extent
     folder
         Receives a folder for each scene. After an interruption the same call continues: walkthroughs at
         their first missing frame, other items at their beginning, with the frames traced so far.

@@ -80,7 +80,3 @@ def test_disoccluded_pixels_are_traced_and_all_others_reused(frames):
         # No pixel shows another surface.
         is_red = found["RGB"][..., 0] > found["RGB"][..., 2]
         np.testing.assert_array_equal(is_red, shape_index == 2)
-
-
-def test_the_example_is_short():
-    assert len((EXAMPLES / "nearest_keyframe.py").read_text().splitlines()) <= 80

@@ -17,8 +17,8 @@ from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
-SPECULAR_SPP = 4  # specular rays of each pixel of the frame
-SEEN_SPP = 4  # camera rays of each pixel of the frame
+SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
+SEEN_SPP = 4  # camera rays of each pixel of the light camera
 GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
 
 
