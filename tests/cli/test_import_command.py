@@ -38,16 +38,24 @@ def test_an_import_lists_what_it_means_in_the_picture(run, shot, tmp_path):
     assert "my shot.blend by Blender 4.5.1: 3 objects, 4 instances" in result.stdout
     assert "1 not carried over, 0 approximated, 1 baked" in result.stdout
     render = next(line for line in result.stdout.splitlines() if line.startswith("render"))
-    settings, path = f"'{out}/settings.toml'", f"'{out}/camera_path.json'"
-    assert f"enfilade render '{out}/scene.xml' --path {path} --settings {settings}" in render
+    assert render.endswith(f"enfilade render '{out}' --out RUN")
 
 
-def test_the_printed_command_renders_with_the_settings_of_the_file(run, shot, tmp_path, jobs):
+def test_the_folder_of_an_imported_scene_renders_with_the_path_and_settings_of_the_file(
+    run, shot, tmp_path, jobs
+):
     out = tmp_path / "scene"
     run("import", shot(), "--out", out)
-    files = ("--path", out / "camera_path.json", "--settings", out / "settings.toml")
-    run("render", out / "scene.xml", *files, "--out", tmp_path / "run")
-    assert jobs[0].settings[ViewingSettings].exposure_ev == 0.5
+    run("render", out, "--out", tmp_path / "run")
+    run("render", out, "--out", tmp_path / "other", "--exposure-ev", "2", "--frames", "11")
+    first, second = jobs
+    assert first.scene.file == out / "scene.xml"
+    assert [job.settings[ViewingSettings].exposure_ev for job in jobs] == [0.5, 2.0]
+    assert second.path.numbers == (11,)
+    assert set(second.path.numbers) < set(first.path.numbers)
+    result = run("render", tmp_path, "--out", tmp_path / "none")
+    assert result.exit_code == 2
+    assert "holds no imported scene" in result.stderr
 
 
 def test_as_json(run, shot, tmp_path):

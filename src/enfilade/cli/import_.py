@@ -188,16 +188,8 @@ def _notes(notes: Iterable[Note]) -> Iterator[str]:
 
 def _ending(imported: ImportedScene, spent: Source) -> Iterator[str]:
     from enfilade.reports.tables import seconds
-    from enfilade.scene.blender.imported import SETTINGS_FILE
 
     yield imported.summary
     yield f"time    {seconds(spent.wall_s)}, CPU {seconds(spent.cpu_s)}"
-    path = "--path PATH" if imported.path_file is None else f"--path {_quoted(imported.path_file)}"
-    yield (
-        f"render  enfilade render {_quoted(imported.scene_file)} {path} --settings "
-        f"{_quoted(imported.folder / SETTINGS_FILE)} --out RUN"
-    )
-
-
-def _quoted(file: Path) -> str:
-    return shlex.quote(str(file))
+    path = " --path PATH" if imported.path_file is None else ""
+    yield f"render  enfilade render {shlex.quote(str(imported.folder))}{path} --out RUN"

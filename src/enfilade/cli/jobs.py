@@ -29,7 +29,7 @@ def job_of(
     frames: str | None,
     fps: float | None,
 ) -> Job:
-    """The job that a command describes; a file of Blender is imported.
+    """The job that a command describes; a file of Blender is imported, the folder of an imported one is read.
 
     Parameters
     ----------
@@ -50,6 +50,7 @@ def job_of(
     from enfilade.camera import load_path, parse_frames
     from enfilade.methods.opener import open_method
     from enfilade.runs.job import Job
+    from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.blender.source import is_importable
     from enfilade.scene.opener import Scene
 
@@ -61,9 +62,13 @@ def job_of(
     _check_effect(ctx, opened, scene, is_imported=is_imported)
     selected = None if frames is None else parse_frames(frames)
     path = None if path_file is None else load_path(path_file, size=size, frames=selected, fps=fps)
-    if run is not None and is_imported:
+    imported = None
+    if scene.is_dir():
+        imported = ImportedScene.read(scene)
+    elif run is not None and is_imported:
         span = (selected[0], selected[-1]) if selected and path is None else None
         imported = _imported(run, scene, settings, size, span, quiet=quiet)
+    if imported is not None:
         scene, settings = imported.scene_file, Settings.from_tables(imported.tables_under(tables), kinds)
         path = path or load_path(imported.checked_path(), size=size, frames=selected, fps=fps)
     if path is None:

@@ -95,7 +95,7 @@ _file = click.Path(path_type=Path)
 
 def _path_options(*, is_required: bool) -> Callable[[Command], Command]:
     """Scene and camera path; a file that Blender imports has a path of its own."""
-    own = "" if is_required else "  [default: that of a file that Blender imports]"
+    own = "" if is_required else "  [default: that of an imported scene]"
     return decorated(
         click.argument("scene", type=_file),
         click.option(
