@@ -15,6 +15,8 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
 MM = 1000.0
+FAR = 1000.0  # scene units from the origin
+RAY_OFFSET = 9e-5  # of the distance from the origin, by which Mitsuba moves the origins of rays
 KINDS = {"ORTHO": "an orthographic", "PANO": "a panoramic"}
 
 
@@ -34,6 +36,7 @@ def read_views(selection: Selection, notes: Notes) -> list[View]:
             return []
         views.append(_view(camera, selection, notes))
     _note_lenses(views, selection, notes)
+    _note_distance(views, notes)
     return views
 
 
@@ -96,6 +99,18 @@ def _focus(camera: Any, graph: Any) -> float:
     place = target.evaluated_get(graph).matrix_world.translation
     axis = -(camera.matrix_world.to_3x3().col[2]).normalized()
     return float(abs((place - camera.matrix_world.translation).dot(axis)))
+
+
+def _note_distance(views: list[View], notes: Notes) -> None:
+    farthest = max(views, key=lambda view: np.abs(view.pose[:3, 3]).max())
+    distance = np.abs(farthest.pose[:3, 3]).max()
+    if distance > FAR:
+        what = f"it is {distance:,.0f} units from the origin"
+        effect = (
+            f"shadows are lost within {distance * RAY_OFFSET:.2g} units of contacts: move the scene to the "
+            "origin"
+        )
+        notes.add("approximated", farthest.name, "Location", what, effect)
 
 
 def _note_lenses(views: list[View], selection: Selection, notes: Notes) -> None:

@@ -141,6 +141,7 @@ def test_a_mirrored_camera_looks_where_it_points(exported):
     assert [what for name, what in notes(result, "not-carried") if name == "Camera"] == [
         "its negative scale is left out"
     ]
+    assert ("Camera", "it is 5,000 units from the origin") in notes(result, "approximated")
 
 
 def test_view_and_exposure_are_those_of_the_file(exported):

@@ -97,6 +97,7 @@ def picture_files(folder):
 def mirrored_camera(_folder):
     scene = new_file()
     scene.camera.scale = (1.0, -2.0, 1.0)
+    scene.camera.location.x += 5000.0
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
 
 
