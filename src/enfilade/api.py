@@ -41,10 +41,10 @@ def render(
     Parameters
     ----------
     scene
-        A Mitsuba 3 scene in XML, a :class:`Scene`, or a .blend, glTF, USD, FBX or OBJ file, which Blender
-        imports into the run folder.
+        A Mitsuba 3 scene in XML, a :class:`Scene`, a .blend, glTF, USD, FBX or OBJ file, which Blender
+        imports into the run folder, or the folder of an imported scene.
     path
-        A camera path file (see docs/formats.md), or a :class:`CameraPath`; None: that of the imported file.
+        A camera path file (see docs/formats.md), or a :class:`CameraPath`; None: that of the imported scene.
     out
         The run folder. With the same arguments the call continues where it stopped.
     method
@@ -260,6 +260,7 @@ def _job(
     from enfilade.methods.opener import name_of, open_method
     from enfilade.runs.job import Job
     from enfilade.runs.source import imported_into
+    from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.blender.source import is_importable
     from enfilade.scene.opener import Scene
     from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Settings
@@ -267,9 +268,13 @@ def _job(
     name = name_of(method)
     kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
     chosen = settings if isinstance(settings, Settings) else Settings.from_tables(settings or {}, kinds)
-    if not isinstance(scene, Scene) and is_importable(Path(scene)):
+    imported = None
+    if not isinstance(scene, Scene) and Path(scene).is_dir():
+        imported = ImportedScene.read(Path(scene))
+    elif not isinstance(scene, Scene) and is_importable(Path(scene)):
         blender, limits = chosen[BlenderSettings], chosen[LimitSettings]
         imported = imported_into(run, Path(scene), blender, limits, monitor)
+    if imported is not None:
         scene, path = imported.scene_file, path or imported.checked_path()
         if not isinstance(settings, Settings):
             chosen = Settings.from_tables(imported.tables_under(settings or {}), kinds)

@@ -57,15 +57,15 @@ def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
         active_colour=list(colours)[active_colour] if 0 <= active_colour < len(colours) else "",
         generated=_generated(data, positions, triangles),
     )
-    is_finite = np.isfinite(positions).all(axis=1)[triangles].all(axis=1)
-    return mesh if is_finite.all() else _without_broken(mesh, is_finite, owner, notes)
+    is_finite = np.isfinite(positions).all(axis=1)
+    return mesh if is_finite.all() else _without_broken(mesh, is_finite[triangles].all(axis=1), owner, notes)
 
 
 def _without_broken(mesh: Mesh, is_finite: Any, owner: str, notes: Notes) -> Mesh:
     """The triangles whose positions are finite; normals that others have made void are those of triangles."""
-    count = np.count_nonzero(~is_finite)
-    what = f"triangles with a vertex that is NaN or infinite are left out: {count} of {len(mesh)}"
-    notes.add("not-carried", owner, "Mesh", what, "they are missing from the picture")
+    if count := np.count_nonzero(~is_finite):
+        what = f"triangles with a vertex that is NaN or infinite are left out: {count} of {len(mesh)}"
+        notes.add("not-carried", owner, "Mesh", what, "they are missing from the picture")
     mesh = mesh.select(is_finite)
     edges = np.diff(mesh.positions[mesh.triangles], axis=1)
     flat = np.cross(edges[:, 0], edges[:, 1])

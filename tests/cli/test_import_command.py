@@ -6,6 +6,7 @@ import os
 import numpy as np
 import pytest
 
+import enfilade
 from enfilade.images import write_exr
 from enfilade.settings import VideoSettings, ViewingSettings
 from support.fake_blender import NOTE, RESULT
@@ -48,9 +49,12 @@ def test_the_folder_of_an_imported_scene_renders_with_the_path_and_settings_of_t
     run("import", shot(), "--out", out)
     run("render", out, "--out", tmp_path / "run")
     run("render", out, "--out", tmp_path / "other", "--exposure-ev", "2", "--frames", "11")
-    first, second = jobs
+    with pytest.raises(SystemExit):
+        enfilade.render(out, None, tmp_path / "third", settings={"viewing": {"exposure_ev": 2.0}})
+    first, second, third = jobs
+    assert (third.scene, third.settings[ViewingSettings]) == (first.scene, second.settings[ViewingSettings])
     assert first.scene.file == out / "scene.xml"
-    assert [job.settings[ViewingSettings].exposure_ev for job in jobs] == [0.5, 2.0]
+    assert [job.settings[ViewingSettings].exposure_ev for job in (first, second)] == [0.5, 2.0]
     assert second.path.numbers == (11,)
     assert set(second.path.numbers) < set(first.path.numbers)
     result = run("render", tmp_path, "--out", tmp_path / "none")

@@ -49,3 +49,8 @@ def test_with_a_candidate_for_each_emitter_there_is_no_noise_of_the_choice():
     share = np.bincount(chosen.astype(int), minlength=4) / COUNT
     np.testing.assert_allclose(share, np.array(values) / np.sum(values), atol=0.01)
     assert dimension == 8  # a point and a number for each candidate
+
+
+def test_what_is_not_finite_stays_so():
+    found, _, _ = drawn([1.0, float("nan"), 6.0, 0.5], 4)
+    assert np.isnan(found).all()

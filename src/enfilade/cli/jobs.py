@@ -101,9 +101,10 @@ def _check_effect(ctx: click.Context, method: Method, scene: Path, *, is_importe
     read = {kind.table for kind in kinds}
     for flag, table in assigned(ctx).items():
         if table == own and not is_imported:
-            raise SettingsError(
-                f"{flag} has no effect on {scene}, which Blender does not import; leave it out"
-            )
+            why = "which Blender does not import; leave it out"
+            if scene.is_dir():
+                why = "which is imported already; import the file again, with this flag"
+            raise SettingsError(f"{flag} has no effect on {scene}, {why}")
         if table not in read | {own}:
             raise SettingsError(
                 f"{flag} has no effect with --method {method.name}, which does not read [{table}]; leave it "

@@ -84,6 +84,7 @@ class BakeScene:
         """Value of an output of a light's nodes that is even: a sun of that colour lights a white square."""
         groups = set(bpy.data.node_groups)
         sun = light.copy()
+        sun.animation_data_clear()
         name, sun.type = sun.name, "SUN"
         sun = bpy.data.lights[name]  # of another type now
         sun.energy, sun.color, sun.angle = math.pi, (1.0, 1.0, 1.0), 0.0

@@ -137,6 +137,7 @@ def lamp_nodes(_folder):
     fill(tree, product, {0: 3.0, 1: 5.0})
     fill(tree, mixed, {0: 0.25, 1: (1.0, 0.0, 0.0, 1.0), 2: (0.0, 0.0, 1.0, 1.0)})
     fill(tree, emission, {"Color": mixed, "Strength": node_of(tree, "LightFalloff", Strength=product)})
+    bpy.data.lights["Computed"].keyframe_insert("energy")
     add("Computed again", bpy.data.lights["Computed"], (1.0, 0.0, 3.0))
 
 

@@ -99,7 +99,8 @@ def _gather(
     gathered, times = direct.color + indirect.color, 1
     if (denoiser := shot.settings.denoiser) != "none":
         is_gathered, is_shown = (np.zeros(virtual.shape_index.shape, np.bool_) for _ in range(2))
-        is_gathered.flat[pixels], is_shown.flat[[*pixels, *known_pixels]] = True, True
+        is_gathered.flat[pixels], is_shown.flat[known_pixels] = True, True
+        is_shown |= is_gathered
         variance = np.float32(NOISE_SHARE) * (direct.variance + indirect.variance)
         light = Shading(gathered, variance).to_image(is_gathered)
         light.color.reshape(-1, 3)[known_pixels] = known_irradiance

@@ -10,7 +10,7 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Array3f, Float, UInt, opaque
-from enfilade.kernels.random import PaddedSobolSampler
+from enfilade.kernels.random import BELOW_ONE, PaddedSobolSampler
 
 MOST_CANDIDATES = 8  # of which one has a shadow ray
 
@@ -43,7 +43,7 @@ def resample(
     def draw(k: Any, target: Any, chosen: Any, chosen_weight: Any, total: Any) -> tuple[Any, ...]:
         own = replace(sampler, dimension=first + 2 * k)
         point = own.next_2d()
-        place = mi.Point2f((Float(k) + point.x) / Float(size), point.y)
+        place = mi.Point2f(dr.minimum((Float(k) + point.x) / Float(size), BELOW_ONE), point.y)
         new_target, contribution = candidate(place)
         weight = dr.max(dr.abs(contribution))
         total = total + weight
@@ -63,4 +63,5 @@ def resample(
         labels=("k", "target", "chosen", "chosen_weight", "total"),
     )
     sampler.dimension = first + 2 * count
-    return target, chosen * dr.select(chosen_weight > 0.0, total / (chosen_weight * Float(size)), 0.0)
+    # What is not finite stays so, and is left out with its path.
+    return target, chosen * dr.select(total == 0.0, 0.0, total / (chosen_weight * Float(size)))

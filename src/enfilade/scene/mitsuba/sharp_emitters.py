@@ -96,7 +96,7 @@ class SharpEmitters:
                 return sample.p, Array3f(evaluate(sample.d) * radiance) * size
 
             target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler)
-            found += self._unoccluded(si, target, chosen, active & (dr.max(chosen) > 0.0))
+            found += self._unoccluded(si, target, chosen, active & ~(dr.max(chosen) <= 0.0))
         if self._sun is not None:
             direction, radiance = self._sun.sample(sampler)
             target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
