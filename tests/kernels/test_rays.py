@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from enfilade.arrays import Float, matrix3
+from enfilade.arrays import Array2f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.random import one_sequence
-from enfilade.kernels.rays import box_offsets, gaussian_offsets, pinhole_directions
+from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets
 
 COUNT = 1 << 18
 
@@ -20,8 +20,7 @@ def squares(count=COUNT):
 def test_directions_have_unit_depth_and_pass_through_their_point():
     camera = Camera(look_at((1, 2, 3), (-1, 0, 0.5)), 47.0, 64, 48)
     x, y = np.array([0, 64, 32, 11.3], np.float32), np.array([0, 48, 24, 40.1], np.float32)
-    got = pinhole_directions(Float(x), Float(y), direction_from_pixel=matrix3(camera.direction_from_pixel))
-    got = np.array(got).T
+    got = np.array(camera_rays(camera, Array2f(x, y)).direction).T
     np.testing.assert_allclose(-got @ camera.world_from_camera[:3, 2], 1.0, rtol=1e-6)
     image = got @ camera.pixel_from_direction.T
     np.testing.assert_allclose(image[:, :2], np.stack([x, y], axis=1), atol=2e-5)  # float32 of 64 px
