@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from enfilade.arrays import Bool, UInt
+from enfilade.arrays import Array3f, Bool, UInt
 
 NULL_LAYERS = 32  # null interactions along a ray before it gives up
 
@@ -30,7 +30,12 @@ class ShadowRays:
         self._scene = scene
         self.pass_null = pass_null
 
-    def transmittance(self, si: Any, target: Any, active: Any) -> Any:
+    def unoccluded(self, si: Any, target: Any, contribution: Any, active: Any) -> Any:
+        """A contribution from a point of an emitter, times the transmittance in between; Array3f."""
+        is_lit = active & ~(dr.max(dr.abs(contribution)) <= 0.0)  # what is not finite stays so
+        return dr.select(is_lit, contribution * Array3f(self._transmittance(si, target, is_lit)), 0.0)
+
+    def _transmittance(self, si: Any, target: Any, active: Any) -> Any:
         """Share of light that reaches a surface from a point; Color3f."""
         ray = si.spawn_ray_to(target)
         is_blocked = self._scene.ray_test(ray, active)

@@ -40,8 +40,8 @@ class SharpEmitters:
         weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
         is_delta &= weights > 0.0  # Mitsuba never samples the others
-        self._count = int(is_delta.sum())
-        self._delta = lanes(np.flatnonzero(is_delta).astype(np.uint32)) if self._count else None
+        self._delta_count = int(is_delta.sum())
+        self._delta = lanes(np.flatnonzero(is_delta).astype(np.uint32)) if self._delta_count else None
         self._sun = find_sun(scene.environment())
 
         # The intervals of the first random number in which the scene samples each emitter.
@@ -56,7 +56,7 @@ class SharpEmitters:
     @property
     def is_empty(self) -> bool:
         """Whether no emitter casts sharp shadows."""
-        return not self._count and self._sun is None
+        return not self._delta_count and self._sun is None
 
     @property
     def state(self) -> Any:
@@ -83,25 +83,25 @@ class SharpEmitters:
         -------
         Array3f
         """
-        groups = min(self._count, SHADOW_RAYS)
-        size = self._count / max(groups, 1)  # emitters of a group
+        groups = min(self._delta_count, SHADOW_RAYS)
+        size = self._delta_count / max(groups, 1)  # emitters of a group
         found = Array3f(0)
         for group in range(groups):
 
             def candidate(place: Any, group: int = group) -> tuple[Any, Any]:
-                number = dr.minimum(UInt((group + place.x) * size), self._count - 1)
+                number = dr.minimum(UInt((group + place.x) * size), self._delta_count - 1)
                 index = dr.gather(UInt, self._delta, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
                 sample, radiance = emitter.sample_direction(si, place, active)
                 return sample.p, Array3f(evaluate(sample.d) * radiance) * size
 
             target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler)
-            found += self._unoccluded(si, target, chosen, active & ~(dr.max(chosen) <= 0.0))
+            found += self._shadow_rays.unoccluded(si, target, chosen, active)
         if self._sun is not None:
             direction, radiance = self._sun.sample(sampler)
             target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
             contribution = Array3f(evaluate(direction) * radiance)
-            found += self._unoccluded(si, target, contribution, active & (dr.max(contribution) > 0.0))
+            found += self._shadow_rays.unoccluded(si, target, contribution, active)
         return found
 
     def sample_soft(self, si: Any, sample_point: Any, active: Any) -> tuple[Any, Any]:
@@ -133,8 +133,3 @@ class SharpEmitters:
 
     def _is_environment(self, sample: Any) -> Any:
         return sample.emitter == mi.EmitterPtr(self._scene.environment())
-
-    def _unoccluded(self, si: Any, target: Any, contribution: Any, active: Any) -> Any:
-        """A contribution from a point, times the transmittance in between."""
-        share = self._shadow_rays.transmittance(si, target, active)
-        return dr.select(active, contribution * Array3f(share), 0.0)

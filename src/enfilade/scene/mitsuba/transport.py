@@ -175,9 +175,7 @@ class LightTransport:
 
         emitters = self.sharp_emitters.soft_count if soft_only else self.sharp_emitters.count
         target, light = resample(candidate, min(max(emitters, 1), MOST_CANDIDATES), sampler)
-        is_lit = active & ~(dr.max(dr.abs(light)) <= 0.0)
-        share = self._shadow_rays.transmittance(si, target, is_lit)
-        return dr.select(is_lit, light * Array3f(share), 0.0)
+        return self._shadow_rays.unoccluded(si, target, light, active)
 
 
 def _divided(lobe: Any, albedo: Any) -> Any:
