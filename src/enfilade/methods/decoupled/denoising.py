@@ -20,7 +20,9 @@ OUTLIER = 64.0  # times the denoised irradiance: brighter estimates are limited 
 LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
-def denoise_irradiance(geometry: Geometry, image: IrradianceImage, quality: str) -> IrradianceImage:
+def denoise_irradiance(
+    geometry: Geometry, image: IrradianceImage, quality: str, outlier: float = OUTLIER
+) -> IrradianceImage:
     """An irradiance image whose layers are denoised apart; its variance is 0.
 
     Parameters
@@ -30,10 +32,12 @@ def denoise_irradiance(geometry: Geometry, image: IrradianceImage, quality: str)
     image
     quality
         Of the denoiser.
+    outlier
+        As of :func:`denoise_light`.
     """
     direct, indirect = (
         Shading(
-            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=OUTLIER),
+            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=outlier),
             np.zeros_like(layer.variance),
             layer.dropped,
         )

@@ -19,21 +19,21 @@ from enfilade.settings import LimitSettings
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
-GATHER_SPP = 4  # final gather rays of each diffuse pixel of the prepass image
+GATHER_SPP = 1  # final gather rays of each diffuse pixel of the prepass image
 
 
 def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
-    camera, geometry = light_camera(walk.path.cameras[frame]), shot.prepass_geometry(frame)
+    camera, geometry = light_camera(walk.path.cameras[frame]), shot.light_geometry(frame)
     chunk = walk.settings[LimitSettings].paths_in_flight
 
     # Gather at the surfaces that mirrors and panes show.
     virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
-    is_sharp = np.isin(shot.light_geometry(frame).surface, SHARP).ravel()
+    is_sharp = np.isin(geometry.surface, SHARP).ravel()
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     with_virtual = replace(cache, hash_grid=virtual.upload())
     for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):

@@ -37,7 +37,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 18
+    revision = 19
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
@@ -111,7 +111,7 @@ class Decoupled(Method):
         shot, frame = self._context_of(task, inputs, walk), task.frame
         match task.pass_name:
             case "prepass":
-                return trace_prepass(walk, shot.renderer, frame)
+                return trace_prepass(shot, frame)
             case "hash_grid":
                 return fill_hash_grid(shot, frame)
             case "irradiance":

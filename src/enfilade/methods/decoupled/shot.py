@@ -23,7 +23,6 @@ from enfilade.methods.decoupled.irradiance_cache import (
 )
 from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
-from enfilade.methods.decoupled.prepass import prepass_geometry
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry, Mask
@@ -163,13 +162,9 @@ class ShotContext:
             return self.walk.view(frame).geometry
         return self._resized.get((frame, camera.width), lambda: find_geometry(self.renderer, camera))
 
-    def prepass_geometry(self, frame: int) -> Geometry:
-        """G-buffer of a prepass image."""
-        return prepass_geometry(self.walk, frame)
-
     def _prepass_image(self, frame: int) -> UploadedImage:
         return self._prepass.get(
-            frame, lambda: upload(self.prepass_geometry(frame), self.inputs.record("prepass", frame))
+            frame, lambda: upload(self.light_geometry(frame), self.inputs.record("prepass", frame))
         )
 
     def _accumulated_prepass_image(self, frame: int) -> UploadedImage:
@@ -177,7 +172,7 @@ class ShotContext:
             around = sorted(nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1))
             own = self.inputs.record("prepass", frame)
             images = [self._prepass_image(keyframe) for keyframe in around]
-            return accumulate(self.prepass_geometry(frame), own.is_known, images)
+            return accumulate(self.light_geometry(frame), own.is_known, images)
 
         return self._accumulated_prepass.get(frame, make)
 

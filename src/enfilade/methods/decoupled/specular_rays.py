@@ -14,7 +14,13 @@ import numpy as np
 
 from enfilade.arrays import to_float
 from enfilade.kernels.estimate import Estimate, Samples
-from enfilade.methods.decoupled.edges import SPECULAR_DEVIATION, EdgeRays, dilated, is_outline
+from enfilade.methods.decoupled.edges import (
+    SPECULAR_CONTRAST,
+    SPECULAR_DEVIATION,
+    EdgeRays,
+    dilated,
+    is_outline,
+)
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
@@ -82,9 +88,9 @@ def shade_specular(
     aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
-    # Aliasing is more visible than noise: these edges have the tolerance of camera rays.
+    # Aliasing is more visible than noise: their tolerance is far below that of noise.
     rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
-    matters = EdgeRays.of(shot.walk, beneath=beneath).matters
+    matters = EdgeRays.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
