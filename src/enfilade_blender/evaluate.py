@@ -108,6 +108,7 @@ def _render(selection: Selection) -> None:
 def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
     _check_generated(graph, limits)
     by_key: dict[Any, Placed | None] = {}
+    names = _attributes_of_materials()
     for instance in graph.object_instances:
         obj = instance.object
         result.instances += 1
@@ -127,7 +128,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         elif isinstance(obj.data, bpy.types.Mesh):  # text, curves and metaballs have an instance of one
             key = (_name(instance), obj.name_full, obj.data.as_pointer())
             if key not in by_key:
-                by_key[key] = _place(instance, notes)
+                by_key[key] = _place(instance, notes, names)
             placed = by_key[key]
             if placed is not None:
                 placed.matrices.append(matrix)
@@ -162,10 +163,17 @@ def _too_many(limits: Limits, name: str) -> ExportError:
     return ExportError(what, name, advice)
 
 
-def _place(instance: Any, notes: Notes) -> Placed | None:
+def _attributes_of_materials() -> frozenset[str]:
+    """Names of the attributes of meshes that nodes read."""
+    trees = [*(material.node_tree for material in bpy.data.materials), *bpy.data.node_groups]
+    nodes = [node for tree in trees if tree is not None for node in tree.nodes if node.type == "ATTRIBUTE"]
+    return frozenset(node.attribute_name for node in nodes if node.attribute_type == "GEOMETRY")
+
+
+def _place(instance: Any, notes: Notes, names: frozenset[str]) -> Placed | None:
     obj = instance.object
     _note_object(instance, notes)
-    mesh = read_mesh(obj.data, obj.name, notes)
+    mesh = read_mesh(obj.data, obj.name, notes, names)
     if len(mesh) == 0:
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -12,10 +13,17 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.ply import F32, Mesh
 
 UNIT = 1e-2  # deviation of a normal's length from 1
+KINDS = {  # attributes that nodes read: name, type and number of their values
+    "FLOAT": ("value", np.float32, 1),
+    "INT": ("value", np.int32, 1),
+    "BOOLEAN": ("value", np.bool_, 1),
+    "FLOAT2": ("vector", np.float32, 2),
+    "FLOAT_VECTOR": ("vector", np.float32, 3),
+}
 
 
-def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
-    """Triangles of an evaluated mesh, with normals, UV maps and colours.
+def read_mesh(data: Any, owner: str, notes: Notes, names: Collection[str] = ()) -> Mesh:
+    """Triangles of an evaluated mesh, with normals, UV maps, colours and other attributes.
 
     Triangles with a vertex that is not finite, which Mitsuba refuses, are left out with a note.
 
@@ -25,6 +33,8 @@ def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
     owner : str
         Name of its object, for notes.
     notes
+    names
+        Of the attributes that materials read.
     """
     data.calc_loop_triangles()
     count = len(data.loop_triangles)
@@ -43,6 +53,17 @@ def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
         size = len(data.loops) if per_corner else len(data.vertices)
         colour = _get(attribute.data, "color", np.float32, size * 4).reshape(-1, 4)
         colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 4)
+    # Nodes show a number as a grey, and a vector as a colour.
+    others = {}
+    at = {"POINT": corners[loops], "CORNER": loops, "FACE": polygons.repeat(3)}
+    for attribute in data.attributes:
+        name, kind = attribute.name, KINDS.get(attribute.data_type)
+        if name in names and name not in uvs and name not in colours and kind and attribute.domain in at:
+            value, dtype, axes = kind
+            values = _get(attribute.data, value, dtype, len(attribute.data) * axes).reshape(-1, axes)
+            colour = np.tile(np.float32([0.0, 0.0, 0.0, 1.0]), (len(values), 1))
+            colour[:, : 3 if axes == 1 else axes] = values
+            others[name] = colour[at[attribute.domain]].reshape(-1, 3, 4)
     active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
     active_colour = data.color_attributes.render_color_index if colours else -1
     triangles = corners[loops].reshape(-1, 3)
@@ -51,7 +72,7 @@ def read_mesh(data: Any, owner: str, notes: Notes) -> Mesh:
         triangles=triangles,
         normals=normals[loops].reshape(-1, 3, 3),
         uvs={name: uv.reshape(-1, 3, 2) for name, uv in uvs.items()},
-        colours=colours,
+        colours=colours | others,
         materials=slots[polygons],
         active_uv=active_uv,
         active_colour=list(colours)[active_colour] if 0 <= active_colour < len(colours) else "",

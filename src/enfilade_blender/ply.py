@@ -27,7 +27,7 @@ class Mesh:
     uvs : dict of (N, 3, 2) float32
         Texture coordinates of corners by the name of the UV map; v points up.
     colours : dict of (N, 3, 4) float32
-        Linear colours and alpha of corners by the name of the attribute.
+        Attributes of corners by name: linear colours and alpha, or numbers and vectors.
     materials : (N,) int32
         Slots.
     active_uv : str

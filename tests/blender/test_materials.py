@@ -228,3 +228,13 @@ def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blende
     mixed = scene.findall("bsdf[@id='material both: both']//rgb")
     colours = [[float(number) for number in colour.get("value").split()] for colour in mixed]
     assert np.array(colours) == pytest.approx(np.array([[0.8, 0.1, 0.1], [0.1, 0.6, 0.1]]), abs=1e-3)
+
+
+def test_numbers_and_vectors_of_meshes_are_colours(blender):
+    code, out, result = blender.job(blender.make("attributes")[0], "attributes")
+    assert code == 0, result
+    assert [note["what"] for note in result["notes"]] == ["there is no light"]
+    scene = mi.load_file(str(out / "scene.xml"))
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f([0.0, 2.0, 4.0], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
+    assert found == pytest.approx(np.array([[0.25] * 3, [0.2, 0.4, 0.6], [0.3] * 3]), abs=2e-3)

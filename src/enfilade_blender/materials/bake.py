@@ -202,7 +202,7 @@ def _lost(found: Output, mesh: Mesh, copies: int) -> str:
     attribute = {"ATTRIBUTE": "attribute_name", "VERTEX_COLOR": "layer_name"}.get(node.type)
     layer = getattr(node, attribute) if attribute else ""
     if layer and layer not in mesh.uvs and layer not in mesh.colours:
-        return f"the attribute {layer} is neither a UV map nor a colour of the mesh, and is taken as 0"
+        return f"the mesh has no attribute {layer} of vertices, corners or faces; it is taken as 0"
     return OBJECT_DATA.get(node.type, "")
 
 

@@ -120,7 +120,11 @@ INPUTS = (
         "mapped",
         "`bitmap` with `to_uv`, `wrap_mode`, `filter_type`, `raw`",
     ),
-    ("Colour attribute", "mapped", "`mesh_attribute`; baked: its alpha, and several in one material"),
+    (
+        "Attribute of vertices, corners or faces",
+        "mapped",
+        "`mesh_attribute`; baked: its alpha, several in one material, and what nodes compute of it",
+    ),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
     (
         "Everything else: noise, ramps, Object and Generated coordinates",
@@ -134,7 +138,7 @@ INPUTS = (
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
     (
-        "Object Info: Random; properties; attributes but UV maps and colours; data of particles and hairs",
+        "Object Info: Random; properties; attributes of edges and instances; data of particles and hairs",
         "approximated",
         "another number, or 0",
     ),

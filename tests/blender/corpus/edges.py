@@ -170,6 +170,28 @@ def painted(_folder):
                 corner.color = colour
 
 
+def attributes(_folder):
+    """A number of vertices and a vector of faces as colours, and a truth value of corners times 0.3."""
+    new_file()
+    kinds = [
+        ("Wear", "FLOAT", "POINT", 0.25),
+        ("Side", "FLOAT_VECTOR", "FACE", (0.2, 0.4, 0.6)),
+        ("On", "BOOLEAN", "CORNER", True),
+    ]
+    for number, (name, kind, domain, value) in enumerate(kinds):
+        material, tree, bsdf = shader(name, "BsdfDiffuse")
+        read = node_of(tree, "Attribute")
+        read.attribute_name = name
+        if name == "On":
+            source, read = read, node_of(tree, "VectorMath")
+            read.operation = "MULTIPLY"
+            fill(tree, read, {0: source, 1: (0.3, 0.3, 0.3)})
+        fill(tree, bsdf, {"Color": read})
+        data = plane(name, (2.0 * number, 0.0, 0.0), 1.5, material).data
+        for item in data.attributes.new(name, kind, domain).data:
+            setattr(item, "vector" if kind == "FLOAT_VECTOR" else "value", value)
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
