@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import sem
 
-from enfilade.arrays import Array3f, Float, UInt
+from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled import hash_grid as module
 from enfilade.methods.decoupled.hash_grid import (
@@ -188,3 +188,24 @@ def test_entries_with_most_of_their_light_from_one_path_are_not_uploaded():
     assert Entries.of(key, light).upload() is None
     confirmed = [Entries.of(key, light) for _ in range(4)]
     assert Entries.joined(confirmed).upload() is not None
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 1024, 1025, 50_000])
+def test_every_key_is_found_and_no_other(count):
+    # Also those of the fullest bucket, and of the last one.
+    points, normals = random_points(2 * count, seed=count)
+    key = keys(points, normals, 1e-4)
+    light = np.arange(1, count + 1)[:, None] * np.ones(3)
+    grid = Entries.joined([Entries.of(key[:count], light)]).repeated(MIN_SAMPLES).upload()
+    at = Array3f(points.T.astype(np.float32)), Array3f(normals.T.astype(np.float32)), UInt(1), Float(1e-4)
+    found, is_hit = (np.array(v) for v in grid.lookup(*at))
+    assert is_hit.tolist() == [True] * count + [False] * count
+    np.testing.assert_allclose(found[:, :count], light.T)
+
+
+def test_lanes_that_are_not_looked_up_find_nothing():
+    grid = grid_at((0.3, 0.3, 0.3), 1.0)
+    at = Array3f([0.3] * 2, [0.3] * 2, [0.3] * 2), Array3f(*UP[0].tolist()), UInt(1), Float(1.0)
+    light, is_hit = (np.array(v) for v in grid.lookup(*at, where=Bool([True, False])))
+    assert is_hit.tolist() == [True, False]
+    np.testing.assert_array_equal(light, [[1.0, 0.0]] * 3)

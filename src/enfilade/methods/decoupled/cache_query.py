@@ -10,7 +10,7 @@ import drjit as dr
 from enfilade.arrays import Array3f, Bool
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 
-__all__ = ["CacheQuery", "query_further", "query_view"]
+__all__ = ["CacheQuery", "query_further", "query_hash_grid", "query_view"]
 
 STREAM_SALT = 0x9E3779B9  # makes the jitter of lookups independent of the path's random numbers
 
@@ -49,22 +49,35 @@ def query_view(cache: IrradianceCache, query: CacheQuery) -> tuple[Any, Any]:
     return _reflected(query, *cache.lookup_in_view(query.position, query.normal, query.shape_index))
 
 
+def query_hash_grid(
+    cache: IrradianceCache, query: CacheQuery, where: Any, offset: Any = None
+) -> tuple[Any, Any]:
+    """Diffuse reflection of irradiance from the hash grid alone, and which of some lanes miss it.
+
+    Parameters
+    ----------
+    cache, query
+    where : Bool
+        Lanes that are looked up; of others the reflection is 0.
+    offset : Array3f or None
+        As of :meth:`HashGrid.lookup`.
+    """
+    if not cache.hash_grid:
+        return Array3f(0), Bool(where)
+    at = query.position, query.normal, query.shape_index, query.width
+    irradiance, is_found = cache.hash_grid.lookup(*at, offset, where)
+    return Array3f(dr.select(is_found, query.weight * irradiance, 0.0)), Bool(where & ~is_found)
+
+
 def query_further(cache: IrradianceCache, query: CacheQuery, sampler: Any, jitter: Any) -> tuple[Any, Any]:
     """Diffuse reflection of irradiance from the images, then from the hash grid; and where both miss."""
     reflected, is_miss = _reflected(query, *cache.lookup(query.position, query.normal, query.shape_index))
-    if cache.hash_grid:
-        # Jitter the position, so that many lookups interpolate.
-        sampler = sampler.fork(STREAM_SALT)
-        offset = Array3f(*sampler.next_2d(), sampler.next_1d())
-        offset = 0.5 + jitter * (offset - 0.5)
 
-        # Look up where the images miss.
-        irradiance, is_found = cache.hash_grid.lookup(
-            query.position, query.normal, query.shape_index, query.width, offset
-        )
-        reflected = dr.select(is_miss & is_found, query.weight * irradiance, reflected)
-        is_miss &= ~is_found
-    return reflected, is_miss
+    # Jitter the position in the hash grid, so that many lookups interpolate.
+    sampler = sampler.fork(STREAM_SALT)
+    offset = 0.5 + jitter * (Array3f(*sampler.next_2d(), sampler.next_1d()) - 0.5)
+    from_grid, is_miss = query_hash_grid(cache, query, is_miss, offset)
+    return Array3f(reflected + from_grid), is_miss
 
 
 def _reflected(query: CacheQuery, irradiance: Any, is_known: Any) -> tuple[Any, Any]:

@@ -7,6 +7,7 @@ whose keys are hashes of the quantized position and normal (Binder et al. 2018) 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +22,8 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, of an entry that is used
 RELIABLE_SAMPLES, RELIABLE_ERROR = 16, 0.1  # fewest, and largest relative standard error, of a reliable one
-SEARCH_STEPS = 22
-MAX_ENTRIES = 1 << SEARCH_STEPS  # that are uploaded; of more, those with the most samples
+MAX_ENTRIES = 1 << 22  # that are uploaded; of more, those with the most samples
+SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
 
 
@@ -40,15 +41,22 @@ class HashGrid:
         Whether the entry is preferred to larger ones.
     last : UInt
         Lane of the last key.
+    starts : UInt
+        Number of keys before each bucket. The upper bits of a key are the number of its bucket: keys are
+        hashes, so that buckets have about as many each.
+    shift : UInt64
+        Number of the lower bits.
     """
 
     keys: Any
     irradiance: Any
     is_reliable: Any
     last: Any
+    starts: Any
+    shift: Any
 
     def lookup(
-        self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any
+        self, position: Any, normal: Any, shape_index: Any, width: Any, offset: Any = None, where: Any = True
     ) -> tuple[Any, Any]:
         """Irradiance over pi at points, from the smallest reliable entry, or else the largest.
 
@@ -58,37 +66,40 @@ class HashGrid:
         shape_index : UInt
         width : Float
             Of the path there, scene units.
-        offset : Array3f
+        offset : Array3f or None
             Shift of the point in widths of an entry, plus 0.5, so that many lookups interpolate. Moved points
             without an entry use that of the point itself.
+        where : Bool
+            Lanes that are looked up.
 
         Returns
         -------
         irradiance : Array3f
         is_found : Bool
         """
-        irradiance, is_found, is_final = Array3f(0), Bool(False), Bool(False)
+        irradiance, is_found, is_final = Array3f(0), Bool(False), ~Bool(where)
+        offsets = (0.5,) if offset is None else (offset, 0.5)
         for level in range(LEVELS):
             is_open = ~is_final
-            for moved in (offset, 0.5):
+            for moved in offsets:
                 key = entry_key(position, normal, shape_index, width, level, moved)
-                lane = self._search(key)
-                is_here = is_open & (dr.gather(UInt64, self.keys, lane) == key)
-                irradiance = dr.select(is_here, dr.gather(Array3f, self.irradiance, lane), irradiance)
-                is_final |= is_here & dr.gather(Bool, self.is_reliable, lane)
+                lane, is_here = self._search(key, is_open)
+                irradiance = dr.select(
+                    is_here, dr.gather(Array3f, self.irradiance, lane, is_here), irradiance
+                )
+                is_final |= is_here & dr.gather(Bool, self.is_reliable, lane, is_here)
                 is_found |= is_here
                 is_open &= ~is_here
         return irradiance, is_found
 
-    def _search(self, key: Any) -> Any:
-        """Lane of the first key that is not less, or the last one, by binary search."""
-        low, high = UInt(0), UInt(self.last)
-        for _ in range(SEARCH_STEPS):
-            middle = (low + high) >> 1
-            is_less = dr.gather(UInt64, self.keys, middle) < key
-            low = dr.select(is_less, dr.minimum(middle + 1, self.last), low)
-            high = dr.select(is_less, high, middle)
-        return low
+    def _search(self, key: Any, is_active: Any) -> tuple[Any, Any]:
+        """Lane of a key, and whether there is one, by binary search in its bucket."""
+        lane = dr.gather(UInt, self.starts, UInt(key >> self.shift), is_active)
+        for step in SEARCH_STEPS:
+            ahead = dr.minimum(lane + (step - 1), self.last)
+            lane = dr.select(dr.gather(UInt64, self.keys, ahead, is_active) < key, lane + step, lane)
+        lane = dr.minimum(lane, self.last)
+        return lane, is_active & (dr.gather(UInt64, self.keys, lane, is_active) == key)
 
 
 def entry_key(position: Any, normal: Any, shape_index: Any, width: Any, level: int, offset: Any = 0.5) -> Any:
@@ -217,11 +228,16 @@ class Entries:
             chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
         irradiance = irradiance[chosen]
         is_reliable = ((self.counts >= RELIABLE_SAMPLES) & (error <= RELIABLE_ERROR))[chosen]
+        shift = 64 - max(math.ceil(math.log2(len(chosen))), 1)
+        buckets = (self.keys[chosen] >> np.uint64(shift)).astype(np.int64)
+        sizes = np.bincount(buckets, minlength=1 << (64 - shift))
         grid = HashGrid(
             lanes(self.keys[chosen]),
             lanes(irradiance.astype(np.float32)[None]),
             lanes(is_reliable),
             opaque(len(chosen) - 1, UInt),
+            lanes((np.cumsum(sizes) - sizes).astype(np.uint32)),
+            opaque(shift, UInt64),
         )
         dr.eval(grid)
         return grid

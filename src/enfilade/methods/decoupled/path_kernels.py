@@ -9,7 +9,7 @@ import drjit as dr
 
 from enfilade.arrays import Array3f, Bool
 from enfilade.kernels.replay import recorded
-from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_view
+from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_hash_grid, query_view
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
 from enfilade.methods.decoupled.lookup import UploadedImage, lookup
@@ -205,8 +205,10 @@ class PathKernels:
             branch=path.branch,
         )
 
-        # Query the cache at the next vertex.
+        # Query the view, and at once the hash grid, which has most of what the camera does not see.
         emitted, vertex = self._intersect(cache, extended)
+        reflected, is_miss = query_hash_grid(cache, vertex.query, vertex.is_miss)
+        vertex = replace(vertex, radiance=vertex.radiance + reflected, is_miss=is_miss)
         return Array3f(sample.direct + emitted), vertex
 
     def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
