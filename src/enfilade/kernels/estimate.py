@@ -10,13 +10,13 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array3f, Float, Float64, UInt, lanes, opaque, rows
+from enfilade.arrays import Array2f, Array3f, Float, Float64, UInt, lanes, opaque, rows
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
-from enfilade.renderer import PixelFilter, RandomKey, Rays
+from enfilade.renderer import PixelFilter, RandomKey
 
 SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no chunk size changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
@@ -103,13 +103,13 @@ class Estimate:
                 part = chosen[start : start + step]
                 pixel, path = _numbered(self._pixels[part], first, count)
                 sampler = samplers(pixel, path, self._random)
-                rays = self._rays(pixel, sampler)
+                offset = self._offset(sampler)
+                rays = camera_rays(self._camera, pixel_centres(self._camera, pixel) + offset)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
                 found = self._radiance(rays, sampler)
-                for total, value in zip(self._sums, _summed(found, count), strict=True):
-                    dr.scatter_add(total, Float64(value), lanes(part), mode=dr.ReduceMode.NoConflicts)
-                dr.eval(self._sums)
+                samples = found if isinstance(found, Samples) else Samples((found,))
+                self._accumulate(samples, offset, lanes(part), count)
         self._next += spp
         self._traced += spp * len(chosen)
 
@@ -131,14 +131,7 @@ class Estimate:
     @property
     def shadings(self) -> list[Shading]:
         """The same of every layer."""
-        count = dr.maximum(self._sums[0], 1.0)
-        found = []
-        for first in range(2, len(self._sums), 4):
-            *mean, mean_square = (total / count for total in self._sums[first : first + 4])
-            luminance = sum(weight * channel for weight, channel in zip(REC709_LUMINANCE, mean, strict=True))
-            sample_variance = dr.maximum(mean_square - luminance * luminance, 0.0)
-            variance = dr.select(count > 1.0, sample_variance / dr.maximum(count - 1.0, 1.0), 0.0)
-            found.append((Array3f(*map(Float, mean)), Float(variance)))
+        found = self._means()
         dr.eval(found)
         n, dropped = len(self._pixels), self.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
@@ -148,18 +141,49 @@ class Estimate:
         """Pixels that have a marked path, (N,)."""
         return np.array(self._sums[1] > 0.0)[: len(self._pixels)]
 
-    def _rays(self, pixel: Any, sampler: PaddedSobolSampler) -> Rays:
-        """Camera rays of paths, distributed by the pixel filter."""
-        at = pixel_centres(self._camera, pixel)
+    def _offset(self, sampler: PaddedSobolSampler) -> Any:
+        """Offsets of camera rays from their pixel's centre, distributed by the pixel filter; Array2f."""
         match self._filter:
             case PixelFilter.BOX:
-                at += box_offsets(sampler.next_2d())
+                return box_offsets(sampler.next_2d())
             case PixelFilter.GAUSSIAN:
-                offsets = gaussian_offsets(
-                    sampler.next_2d(), sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX
-                )
-                at += offsets
-        return camera_rays(self._camera, at)
+                return gaussian_offsets(sampler.next_2d(), sigma=GAUSSIAN_SIGMA_PX, radius=GAUSSIAN_RADIUS_PX)
+        return Array2f(0.0)
+
+    def _accumulate(
+        self,
+        samples: Samples,
+        offset: Any,  # noqa: ARG002  (`ReconstructedEstimate`)
+        target: Any,
+        count: int,
+    ) -> None:
+        """Add paths to the sums of their pixels.
+
+        Parameters
+        ----------
+        samples
+        offset : Array2f
+            Of the paths, from their pixel's centre.
+        target : UInt
+            Indices of the pixels in the list.
+        count
+            Paths a pixel, in neighbouring lanes.
+        """
+        for total, value in zip(self._sums, _summed(samples, count), strict=True):
+            dr.scatter_add(total, Float64(value), target, mode=dr.ReduceMode.NoConflicts)
+        dr.eval(self._sums)
+
+    def _means(self) -> list[tuple[Any, Any]]:
+        """Mean colour (Array3f) and variance of the mean luminance (Float) of every layer."""
+        count = dr.maximum(self._sums[0], 1.0)
+        found = []
+        for first in range(2, len(self._sums), 4):
+            *mean, mean_square = (total / count for total in self._sums[first : first + 4])
+            luminance = sum(weight * channel for weight, channel in zip(REC709_LUMINANCE, mean, strict=True))
+            sample_variance = dr.maximum(mean_square - luminance * luminance, 0.0)
+            variance = dr.select(count > 1.0, sample_variance / dr.maximum(count - 1.0, 1.0), 0.0)
+            found.append((Array3f(*map(Float, mean)), Float(variance)))
+        return found
 
 
 def estimate(
@@ -191,7 +215,7 @@ def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[A
     return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(count) + opaque(first)
 
 
-def _summed(answer: Any, count: int) -> list[Any]:
+def _summed(samples: Samples, count: int) -> list[Any]:
     """Sums over the `count` paths of each pixel.
 
     Returns
@@ -199,7 +223,6 @@ def _summed(answer: Any, count: int) -> list[Any]:
     list of Float
         Number of finite paths, number of marked ones; of each layer red, green, blue, squared luminance.
     """
-    samples = answer if isinstance(answer, Samples) else Samples((answer,))
     values = []
     for layer in samples.layers:
         color = Array3f(layer)

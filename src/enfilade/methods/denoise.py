@@ -45,34 +45,10 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
     About 5 microseconds of CPU time a pixel at its highest quality, 1 at its fastest.
     """
     images = {"color": np.maximum(color, np.float32(0.0)), "albedo": albedo, "normal": normal}
-    return _filtered(images, hdr=True, cleanAux=True, quality=quality)
+    return _filtered(images, quality)
 
 
-def denoise_displayed(color: F32) -> F32:
-    """Denoise an image as it is displayed, on the CPU, without guides.
-
-    Parameters
-    ----------
-    color : (H, W, 3) float32
-        Linear, 0..1, 1 = white.
-
-    Returns
-    -------
-    (H, W, 3) float32
-
-    Raises
-    ------
-    SettingsError
-        ``pyoidn`` is not installed.
-
-    Notes
-    -----
-    About 2 microseconds of CPU time a pixel.
-    """
-    return _filtered({"color": color}, hdr=False, cleanAux=False, quality="balanced")
-
-
-def _filtered(images: Mapping[str, F32], *, quality: str, **flags: bool) -> F32:
+def _filtered(images: Mapping[str, F32], quality: str) -> F32:
     """The output of a network, whose memory is freed afterwards."""
     if why := why_no_denoiser():
         raise SettingsError(why)
@@ -85,8 +61,8 @@ def _filtered(images: Mapping[str, F32], *, quality: str, **flags: bool) -> F32:
     with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT) as network:
         for name, image in {**inputs, "output": output}.items():
             network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-        for name, is_set in flags.items():
-            network.set_bool(name, is_set)
+        network.set_bool("hdr", True)
+        network.set_bool("cleanAux", True)
         network.set_quality(getattr(pyoidn, f"OIDN_QUALITY_{quality.upper()}"))
         network.set_int("maxMemoryMB", MAX_SCRATCH_MB)
         network.commit()

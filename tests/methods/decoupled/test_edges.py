@@ -99,7 +99,7 @@ def test_a_bright_surface_beside_a_pixel_may_have_been_missed(sky, spp, is_uncer
 
 def test_the_tolerance_follows_the_quality():
     tolerances = [displayed_tolerance(quality) for quality in (1.0, 4.0, 16.0, 64.0)]
-    np.testing.assert_allclose(tolerances, [0.006, 0.012, 0.024, 0.048])
+    np.testing.assert_allclose(tolerances, [0.0033, 0.0066, 0.0132, 0.0264])
 
 
 def test_rays_double_where_the_value_is_uncertain_and_beside_it():

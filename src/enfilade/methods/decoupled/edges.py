@@ -16,9 +16,9 @@ from enfilade.renderer import Emitters
 from enfilade.settings import DecoupledSettings, ViewingSettings
 
 EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
-DISPLAYED_DEVIATION = 0.006  # times the square root of the quality: above it a displayed value is uncertain
+DISPLAYED_DEVIATION = 0.0033  # times the square root of the quality: above it a displayed value is uncertain
 SPECULAR_DEVIATION = 2.0  # times that: specular rays, which cost more than camera rays
-SPECULAR_CONTRAST = 1.0 / 3.0  # likewise: half the contrast of edges of specular AOVs that are refined
+SPECULAR_CONTRAST = 2.0 / 3.0  # likewise: half the contrast of edges of specular AOVs that are refined
 OCCLUDED = 1.01  # times the farthest depth around: emitters beyond it are not visible
 
 

@@ -9,10 +9,10 @@ from enfilade.arrays import to_float, to_half
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath
 from enfilade.kernels.estimate import Estimate
+from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, redisplayed, upload_displayed
-from enfilade.methods.decoupled.edge_filter import filter_edges
 from enfilade.methods.decoupled.edges import (
     EdgeRays,
     dilated,
@@ -30,7 +30,7 @@ from enfilade.methods.decoupled.specular import (
 )
 from enfilade.methods.decoupled.specular_rays import shade_specular
 from enfilade.records import U8, Frame, Geometry, Mask, Provenance
-from enfilade.renderer import PixelFilter, Purpose
+from enfilade.renderer import Purpose
 from enfilade.settings import LimitSettings, ViewingSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
@@ -59,19 +59,14 @@ class Frames:
         where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
         camera_rays = diffuse.shading.to_image(np.ones_like(where))
         is_marked, paths = diffuse.is_marked, diffuse.paths
-        del diffuse  # its sums take 48 bytes a pixel
+        del diffuse  # its sums take 200 bytes a pixel
         color = camera_rays.color
         virtual = self._virtual_geometry(shot, frame) if where.any() else []
         specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
 
-        # Denoise what is left of the noise at edges.
+        # Store the AOVs with the deviation of refined pixels, and count the rays.
         variance = camera_rays.variance + specular.variance
         variance = np.where(refined | specular.is_refined, variance, np.float32(0))
-        if shot.settings.denoiser != "none":
-            total = color + sum(to_float(aov.color) for aov in specular.aovs)
-            color += filter_edges(total, variance, exposure_ev=_exposure_ev(shot))
-
-        # Store the AOVs, and count the rays.
         is_keyframe = frame in shot.keyframes
         provenance = _provenance(geometry, cache, is_marked, is_keyframe=is_keyframe)
         reflection, *others = specular.aovs
@@ -152,14 +147,13 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
     """Emission and diffuse reflection, with more camera rays at edges and fine textures; where, (H, W)."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
-    estimate = Estimate(
+    estimate = ReconstructedEstimate(
         camera,
         np.arange(camera.width * camera.height, dtype=np.uint32),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
             cache, rays, sampler, pixel_angle=light_camera(camera).pixel_angle
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
-        pixel_filter=PixelFilter.GAUSSIAN,
         random=walk.random(frame, Purpose.DIFFUSE),
     )
     estimate.add(settings.min_spp)

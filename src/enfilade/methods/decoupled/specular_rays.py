@@ -14,6 +14,7 @@ import numpy as np
 
 from enfilade.arrays import to_float
 from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.edges import (
     SPECULAR_CONTRAST,
     SPECULAR_DEVIATION,
@@ -24,6 +25,7 @@ from enfilade.methods.decoupled.edges import (
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
@@ -100,7 +102,7 @@ def shade_specular(
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
     uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
     within = edges | is_seen_in
-    fine = frame_rays.looked_up(within, uploaded)
+    fine = frame_rays.looked_up(within, uploaded, aovs)
     refined = rays.refine(fine, within, edges, within, 0)
     layers = [of.to_image(within) for of in fine.shadings]
     if any(layer.color.any() for layer in layers[len(aovs) :]):  # transmission that is seen at edges alone
@@ -160,31 +162,36 @@ class _FrameRays:
                 self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
-        found = self._estimate(pixels, pixel_filter, purpose, radiance)
+        found = Estimate(**self._arguments(pixels, purpose, radiance), pixel_filter=pixel_filter)
         found.add(specular_spp(self.shot.settings))
         return found
 
-    def looked_up(self, pixels: Mask, aovs: Any) -> Estimate:
+    def looked_up(
+        self, pixels: Mask, uploaded: UploadedImage, aovs: Sequence[SpecularAov]
+    ) -> ReconstructedEstimate:
         """An estimate of pixels, (H, W), by lookups of uploaded AOVs, without rays yet."""
 
         def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance_at_edges(
-                aovs, self.cache, rays, sampler, pixel_angle=self._pixel_angle
+                uploaded, self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
-        return self._estimate(pixels, PixelFilter.GAUSSIAN, Purpose.SPECULAR_EDGES, radiance)
+        colors = [to_float(aov.color) for aov in aovs]
+        black = [np.zeros_like(colors[0])] * (SPECULAR_AOVS - len(colors))
+        arguments = self._arguments(pixels, Purpose.SPECULAR_EDGES, radiance)
+        return ReconstructedEstimate(**arguments, background=[*colors, *black])
 
     @property
     def _pixel_angle(self) -> float:
         return light_camera(self.geometry.camera).pixel_angle
 
-    def _estimate(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose, radiance: Any) -> Estimate:
-        return Estimate(
-            self.geometry.camera,
-            np.flatnonzero(pixels).astype(np.uint32),
-            radiance,
-            chunk=self.shot.walk.settings[LimitSettings].paths_in_flight,
-            pixel_filter=pixel_filter,
-            random=self.shot.walk.random(self.frame, purpose),
-            layers=SPECULAR_AOVS,
-        )
+    def _arguments(self, pixels: Mask, purpose: Purpose, radiance: Any) -> dict[str, Any]:
+        """Of estimates of pixels, (H, W)."""
+        return {
+            "camera": self.geometry.camera,
+            "pixels": np.flatnonzero(pixels).astype(np.uint32),
+            "radiance": radiance,
+            "chunk": self.shot.walk.settings[LimitSettings].paths_in_flight,
+            "random": self.shot.walk.random(self.frame, purpose),
+            "layers": SPECULAR_AOVS,
+        }
