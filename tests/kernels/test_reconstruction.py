@@ -13,6 +13,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from twins.reconstruction import reconstructed
 
 WIDTH, HEIGHT = 24, 16
 CAMERA = Camera(look_at((0, 0, 5), (0, 0, 0)), 40.0, WIDTH, HEIGHT)
@@ -70,6 +71,28 @@ def coverage(edge):
     return np.array([0.5 * (1.0 - math.erf(x / scale) / math.erf(1.5 / scale)) for x in cut])
 
 
+@pytest.mark.parametrize("has_background", [False, True])
+def test_it_is_that_of_the_twin_for_lists_with_unequal_numbers_of_paths(has_background):
+    rng = np.random.default_rng(3)
+    listed, more = rng.random((2, HEIGHT, WIDTH)) < 0.6
+    background = rng.random((HEIGHT, WIDTH)).astype(np.float32) if has_background else None
+    samples = {}
+
+    def radiance(rays, sampler):
+        x, y = at_image(rays)
+        value = 0.5 + 0.5 * dr.sin(3.0 * x) * dr.cos(2.0 * y)
+        for u, v, s in zip(*map(np.array, (x, y, value)), strict=True):
+            samples.setdefault((math.floor(v), math.floor(u)), []).append((u, v, s))
+        return Array3f(value)
+
+    layers = None if background is None else [np.repeat(background[..., None], 3, axis=2)]
+    estimate = opened(radiance, listed, background=layers)
+    estimate.add(4, rng.random(listed.sum()) < 0.8)  # the others have no paths
+    estimate.add(12, more[listed])
+    expected = np.array(reconstructed((HEIGHT, WIDTH), samples, background))
+    np.testing.assert_allclose(estimate.shading.color[:, 1], expected[listed], atol=2e-5)
+
+
 def test_it_converges_to_the_gaussian_filter():
     edge = 11.3
     estimate = opened(half_plane(edge))
@@ -81,8 +104,7 @@ def test_it_converges_to_the_gaussian_filter():
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
 def test_edges_have_less_than_half_the_noise_of_filter_importance_sampling(angle):
-    true = opened(half_plane(11.3, angle))
-    true.add(1024)
+    true = filtered(half_plane(11.3, angle), spp=4096)
     errors = []
     for seed in range(2, 10):
         shared = opened(half_plane(11.3, angle), seed=seed)

@@ -153,7 +153,7 @@ class Estimate:
     def _accumulate(
         self,
         samples: Samples,
-        offset: Any,  # noqa: ARG002  (`ReconstructedEstimate`)
+        offset: Any,  # noqa: ARG002  (used by `ReconstructedEstimate`)
         target: Any,
         count: int,
     ) -> None:
@@ -215,6 +215,12 @@ def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[A
     return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(count) + opaque(first)
 
 
+def is_finite(samples: Samples) -> Any:
+    """Paths that count: those of finite radiance, the square of whose luminance does not overflow; Bool."""
+    luminances = [dr.dot(Array3f(layer), Array3f(*REC709_LUMINANCE)) for layer in samples.layers]
+    return dr.isfinite(sum((dr.square(value) for value in luminances), Float(0)))
+
+
 def _summed(samples: Samples, count: int) -> list[Any]:
     """Sums over the `count` paths of each pixel.
 
@@ -223,14 +229,12 @@ def _summed(samples: Samples, count: int) -> list[Any]:
     list of Float
         Number of finite paths, number of marked ones; of each layer red, green, blue, squared luminance.
     """
-    values = []
+    values, is_valid = [Float(1)], is_finite(samples)
     for layer in samples.layers:
         color = Array3f(layer)
         luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
         values += [*color, luminance * luminance]
-    # Leave out paths that are not finite, also those whose square overflows.
-    is_valid = dr.isfinite(sum(values[3::4], Float(0)))
-    values = [dr.select(is_valid, v, 0) for v in (Float(1), *values)]
+    values = [dr.select(is_valid, v, 0) for v in values]
     if samples.is_marked is not None:
         values.append(dr.select(samples.is_marked, Float(1), 0))
     # Evaluate all together: each block_sum evaluates its input, and would trace the paths again.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
@@ -45,11 +44,6 @@ def denoise(color: F32, albedo: F32, normal: F32, *, quality: str = "high") -> F
     About 5 microseconds of CPU time a pixel at its highest quality, 1 at its fastest.
     """
     images = {"color": np.maximum(color, np.float32(0.0)), "albedo": albedo, "normal": normal}
-    return _filtered(images, quality)
-
-
-def _filtered(images: Mapping[str, F32], quality: str) -> F32:
-    """The output of a network, whose memory is freed afterwards."""
     if why := why_no_denoiser():
         raise SettingsError(why)
     import pyoidn

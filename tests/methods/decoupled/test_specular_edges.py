@@ -82,6 +82,6 @@ def test_faint_edges_of_glossy_surfaces_are_antialiased(tmp_path, monkeypatch):
     renderer = blocks(tmp_path, PLASTIC, wall=0.2, sky=0.25)
     error = edge_error(renderer)
     assert error < 0.0035
-    # Twice the tolerance of camera rays leaves them aliased.
+    # A threshold of twice the tolerance, that is contrasts of four times it, leaves them aliased.
     monkeypatch.setattr(specular_rays, "SPECULAR_CONTRAST", 2.0)
     assert error < 0.7 * edge_error(renderer)

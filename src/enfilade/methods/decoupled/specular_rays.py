@@ -90,7 +90,7 @@ def shade_specular(
     aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
-    # Aliasing is more visible than noise: their tolerance is far below that of noise.
+    # Aliasing is more visible than noise: their tolerance is a third of that of noise.
     rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     matters = EdgeRays.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
