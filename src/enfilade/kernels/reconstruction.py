@@ -12,17 +12,20 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, lanes, opaque
+from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import (
     GAUSSIAN_RADIUS_PX,
     GAUSSIAN_SIGMA_PX,
     Estimate,
+    Radiance,
     Samples,
     is_finite,
 )
 from enfilade.records import F32
-from enfilade.renderer import PixelFilter
+from enfilade.renderer import PixelFilter, RandomKey
 
 NEIGHBOURS = (-1, 0, 1)  # pixels, along each axis: the filter's radius is one and a half
 
@@ -40,18 +43,32 @@ class ReconstructedEstimate(Estimate):
 
     Parameters
     ----------
-    *args, **options
-        As of :class:`Estimate`, which is given no filter.
-    layers
-        Number of layers of the samples.
+    camera, pixels, radiance, chunk, random, layers
+        As of :class:`Estimate`.
     background : sequence of (H, W, 3) float32
         One a layer: values of pixels that have no paths. None: such pixels do not contribute.
     """
 
     def __init__(
-        self, *args: Any, layers: int = 1, background: Sequence[F32] | None = None, **options: Any
+        self,
+        camera: Camera,
+        pixels: npt.NDArray[np.uint32],
+        radiance: Radiance,
+        *,
+        chunk: int,
+        random: RandomKey,
+        layers: int = 1,
+        background: Sequence[F32] | None = None,
     ) -> None:
-        super().__init__(*args, pixel_filter=PixelFilter.BOX, layers=layers, **options)
+        super().__init__(
+            camera,
+            pixels,
+            radiance,
+            chunk=chunk,
+            pixel_filter=PixelFilter.BOX,
+            random=random,
+            layers=layers,
+        )
         size = max(len(self._pixels), 1)
         # Of each neighbour in the order of `_neighbours`: the weights, and the weighted colours by layer.
         self._weighted = [

@@ -162,7 +162,15 @@ class _FrameRays:
                 self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
-        found = Estimate(**self._arguments(pixels, purpose, radiance), pixel_filter=pixel_filter)
+        found = Estimate(
+            self.geometry.camera,
+            np.flatnonzero(pixels).astype(np.uint32),
+            radiance,
+            chunk=self._chunk,
+            pixel_filter=pixel_filter,
+            random=self.shot.walk.random(self.frame, purpose),
+            layers=SPECULAR_AOVS,
+        )
         found.add(specular_spp(self.shot.settings))
         return found
 
@@ -178,20 +186,20 @@ class _FrameRays:
 
         colors = [to_float(aov.color) for aov in aovs]
         black = [np.zeros_like(colors[0])] * (SPECULAR_AOVS - len(colors))
-        arguments = self._arguments(pixels, Purpose.SPECULAR_EDGES, radiance)
-        return ReconstructedEstimate(**arguments, background=[*colors, *black])
+        return ReconstructedEstimate(
+            self.geometry.camera,
+            np.flatnonzero(pixels).astype(np.uint32),
+            radiance,
+            chunk=self._chunk,
+            random=self.shot.walk.random(self.frame, Purpose.SPECULAR_EDGES),
+            layers=SPECULAR_AOVS,
+            background=[*colors, *black],
+        )
 
     @property
     def _pixel_angle(self) -> float:
         return light_camera(self.geometry.camera).pixel_angle
 
-    def _arguments(self, pixels: Mask, purpose: Purpose, radiance: Any) -> dict[str, Any]:
-        """Of estimates of pixels, (H, W)."""
-        return {
-            "camera": self.geometry.camera,
-            "pixels": np.flatnonzero(pixels).astype(np.uint32),
-            "radiance": radiance,
-            "chunk": self.shot.walk.settings[LimitSettings].paths_in_flight,
-            "random": self.shot.walk.random(self.frame, purpose),
-            "layers": SPECULAR_AOVS,
-        }
+    @property
+    def _chunk(self) -> int:
+        return self.shot.walk.settings[LimitSettings].paths_in_flight
