@@ -9,7 +9,7 @@ from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.tone import srgb_encode
 from enfilade.methods.decoupled import Decoupled, specular_rays
-from enfilade.methods.decoupled.edges import EdgeRays
+from enfilade.methods.decoupled.adaptive_sampling import AdaptiveSampling
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.in_memory import run_passes, walk_of
@@ -73,7 +73,7 @@ def test_edges_of_glossy_surfaces_are_those_of_path_tracing(tmp_path, monkeypatc
     error = edge_error(renderer)
     assert error < 0.06
     # The centres of pixels alone give aliased edges.
-    monkeypatch.setattr(EdgeRays, "matters", lambda *_: np.zeros(SIZE[::-1], bool))
+    monkeypatch.setattr(AdaptiveSampling, "matters", lambda *_: np.zeros(SIZE[::-1], bool))
     assert error < 0.5 * edge_error(renderer)
 
 

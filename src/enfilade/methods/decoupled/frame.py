@@ -12,13 +12,9 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
+from enfilade.methods.decoupled.adaptive_sampling import AdaptiveSampling
 from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, redisplayed, upload_displayed
-from enfilade.methods.decoupled.edges import (
-    EdgeRays,
-    dilated,
-    is_outline,
-    small_emitter_pixels,
-)
+from enfilade.methods.decoupled.edges import dilated, is_outline, small_emitter_pixels
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.lookup import UploadedImage
@@ -159,11 +155,11 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
     estimate.add(settings.min_spp)
 
     # Add rays at edges.
-    geometry, rays = walk.view(frame).geometry, EdgeRays.of(walk)
+    geometry, sampling = walk.view(frame).geometry, AdaptiveSampling.of(walk)
     everywhere = np.ones(geometry.shape_index.shape, np.bool_)
     emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
-    edges = is_outline(geometry) | dilated(rays.uncertain(estimate, everywhere) | emitters)
-    return estimate, rays.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
+    edges = is_outline(geometry) | dilated(sampling.uncertain(estimate, everywhere) | emitters)
+    return estimate, sampling.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
 
 
 def _provenance(

@@ -15,13 +15,12 @@ import numpy as np
 from enfilade.arrays import to_float
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.kernels.reconstruction import ReconstructedEstimate
-from enfilade.methods.decoupled.edges import (
+from enfilade.methods.decoupled.adaptive_sampling import (
     SPECULAR_CONTRAST,
     SPECULAR_DEVIATION,
-    EdgeRays,
-    dilated,
-    is_outline,
+    AdaptiveSampling,
 )
+from enfilade.methods.decoupled.edges import dilated, is_outline
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
@@ -91,8 +90,8 @@ def shade_specular(
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
     # Aliasing is more visible than noise: their tolerance is a third of that of noise.
-    rays = EdgeRays.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
-    matters = EdgeRays.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
+    sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
+    matters = AdaptiveSampling.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
@@ -103,7 +102,7 @@ def shade_specular(
     uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
     within = edges | is_seen_in
     fine = frame_rays.looked_up(within, uploaded, aovs)
-    refined = rays.refine(fine, within, edges, within, 0)
+    refined = sampling.refine(fine, within, edges, within, 0)
     layers = [of.to_image(within) for of in fine.shadings]
     if any(layer.color.any() for layer in layers[len(aovs) :]):  # transmission that is seen at edges alone
         aovs = [*aovs, *[black] * (SPECULAR_AOVS - len(aovs))]
