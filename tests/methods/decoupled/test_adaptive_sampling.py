@@ -8,7 +8,7 @@ from enfilade.methods.decoupled.adaptive_sampling import (
     displayed_deviation,
     displayed_tolerance,
 )
-from enfilade.methods.decoupled.edges import dilated
+from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.records import Shading
 
 H, W = 20, 30
@@ -104,3 +104,71 @@ def test_what_is_displayed_beneath_an_estimate_lowers_its_visible_deviation():
     # sRGB of 0.01 and 0.03; of 0.51 and 0.53
     np.testing.assert_allclose(alone, (0.1901 - 0.0998) / 2.0, atol=1e-3)
     np.testing.assert_allclose(above, (0.7536 - 0.7411) / 2.0, atol=1e-3)
+
+
+class Spikes:
+    """An estimate of pixels whose rays find a bright path with a small probability."""
+
+    CHANCE, BRIGHT = 0.01, 0.5
+
+    def __init__(self, shape, spp):
+        self._random = np.random.default_rng(5)
+        self.counts, self._found = np.zeros(shape), np.zeros(shape)
+        self.add(spp, np.ones(shape, bool).ravel())
+
+    def add(self, spp, where):
+        where = where.reshape(self.counts.shape)
+        self._found += where * self._random.binomial(spp, self.CHANCE, where.shape)
+        self.counts += where * spp
+
+    @property
+    def mean(self):
+        return self.BRIGHT * self._found / self.counts
+
+    @property
+    def shadings(self):
+        share = self._found / self.counts
+        variance = self.BRIGHT**2 * share * (1.0 - share) / (self.counts - 1.0)
+        color = np.repeat(self.mean.reshape(-1, 1), 3, axis=1)
+        return [Shading(color.astype(np.float32), variance.ravel().astype(np.float32))]
+
+
+@pytest.mark.parametrize(("beneath", "lost", "lost_otherwise"), [(0.5, 0.03, 0.25), (0.0, 0.3, 0.45)])
+def test_noise_is_reduced_with_little_loss_of_rare_light(beneath, lost, lost_otherwise):
+    everywhere = np.ones((200, 300), bool)
+    sampling = AdaptiveSampling(most=64, tolerance=0.05, exposure_ev=0.0, beneath=beneath)
+    estimate = Spikes(everywhere.shape, 4)
+    deviation = estimate.mean.std()
+    sampling.reduce_noise(estimate, everywhere, everywhere, 4)
+    assert estimate.mean.std() < 0.95 * deviation
+    expected = Spikes.CHANCE * Spikes.BRIGHT
+    assert abs(estimate.mean.mean() / expected - 1.0) < lost
+    # Were uncertain pixels themselves refined, more of this light would be lost.
+    biased = Spikes(everywhere.shape, 4)
+    sampling.refine(biased, everywhere, dilated(sampling.uncertain(biased, everywhere)), everywhere, 4)
+    assert biased.mean.mean() / expected - 1.0 < -lost_otherwise
+
+
+def test_noise_is_reduced_beside_uncertain_pixels_where_it_may():
+    sampled = np.ones((H, W), bool)
+    sampled[:, 9] = False
+    within = sampled.copy()
+    within[6] = False
+    counts = np.where(sampled, 4, 0)
+    noisy = np.zeros((H, W), bool)
+    noisy[7, 8] = True
+
+    class Counted:
+        def add(self, spp, where):
+            counts[sampled] += spp * where
+
+        @property
+        def shadings(self):
+            variance = np.where(noisy, 0.01, 0.0).astype(np.float32)[sampled]
+            return [Shading(np.full((sampled.sum(), 3), 0.5, np.float32), variance)]
+
+    sampling = AdaptiveSampling(most=100, tolerance=0.02, exposure_ev=0.0)
+    sampling.reduce_noise(Counted(), sampled, within, 4)
+    expected = beside(noisy) & within
+    assert expected.sum() == 3
+    np.testing.assert_array_equal(counts, np.where(expected, 8, np.where(sampled, 4, 0)))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.edges import is_outline, small_emitter_pixels
+from enfilade.methods.decoupled.edges import beside, dilated, is_outline, small_emitter_pixels
 from enfilade.records import Geometry
 from enfilade.renderer import Emitters
 
@@ -53,3 +53,11 @@ def test_outlines_are_pixels_beside_another_shape():
     index[5, 7] = 2
     rows, columns = np.nonzero(is_outline(geometry_of(index)))
     assert set(zip(rows, columns, strict=True)) == {(5, 7), (4, 7), (6, 7), (5, 6), (5, 8)}
+
+
+def test_pixels_are_beside_others_but_not_beside_themselves():
+    mask = np.zeros((H, W), bool)
+    mask[[4, 9, 9], [5, 0, 1]] = True
+    expected = dilated(mask)
+    expected[4, 5] = False
+    np.testing.assert_array_equal(beside(mask), expected)

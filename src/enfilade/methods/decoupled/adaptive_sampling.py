@@ -10,7 +10,7 @@ import scipy.ndimage
 
 from enfilade.kernels.estimate import Estimate
 from enfilade.kernels.tone import luminance, srgb_encode
-from enfilade.methods.decoupled.edges import dilated
+from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U32, Mask, Shading
 from enfilade.settings import DecoupledSettings, ViewingSettings
@@ -92,6 +92,29 @@ class AdaptiveSampling:
             refined |= edges
             edges = within & dilated(edges & self.uncertain(estimate, sampled, counts))
         return refined
+
+    def reduce_noise(self, estimate: Estimate, sampled: Mask, within: Mask, spp: int) -> None:
+        """Double the rays beside uncertain pixels, again and again.
+
+        Whether a pixel has more rays follows from its neighbours, not from its own rays. Otherwise those that
+        found a rare bright path would be averaged with many others, those that missed it would stay as they
+        are, and light would be lost. Some is lost even so, since the neighbours' rays depend on the pixel.
+
+        Parameters
+        ----------
+        estimate, sampled, spp
+            As of :meth:`refine`.
+        within : (H, W) bool
+            Pixels of `sampled` that may have more rays.
+        """
+        noisy = sampled
+        while spp < self.most:
+            noisy = within & beside(noisy & self.uncertain(estimate, sampled))
+            if not noisy.any():
+                return
+            more = min(spp, self.most - spp)
+            estimate.add(more, noisy[sampled])
+            spp += more
 
 
 def displayed_tolerance(quality: float) -> float:

@@ -31,6 +31,14 @@ def dilated(mask: Mask) -> Mask:
     return grown
 
 
+def beside(mask: Mask) -> Mask:
+    """Pixels with at least one of their eight neighbours in a mask; they themselves do not count."""
+    ring = np.ones((3, 3), np.bool_)
+    ring[1, 1] = False
+    found: Mask = scipy.ndimage.binary_dilation(mask, ring)
+    return found
+
+
 def small_emitter_pixels(emitters: Emitters, geometry: Geometry) -> Mask:
     """Pixels of emitters that are small in the image, and of the outlines of larger ones, (H, W).
 

@@ -65,19 +65,24 @@ def shade_specular(
         return SpecularShading([black], nowhere, no_variance, 0, 0)
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
+    in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
 
     # Trace over the whole pixel; beside another surface through its centre, unless it shows a virtual image.
+    # What is traced once more at edges may stay noisy.
     is_edge, is_thin = surface_edges(frame_rays.geometry)
+    is_traced_later = in_mirrors | is_thin
     is_centre = where & (is_edge | is_thin) & ~is_seen_in
     traced = [
         Shading(np.zeros((*where.shape, 3), np.float32), no_variance.copy()) for _ in range(SPECULAR_AOVS)
     ]
+    sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     paths = dropped = 0
     for pixels, pixel_filter, purpose in (
         (where & ~is_centre, PixelFilter.GAUSSIAN, Purpose.SPECULAR),
         (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
     ):
         estimate = frame_rays.traced(pixels, pixel_filter, purpose)
+        sampling.reduce_noise(estimate, pixels, pixels & ~is_traced_later, specular_spp(shot.settings))
         for aov, found in zip(traced, estimate.shadings, strict=True):
             aov.color[pixels], aov.variance[pixels] = found.color, found.variance
         paths, dropped = paths + estimate.paths, dropped + estimate.dropped
@@ -90,16 +95,14 @@ def shade_specular(
 
     # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
     # Aliasing is more visible than noise: their tolerance is a third of that of noise.
-    sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
     matters = AdaptiveSampling.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
-    in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
     if not edges.any():
         return SpecularShading(aovs, nowhere, no_variance, paths, dropped)
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
-    uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~(in_mirrors | is_thin))
+    uploaded = upload_aovs(frame_rays.geometry, aovs, SPECULAR_AOVS, where & ~is_traced_later)
     within = edges | is_seen_in
     fine = frame_rays.looked_up(within, uploaded, aovs)
     refined = sampling.refine(fine, within, edges, within, 0)
