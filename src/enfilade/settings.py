@@ -313,9 +313,14 @@ class DecoupledSettings(Section):
     )
     lookup_keyframes: int = option(4, "Nearest keyframes that are looked up.", least=1, most=16)
     min_spp: int = option(4, "Camera rays of every pixel.", least=2, most=4096)
-    edge_spp: int = option(128, "Most camera rays of a pixel at an edge.", least=2, most=4096)
+    edge_spp: int = option(
+        128, "Most rays of a pixel at an edge or on a narrow glossy surface.", least=2, most=4096
+    )
     specular_spp: int = option(
-        0, "Rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.", least=0, most=4096
+        0,
+        "First rays of a pixel with specular lobes, 2 or more; 0: derived from the quality.",
+        least=0,
+        most=4096,
     )
     denoiser: str = option(
         "balanced",

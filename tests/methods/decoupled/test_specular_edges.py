@@ -10,6 +10,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.tone import srgb_encode
 from enfilade.methods.decoupled import Decoupled, specular_rays
 from enfilade.methods.decoupled.adaptive_sampling import AdaptiveSampling
+from enfilade.methods.decoupled.edges import dilated
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from support.in_memory import run_passes, walk_of
@@ -85,3 +86,20 @@ def test_faint_edges_of_glossy_surfaces_are_antialiased(tmp_path, monkeypatch):
     # A threshold of twice the tolerance, that is contrasts of four times it, leaves them aliased.
     monkeypatch.setattr(specular_rays, "SPECULAR_CONTRAST", 2.0)
     assert error < 0.7 * edge_error(renderer)
+
+
+def test_narrow_surfaces_may_have_more_rays(tmp_path, monkeypatch):
+    renderer = blocks(tmp_path, METAL, wall=0.01, sky=0.7)
+    walk = walk_of(PATH, renderer)
+    chosen = []
+    monkeypatch.setattr(AdaptiveSampling, "reduce_noise", lambda *given: chosen.append(given[3]))
+    run_passes(Decoupled(), walk)
+    found = np.any(chosen[2 * MIDDLE : 2 * MIDDLE + 2], axis=0)
+    # Narrow parts of the blocks; of the wall, which has no specular lobe, pixels whose rays meet a block.
+    geometry = walk.view(MIDDLE).geometry
+    is_edge, is_thin = specular_rays.surface_edges(geometry)
+    is_block = np.isin(geometry.shape_index, [1, 2, 3])
+    expected = specular_rays.narrow_surfaces(is_edge, is_block) & ~is_thin
+    assert expected.sum() > 50
+    assert found[expected].all()
+    assert not found[~dilated(dilated(is_block))].any()

@@ -61,3 +61,20 @@ def test_a_post_narrower_than_three_pixels_is_thin(tmp_path):
         shares.append(kernel.surface_edges(geometry)[1][where].mean())
     assert shares[0] == 1.0
     assert shares[1] < 0.1
+
+
+def test_bars_are_narrow_and_squares_are_not():
+    surface = np.zeros((50, 60), int)
+    surface[5:25, 5:25] = 1  # a square
+    surface[5:45, 32:38] = 2  # a bar of six pixels
+    surface[5:45, 45:53] = 3  # a bar of eight pixels
+    is_edge = np.zeros(surface.shape, bool)
+    for axis in (0, 1):
+        step = np.diff(surface, axis=axis) != 0
+        is_edge |= np.pad(step, [(1, 0), (0, 0)][:: 1 - 2 * axis])
+        is_edge |= np.pad(step, [(0, 1), (0, 0)][:: 1 - 2 * axis])
+    found = kernel.narrow_surfaces(is_edge, surface > 0)
+    assert found[surface == 2].all()
+    assert not found[surface == 1].any()
+    assert not found[surface == 3].any()
+    assert not found[surface == 0].any()

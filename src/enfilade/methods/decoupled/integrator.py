@@ -150,7 +150,9 @@ class Integrator:
             surfaces), and transmission straight through clear surfaces.
         """
         path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
-        return Samples(self._reflected(cache, path, on_miss))
+        # Pad the paths: a few are often as many as some mesh has vertices, which would be another signature.
+        count = dr.width(path.lane)
+        return Samples(self._reflected(cache, compact(path, path.lane), on_miss, count))
 
     def specular_radiance_at_edges(
         self,

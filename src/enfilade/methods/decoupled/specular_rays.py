@@ -29,7 +29,7 @@ from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import filter_spatially, upload_aovs, with_edges
-from enfilade.methods.decoupled.surface_edges import surface_edges
+from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
 from enfilade.records import F32, Geometry, Mask, Shading
 from enfilade.renderer import PixelFilter, Purpose, Rays
@@ -68,9 +68,10 @@ def shade_specular(
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
 
     # Trace over the whole pixel; beside another surface through its centre, unless it shows a virtual image.
-    # What is traced once more at edges may stay noisy.
     is_edge, is_thin = surface_edges(frame_rays.geometry)
+    # Narrow surfaces have more rays, but for those whose rays are traced at edges again.
     is_traced_later = in_mirrors | is_thin
+    is_narrow = narrow_surfaces(is_edge, where) & ~is_traced_later
     is_centre = where & (is_edge | is_thin) & ~is_seen_in
     traced = [
         Shading(np.zeros((*where.shape, 3), np.float32), no_variance.copy()) for _ in range(SPECULAR_AOVS)
@@ -82,7 +83,7 @@ def shade_specular(
         (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
     ):
         estimate = frame_rays.traced(pixels, pixel_filter, purpose)
-        sampling.reduce_noise(estimate, pixels, pixels & ~is_traced_later, specular_spp(shot.settings))
+        sampling.reduce_noise(estimate, pixels, pixels & is_narrow, specular_spp(shot.settings))
         for aov, found in zip(traced, estimate.shadings, strict=True):
             aov.color[pixels], aov.variance[pixels] = found.color, found.variance
         paths, dropped = paths + estimate.paths, dropped + estimate.dropped
@@ -157,7 +158,7 @@ class _FrameRays:
         return self.shot.walk.view(self.frame).geometry
 
     def traced(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose) -> Estimate:
-        """An estimate of pixels, (H, W), by as many rays as the quality asks for."""
+        """An estimate of pixels, (H, W), by their first rays: as many as the quality asks for."""
 
         def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance(

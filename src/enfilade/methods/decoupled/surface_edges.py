@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import drjit as dr
+import numpy as np
+import scipy.ndimage
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaque, pixel_grid
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, points_of
@@ -12,6 +14,7 @@ CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show 
 REACH = 2  # pixels to each side
 # Of the 24 pixels around that show the same surface: a line of two pixels has 9, a straight edge 14.
 MIN_SUPPORT = 10
+MARGIN = 2  # pixels beside the edges of a surface that do not belong to its interior
 
 
 def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
@@ -64,3 +67,26 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     is_thin = support < MIN_SUPPORT
     dr.eval(is_edge, is_thin)
     return image(is_edge, height, width), image(is_thin, height, width)
+
+
+def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:
+    """Pixels of surfaces, or of parts of them, that are narrower than six to seven pixels.
+
+    A denoiser has few pixels there from which it could tell light from noise.
+
+    Parameters
+    ----------
+    is_edge : (H, W) bool
+        Of :func:`surface_edges`.
+    where : (H, W) bool
+        Pixels of surfaces.
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    square = np.ones((3, 3), np.bool_)
+    near = scipy.ndimage.binary_dilation(is_edge, square, iterations=MARGIN)
+    wide = scipy.ndimage.binary_dilation(where & ~near, square, iterations=MARGIN + 2)
+    narrow: Mask = where & near & ~wide
+    return narrow
