@@ -14,6 +14,22 @@ from enfilade.records import Shading
 H, W = 20, 30
 
 
+class Noisy:
+    """An estimate of a mask of pixels, some of which have noise; it counts its rays, (H, W)."""
+
+    def __init__(self, sampled, counts, noisy):
+        self._sampled, self._counts, self._noisy = sampled, counts, noisy
+
+    def add(self, spp, where):
+        self._counts[self._sampled] += spp * where
+
+    @property
+    def shadings(self):
+        variance = np.where(self._noisy, 1.0 / np.maximum(self._counts, 1), 0.0)
+        variance = variance.astype(np.float32)[self._sampled]
+        return [Shading(np.full((self._sampled.sum(), 3), 0.5, np.float32), variance)] * 2
+
+
 def test_the_unseen_share_follows_the_rays_of_each_pixel():
     # A bright pixel beside two dark ones, of which the right one has fewer rays.
     color = np.zeros((1, 3, 3), np.float32)
@@ -60,18 +76,10 @@ def test_rays_double_where_the_value_is_uncertain_and_beside_it():
     noisy = np.zeros((H, W), bool)
     noisy[7, 8] = True
 
-    class Counted:
-        def add(self, spp, where):
-            traced[sampled] += spp * where
-
-        @property
-        def shadings(self):
-            variance = np.where(noisy, 1.0 / np.maximum(traced, 1), 0.0).astype(np.float32)[sampled]
-            return [Shading(np.full((sampled.sum(), 3), 0.5, np.float32), variance)] * 2
-
+    estimate = Noisy(sampled, traced, noisy)
     edges = noisy | (np.arange(W) == 20)
     refined = AdaptiveSampling(most=100, tolerance=0.02, exposure_ev=0.0).refine(
-        Counted(), sampled, edges, sampled, 4
+        estimate, sampled, edges, sampled, 4
     )
     expected = np.where(dilated(noisy), 100 - 16, 0) + np.where(edges, 12, 0)
     np.testing.assert_array_equal(traced, expected)
@@ -158,17 +166,8 @@ def test_noise_is_reduced_beside_uncertain_pixels_where_it_may():
     noisy = np.zeros((H, W), bool)
     noisy[7, 8] = True
 
-    class Counted:
-        def add(self, spp, where):
-            counts[sampled] += spp * where
-
-        @property
-        def shadings(self):
-            variance = np.where(noisy, 0.01, 0.0).astype(np.float32)[sampled]
-            return [Shading(np.full((sampled.sum(), 3), 0.5, np.float32), variance)]
-
     sampling = AdaptiveSampling(most=100, tolerance=0.02, exposure_ev=0.0)
-    sampling.reduce_noise(Counted(), sampled, within, 4)
+    sampling.reduce_noise(Noisy(sampled, counts, noisy), sampled, within, 4)
     expected = beside(noisy) & within
     assert expected.sum() == 3
     np.testing.assert_array_equal(counts, np.where(expected, 8, np.where(sampled, 4, 0)))

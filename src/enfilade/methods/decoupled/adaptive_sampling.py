@@ -94,7 +94,7 @@ class AdaptiveSampling:
         return refined
 
     def reduce_noise(self, estimate: Estimate, sampled: Mask, within: Mask, spp: int) -> None:
-        """Double the rays beside uncertain pixels, again and again.
+        """Double the rays beside uncertain pixels, then beside those of them that still are uncertain.
 
         Whether a pixel has more rays follows from its neighbours, not from its own rays. Otherwise those that
         found a rare bright path would be averaged with many others, those that missed it would stay as they
