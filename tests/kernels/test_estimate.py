@@ -8,8 +8,11 @@ import drjit as dr
 import numpy as np
 import pytest
 
+from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.tone import luminance
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from support.analytic import AnalyticRenderer
@@ -105,6 +108,54 @@ def test_nan_samples_are_dropped_and_counted():
     assert lost.dropped == 64 * 48 * 2
     assert not lost.color.any()
     assert not lost.variance.any()
+
+
+def test_rays_of_centred_pixels_pass_through_their_centre():
+    camera = slide(1, size=(16, 12)).cameras[0]
+    pixels = np.arange(0, 192, 2, dtype=np.uint32)
+    centred = pixels % 3 == 0
+    found = []
+
+    def radiance(rays, sampler):
+        found.append(np.stack([np.array(axis) for axis in rays.direction / rays.direction.z], axis=1))
+        return Array3f(sampler.next_1d())
+
+    means = []
+    for chosen in (centred, np.zeros_like(centred)):
+        random = RandomKey(7, 3, Purpose.FILL)
+        whole = Estimate(
+            camera,
+            pixels,
+            radiance,
+            chunk=1 << 20,
+            pixel_filter=PixelFilter.GAUSSIAN,
+            random=random,
+            centred=chosen,
+        )
+        whole.add(5)
+        means.append(whole.shading.color)
+    some, none = (of.reshape(len(pixels), 5, 3) for of in found)
+    assert (some[centred] == some[centred][:, :1]).all()
+    np.testing.assert_array_equal(some[~centred], none[~centred])
+    assert (np.ptp(none, axis=1)[:, :2] > 0.0).any(axis=1).all()
+    np.testing.assert_array_equal(*means)  # of the same random numbers
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_the_luminance_is_that_of_all_layers_together(layers):
+    camera, pixels = slide(1, size=(16, 12)).cameras[0], np.arange(0, 192, 3, dtype=np.uint32)
+
+    def radiance(_, sampler):
+        return Samples(tuple(Array3f(sampler.next_1d(), sampler.next_1d(), 0.5) for _ in range(layers)))
+
+    random = RandomKey(7, 3, Purpose.FILL)
+    whole = Estimate(
+        camera, pixels, radiance, chunk=1 << 20, pixel_filter=PixelFilter.BOX, random=random, layers=layers
+    )
+    whole.add(6)
+    mean, variance = (np.array(of) for of in whole.luminance)
+    np.testing.assert_allclose(mean, luminance(sum(of.color for of in whole.shadings)), rtol=1e-6)
+    np.testing.assert_allclose(variance, sum(of.variance for of in whole.shadings), rtol=1e-6)
 
 
 def test_an_empty_list_of_pixels_is_traced():

@@ -59,6 +59,8 @@ class Estimate:
         Key of the random numbers.
     layers
         Number of layers of the samples.
+    centred : (N,) bool
+        Pixels of the list whose rays all pass through their centre. None: no such pixels.
     """
 
     def __init__(
@@ -71,12 +73,14 @@ class Estimate:
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
+        centred: npt.NDArray[np.bool_] | None = None,
     ) -> None:
         self._camera = camera
         self._pixels = pixels
         self._radiance = radiance
         self._chunk = chunk
         self._filter = pixel_filter
+        self._scale = None if centred is None else lanes((~centred).astype(np.float32))  # of offsets
         self._random = random
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
@@ -104,6 +108,8 @@ class Estimate:
                 pixel, path = _numbered(self._pixels[part], first, count)
                 sampler = samplers(pixel, path, self._random)
                 offset = self._offset(sampler)
+                if self._scale is not None:
+                    offset = offset * dr.repeat(dr.gather(Float, self._scale, lanes(part)), count)
                 rays = camera_rays(self._camera, pixel_centres(self._camera, pixel) + offset)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
@@ -135,6 +141,16 @@ class Estimate:
         dr.eval(found)
         n, dropped = len(self._pixels), self.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
+
+    @property
+    def luminance(self) -> tuple[Any, Any]:
+        """Mean luminance of each pixel over all layers together, and the variance of this mean; Float, Float.
+
+        As lanes of the list; one of zeros where the list is empty.
+        """
+        means = self._means()
+        color = sum((color for color, _ in means), Array3f(0))
+        return dr.dot(color, Array3f(*REC709_LUMINANCE)), sum((variance for _, variance in means), Float(0))
 
     @property
     def is_marked(self) -> npt.NDArray[np.bool_]:

@@ -2,16 +2,29 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 
+from enfilade.arrays import lanes
+from enfilade.kernels.tone import srgb_encode
 from enfilade.methods.decoupled.adaptive_sampling import (
     AdaptiveSampling,
     displayed_deviation,
     displayed_tolerance,
 )
 from enfilade.methods.decoupled.edges import beside, dilated
-from enfilade.records import Shading
 
 H, W = 20, 30
+
+
+class Means:
+    """An estimate of a mask of pixels, by their mean luminance and its variance, (H, W)."""
+
+    def __init__(self, sampled, mean, variance):
+        self._of = [np.asarray(of, np.float32)[sampled] for of in (mean, variance)]
+
+    @property
+    def luminance(self):
+        return tuple(lanes(of) for of in self._of)
 
 
 class Noisy:
@@ -24,41 +37,77 @@ class Noisy:
         self._counts[self._sampled] += spp * where
 
     @property
-    def shadings(self):
-        variance = np.where(self._noisy, 1.0 / np.maximum(self._counts, 1), 0.0)
-        variance = variance.astype(np.float32)[self._sampled]
-        return [Shading(np.full((self._sampled.sum(), 3), 0.5, np.float32), variance)] * 2
+    def luminance(self):
+        variance = np.where(self._noisy, 2.0 / np.maximum(self._counts, 1), 0.0)
+        return Means(self._sampled, np.full((H, W), 1.0), variance).luminance
+
+
+def deviations(low, high, exposure_ev=0.0):
+    low, high = (lanes(np.asarray(of, np.float32)) for of in (low, high))
+    return np.array(displayed_deviation(low, high, exposure_ev))
 
 
 def test_the_unseen_share_follows_the_rays_of_each_pixel():
-    # A bright pixel beside two dark ones, of which the right one has fewer rays.
-    color = np.zeros((1, 3, 3), np.float32)
-    color[0, 1] = 0.2
-    counts = np.array([[31, 31, 7]], np.uint32)
-    found = displayed_deviation(Shading(color, np.zeros((1, 3), np.float32)), 0.0, counts)[0]
-    assert found[0] < found[2]
-    alone = displayed_deviation(Shading(color, np.zeros((1, 3), np.float32)), 0.0, 7)[0]
-    assert found[2] == alone[2]
+    # Bright pixels beside two dark ones, of which the right one has fewer rays.
+    mean = np.array([[0.0, 0.2, 0.0]])
+    everywhere, counts = np.ones((1, 3), bool), np.array([[31, 31, 7]], np.uint32)
+    estimate = Means(everywhere, mean, np.zeros((1, 3)))
+    few, many = (deviations([0.0], [0.2 / (n + 1.0)])[0] for n in (7, 31))
+    assert few > many
+    for tolerance, expected in (
+        (0.9 * many, (True, True)),
+        (0.9 * few, (False, True)),
+        (1.1 * few, (False, False)),
+    ):
+        found = AdaptiveSampling(128, tolerance, 0.0).uncertain(estimate, everywhere, counts)
+        assert (found[0, 0], found[0, 2]) == expected
+    assert AdaptiveSampling(128, 0.9 * few, 0.0).uncertain(estimate, everywhere, 7)[0, [0, 2]].all()
+
+
+@pytest.mark.parametrize("exposure_ev", [0.0, -1.5])
+def test_uncertain_pixels_are_those_of_numpy(exposure_ev):
+    rng = np.random.default_rng(4)
+    sampled = rng.uniform(size=(H, W)) < 0.7
+    mean, variance, beneath = (rng.uniform(0.0, high, (H, W)).astype(np.float32) for high in (0.5, 1e-3, 0.4))
+    counts = rng.integers(4, 64, (H, W)).astype(np.uint32)
+    shown = np.where(sampled, mean, np.float32(0))
+    unseen = (scipy.ndimage.maximum_filter(shown, 3) - mean) / (1.0 + counts)
+    deviation = np.maximum(np.sqrt(variance), unseen)
+    low, high = (
+        srgb_encode(np.clip((mean + s * deviation + beneath) * 2.0**exposure_ev, 0.0, 1.0)) for s in (-1, 1)
+    )
+    expected = 0.5 * (high - low)
+    tolerance = float(np.median(expected))
+    rays = AdaptiveSampling(128, tolerance, exposure_ev, beneath)
+    found = rays.uncertain(Means(sampled, mean, variance), sampled, counts)
+    is_decided = abs(expected - tolerance) > 1e-5
+    assert is_decided.mean() > 0.99
+    np.testing.assert_array_equal(found[is_decided], (sampled & (expected > tolerance))[is_decided])
+
+
+def test_without_pixels_none_is_uncertain():
+    nowhere = np.zeros((H, W), bool)
+    assert not AdaptiveSampling(128, 0.0, 0.0).uncertain(None, nowhere).any()
 
 
 def test_what_is_clipped_at_white_is_not_uncertain():
-    grey = np.repeat(np.array([[0.2], [0.2], [50.0], [1.1], [1.1]], np.float32), 3, axis=1)
-    deviation = np.array([0.0, 0.02, 5.0, 0.05, 0.5], np.float32)
-    found = displayed_deviation(Shading(grey, deviation**2), 0.0)
+    grey = np.array([0.2, 0.2, 50.0, 1.1, 1.1])
+    deviation = np.array([0.0, 0.02, 5.0, 0.05, 0.5])
+    found = deviations(grey - deviation, grey + deviation)
     assert found[[0, 2, 3]].tolist() == [0.0, 0.0, 0.0]
     # sRGB of 0.22 and of 0.18; of 0.6 and of white
     np.testing.assert_allclose(found[[1, 4]], [(0.5064 - 0.4614) / 2.0, (1.0 - 0.7977) / 2.0], atol=1e-3)
-    darker = displayed_deviation(Shading(grey, deviation**2), -1.0)
-    assert darker[3] > 0.01
+    assert deviations(grey - deviation, grey + deviation, -1.0)[3] > 0.01
 
 
 @pytest.mark.parametrize(
     ("sky", "spp", "is_uncertain"), [(100.0, 16, True), (100.0, 8000, False), (0.3, 16, False)]
 )
 def test_a_bright_surface_beside_a_pixel_may_have_been_missed(sky, spp, is_uncertain):
-    color = np.full((H, W, 3), 0.2, np.float32)
-    color[:, :10] = sky
-    found = displayed_deviation(Shading(color, np.zeros((H, W), np.float32)), 0.0, spp) > 0.02
+    mean, everywhere = np.full((H, W), 0.2), np.ones((H, W), bool)
+    mean[:, :10] = sky
+    estimate = Means(everywhere, mean, np.zeros((H, W)))
+    found = AdaptiveSampling(128, 0.02, 0.0).uncertain(estimate, everywhere, spp)
     assert found[:, 10].all() == is_uncertain
     assert not found[:, 11:].any()  # no bright surface beside them
     assert not found[:, :10].any()
@@ -107,11 +156,15 @@ def test_edges_matter_where_the_display_shows_them():
 
 
 def test_what_is_displayed_beneath_an_estimate_lowers_its_visible_deviation():
-    shading = Shading(np.full((H, W, 3), 0.02, np.float32), np.full((H, W), 1e-4, np.float32))
-    alone, above = (displayed_deviation(shading, 0.0, beneath=value) for value in (0.0, 0.5))
+    everywhere = np.ones((H, W), bool)
+    estimate = Means(everywhere, np.full((H, W), 0.02), np.full((H, W), 1e-4))
     # sRGB of 0.01 and 0.03; of 0.51 and 0.53
-    np.testing.assert_allclose(alone, (0.1901 - 0.0998) / 2.0, atol=1e-3)
-    np.testing.assert_allclose(above, (0.7536 - 0.7411) / 2.0, atol=1e-3)
+    alone, above = (0.1901 - 0.0998) / 2.0, (0.7536 - 0.7411) / 2.0
+    np.testing.assert_allclose(deviations([0.01, 0.51], [0.03, 0.53]), [alone, above], atol=1e-3)
+    for beneath, deviation in ((0.0, alone), (np.full((H, W), 0.5, np.float32), above)):
+        for tolerance, expected in ((0.8 * deviation, True), (1.2 * deviation, False)):
+            found = AdaptiveSampling(128, tolerance, 0.0, beneath).uncertain(estimate, everywhere)
+            assert (found == expected).all()
 
 
 class Spikes:
@@ -134,11 +187,10 @@ class Spikes:
         return self.BRIGHT * self._found / self.counts
 
     @property
-    def shadings(self):
+    def luminance(self):
         share = self._found / self.counts
         variance = self.BRIGHT**2 * share * (1.0 - share) / (self.counts - 1.0)
-        color = np.repeat(self.mean.reshape(-1, 1), 3, axis=1)
-        return [Shading(color.astype(np.float32), variance.ravel().astype(np.float32))]
+        return Means(np.ones(share.shape, bool), self.mean, variance).luminance
 
 
 @pytest.mark.parametrize(("beneath", "lost", "lost_otherwise"), [(0.5, 0.03, 0.25), (0.0, 0.3, 0.45)])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
+import drjit as dr
 import numpy as np
-import scipy.ndimage
 
+from enfilade.arrays import Float, Int, UInt, image, lanes, opaque
 from enfilade.kernels.estimate import Estimate
-from enfilade.kernels.tone import luminance, srgb_encode
+from enfilade.kernels.tone import luminance, srgb_encode_lanes
 from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import F32, U32, Mask, Shading
+from enfilade.records import F32, U32, Mask
 from enfilade.settings import DecoupledSettings, ViewingSettings
 
 EDGE_SPP = 16  # rays of a pixel at an edge; their number doubles while its value is uncertain
@@ -52,17 +54,47 @@ class AdaptiveSampling:
 
     def matters(self, color: F32) -> Mask:
         """Pixels around which estimates differ by more than twice the tolerance, as displayed, (H, W)."""
-        value = luminance(color)
-        low, high = scipy.ndimage.minimum_filter(value, 3), scipy.ndimage.maximum_filter(value, 3)
-        found: Mask = displayed_deviation_of(low, high, self.beneath, self.exposure_ev) > self.tolerance
-        return found
+        shape = color.shape[0], color.shape[1]
+        pixel = dr.arange(UInt, shape[0] * shape[1])
+        low, high = _extremes(lanes(luminance(color)), pixel, shape)
+        return image(self._exceeds(low, high, pixel), *shape)
 
     def uncertain(self, estimate: Estimate, sampled: Mask, spp: int | U32 | None = None) -> Mask:
-        """Pixels whose displayed value is uncertain, (H, W); see :func:`displayed_deviation`."""
-        layers = [shading.to_image(sampled) for shading in estimate.shadings]
-        color, variance = (sum(getattr(of, name) for of in layers) for name in ("color", "variance"))
-        deviation = displayed_deviation(Shading(color, variance), self.exposure_ev, spp, self.beneath)
-        return deviation > self.tolerance
+        """Pixels whose displayed value is uncertain, (H, W).
+
+        Their mean luminance has a deviation above the tolerance as it is displayed. Values above white count
+        as white: where a quarter of sky makes a pixel white, its share of sky may be uncertain.
+
+        Parameters
+        ----------
+        estimate
+            Of the pixels of `sampled`, row by row.
+        sampled : (H, W) bool
+        spp : int or (H, W) uint32
+            Rays of a pixel, which may all have missed what makes the brightest pixel beside it bright. Its
+            share is taken to be 1 / (spp + 1), in the manner of the rule of succession. None: leave this out.
+        """
+        found = np.zeros_like(sampled)
+        if not sampled.any():
+            return found
+        mean, variance = estimate.luminance
+        dr.eval(mean, variance)
+        deviation, pixel = dr.sqrt(variance), lanes(np.flatnonzero(sampled).astype(np.uint32))
+        if spp is not None:
+            means = dr.zeros(Float, sampled.size)
+            dr.scatter(means, mean, pixel)
+            _, brightest = _extremes(means, pixel, sampled.shape)
+            rays = opaque(spp) if isinstance(spp, int) else dr.gather(UInt, lanes(spp), pixel)
+            deviation = dr.maximum(deviation, (brightest - mean) / (1.0 + Float(rays)))
+        found[sampled] = np.array(self._exceeds(mean - deviation, mean + deviation, pixel))
+        return found
+
+    def _exceeds(self, low: Any, high: Any, pixel: Any) -> Any:
+        """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool."""
+        of = self.beneath
+        beneath = opaque(of) if isinstance(of, float) else dr.gather(Float, lanes(of), pixel)
+        deviation = displayed_deviation(low + beneath, high + beneath, self.exposure_ev)
+        return deviation > opaque(self.tolerance)
 
     def refine(self, estimate: Estimate, sampled: Mask, edges: Mask, within: Mask, spp: int) -> Mask:
         """Trace more rays at edges, and double them at uncertain pixels and beside them.
@@ -122,35 +154,30 @@ def displayed_tolerance(quality: float) -> float:
     return DISPLAYED_DEVIATION * math.sqrt(quality)
 
 
-def displayed_deviation(
-    shading: Shading, exposure_ev: float, spp: int | U32 | None = None, beneath: F32 | float = 0.0
-) -> F32:
-    """Standard deviation of the mean luminance as it is displayed, sRGB-encoded, 0..1; (H, W).
+def displayed_deviation(low: Any, high: Any, exposure_ev: float) -> Any:
+    """Half the difference between two luminances (Float) as they are displayed, sRGB-encoded, 0..1."""
+    scale = opaque(2.0**exposure_ev)
+    low, high = (srgb_encode_lanes(dr.clip(value * scale, 0.0, 1.0)) for value in (low, high))
+    return 0.5 * (high - low)
 
-    Values above white count as white: where a quarter of sky makes a pixel white, its share of sky may be
-    uncertain.
+
+def _extremes(values: Any, pixel: Any, shape: tuple[int, ...]) -> tuple[Any, Any]:
+    """Least and largest values of an image (H, W) in 3x3 pixels, cut at its border; Float, Float.
 
     Parameters
     ----------
-    shading
-        Estimates of pixels, (H, W).
-    exposure_ev
-        In stops.
-    spp : int or (H, W) uint32
-        Rays of a pixel, which may all have missed what makes the brightest pixel beside it bright. Its share
-        is taken to be 1 / (spp + 1), in the manner of the rule of succession. None: leave this out.
-    beneath : (H, W) float32 or float
-        Luminance that is displayed together with it.
+    values : Float
+        Of all pixels.
+    pixel : UInt
+        Flat indices of those in whose neighbourhood to look.
+    shape : (H, W)
     """
-    mean, deviation = luminance(shading.color), np.sqrt(shading.variance)
-    if spp is not None:
-        unseen = (scipy.ndimage.maximum_filter(mean, 3) - mean) / (np.float32(1) + np.float32(spp))
-        deviation = np.maximum(deviation, unseen)
-    return displayed_deviation_of(mean - deviation, mean + deviation, beneath, exposure_ev)
-
-
-def displayed_deviation_of(low: F32, high: F32, beneath: F32 | float, exposure_ev: float) -> F32:
-    """Half the difference between two luminances above what is displayed with them, sRGB-encoded, 0..1."""
-    scale = np.float32(2.0**exposure_ev)
-    low, high = (srgb_encode(np.clip((value + beneath) * scale, 0.0, 1.0)) for value in (low, high))
-    return np.float32(0.5) * (high - low)
+    height, width = (opaque(size, Int) for size in shape)
+    row = Int(pixel) // width
+    column = Int(pixel) - row * width
+    low = high = dr.gather(Float, values, pixel)
+    for dy, dx in np.ndindex(3, 3):
+        y, x = dr.clip(row + (dy - 1), 0, height - 1), dr.clip(column + (dx - 1), 0, width - 1)
+        value = dr.gather(Float, values, UInt(y * width + x))
+        low, high = dr.minimum(low, value), dr.maximum(high, value)
+    return low, high

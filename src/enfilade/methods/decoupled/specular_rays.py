@@ -31,7 +31,7 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import filter_spatially, upload_aovs, with_edges
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.records import F32, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose, Rays
 from enfilade.settings import LimitSettings
 
@@ -73,21 +73,12 @@ def shade_specular(
     is_traced_later = in_mirrors | is_thin
     is_narrow = narrow_surfaces(is_edge, where) & ~is_traced_later
     is_centre = where & (is_edge | is_thin) & ~is_seen_in
-    traced = [
-        Shading(np.zeros((*where.shape, 3), np.float32), no_variance.copy()) for _ in range(SPECULAR_AOVS)
-    ]
     sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
-    paths = dropped = 0
-    for pixels, pixel_filter, purpose in (
-        (where & ~is_centre, PixelFilter.GAUSSIAN, Purpose.SPECULAR),
-        (is_centre, PixelFilter.CENTRE, Purpose.SPECULAR_CENTRE),
-    ):
-        estimate = frame_rays.traced(pixels, pixel_filter, purpose)
-        sampling.reduce_noise(estimate, pixels, pixels & is_narrow, specular_spp(shot.settings))
-        for aov, found in zip(traced, estimate.shadings, strict=True):
-            aov.color[pixels], aov.variance[pixels] = found.color, found.variance
-        paths, dropped = paths + estimate.paths, dropped + estimate.dropped
-        del estimate  # its sums take 80 bytes a pixel
+    estimate = frame_rays.traced(where, is_centre)
+    sampling.reduce_noise(estimate, where, is_narrow, specular_spp(shot.settings))
+    traced = [of.to_image(where) for of in estimate.shadings]
+    paths, dropped = estimate.paths, estimate.dropped
+    del estimate  # its sums take 80 bytes a pixel
 
     # Filter the AOVs along the surfaces that are seen in them.
     count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
@@ -157,8 +148,14 @@ class _FrameRays:
         """G-buffer of the frame."""
         return self.shot.walk.view(self.frame).geometry
 
-    def traced(self, pixels: Mask, pixel_filter: PixelFilter, purpose: Purpose) -> Estimate:
-        """An estimate of pixels, (H, W), by their first rays: as many as the quality asks for."""
+    def traced(self, pixels: Mask, centred: Mask) -> Estimate:
+        """An estimate of pixels by their first rays: as many as the quality asks for.
+
+        Parameters
+        ----------
+        pixels, centred : (H, W) bool
+            Pixels, and those whose rays all pass through their centre.
+        """
 
         def radiance(rays: Rays, sampler: Any) -> Samples:
             return self.shot.integrator.specular_radiance(
@@ -170,9 +167,10 @@ class _FrameRays:
             np.flatnonzero(pixels).astype(np.uint32),
             radiance,
             chunk=self._chunk,
-            pixel_filter=pixel_filter,
-            random=self.shot.walk.random(self.frame, purpose),
+            pixel_filter=PixelFilter.GAUSSIAN,
+            random=self.shot.walk.random(self.frame, Purpose.SPECULAR),
             layers=SPECULAR_AOVS,
+            centred=centred[pixels],
         )
         found.add(specular_spp(self.shot.settings))
         return found
