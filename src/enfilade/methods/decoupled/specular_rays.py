@@ -74,8 +74,10 @@ def shade_specular(
     is_narrow = narrow_surfaces(is_edge, where) & ~is_traced_later
     is_centre = where & (is_edge | is_thin) & ~is_seen_in
     sampling = AdaptiveSampling.of(shot.walk, times=SPECULAR_DEVIATION, beneath=beneath)
-    estimate = frame_rays.traced(where, is_centre)
-    sampling.reduce_noise(estimate, where, is_narrow, specular_spp(shot.settings))
+    estimate = frame_rays.estimate(where, is_centre)
+    spp = specular_spp(shot.settings)
+    estimate.add(spp)
+    sampling.reduce_noise(estimate, where, is_narrow, spp)
     traced = [of.to_image(where) for of in estimate.shadings]
     paths, dropped = estimate.paths, estimate.dropped
     del estimate  # its sums take 80 bytes a pixel
@@ -148,8 +150,8 @@ class _FrameRays:
         """G-buffer of the frame."""
         return self.shot.walk.view(self.frame).geometry
 
-    def traced(self, pixels: Mask, centred: Mask) -> Estimate:
-        """An estimate of pixels by their first rays: as many as the quality asks for.
+    def estimate(self, pixels: Mask, centred: Mask) -> Estimate:
+        """An estimate of pixels, without rays yet.
 
         Parameters
         ----------
@@ -162,7 +164,7 @@ class _FrameRays:
                 self.cache, rays, sampler, pixel_angle=self._pixel_angle
             )
 
-        found = Estimate(
+        return Estimate(
             self.geometry.camera,
             np.flatnonzero(pixels).astype(np.uint32),
             radiance,
@@ -172,8 +174,6 @@ class _FrameRays:
             layers=SPECULAR_AOVS,
             centred=centred[pixels],
         )
-        found.add(specular_spp(self.shot.settings))
-        return found
 
     def looked_up(
         self, pixels: Mask, uploaded: UploadedImage, aovs: Sequence[SpecularAov]
