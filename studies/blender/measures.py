@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32
 
 WINDOW_PX = 1.5  # standard deviation (Wang et al. 2004)
@@ -44,10 +45,7 @@ def compare(reference: tuple[F32, F32], image: tuple[F32, F32]) -> Fidelity:
 
 def displayed(linear: F32) -> F32:
     """The sRGB curve, clipped at white."""
-    x = np.clip(linear, 0.0, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1.0 / 2.4) - 0.055).astype(
-        np.float32
-    )
+    return srgb_encode(np.clip(linear, 0.0, 1.0))
 
 
 def _ssim(first: F32, second: F32) -> float:

@@ -4,7 +4,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from studies.blender.command import read_exr
+from enfilade.images import read_exr
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
@@ -102,7 +102,7 @@ def test_what_is_lost_is_noted(exported):
 
 def test_cycles_renders_beyond_the_files_border(blender, source):
     _, out, _ = blender.job(source, "border", task="cycles", spp=1)
-    image = read_exr(out / "cycles-0011.exr")
+    image = read_exr(out / "cycles-0011.exr")["RGB"]
     assert image.shape == (24, 32, 3)
     assert image[0, 0].max() > 0.0
     assert image[-1, -1].max() > 0.0

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from enfilade.camera.load import load_path
+from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
 from enfilade_blender.image_files import srgb_from_linear
 from enfilade_blender.materials.ggx import mean_reflectance
 from enfilade_blender.scene_xml import LAMP
-from studies.blender.command import read_exr, render
+from support.imported import traced
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 FILES = (
@@ -318,7 +319,7 @@ def test_a_wrong_name_lists_the_right_ones(blender, files):
 def test_cycles_and_mitsuba_agree_on_the_light(blender, exported, files):
     code, out, result = blender.job(files["agx"], "cycles", task="cycles", spp=64, unbiased=True)
     assert (code, result["spp"]) == (0, 64)
-    theirs = read_exr(out / "cycles-0001.exr")
-    ours = render(exported("agx")[0], 64, 1)
+    theirs = read_exr(out / "cycles-0001.exr")["RGB"]
+    ours = traced(exported("agx")[0], 64)
     # Light of an area lamp and a world on plastics. The noise of the mean is 0.2 %.
     assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=0.02)

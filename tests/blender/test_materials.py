@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
-from studies.blender.command import read_exr, render
+from support.imported import traced
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 NAME = "uncommon_materials"
@@ -157,9 +158,9 @@ def test_light_passes_cut_outs_and_lamps_as_in_cycles(blender, name):
     code, out, result = blender.job(source, name)
     assert code == 0, result
     _, theirs, _ = blender.job(source, f"{name} of cycles", task="cycles", spp=64, unbiased=True)
-    wanted = read_exr(theirs / "cycles-0001.exr").mean(axis=(0, 1))
+    wanted = read_exr(theirs / "cycles-0001.exr")["RGB"].mean(axis=(0, 1))
     # A floor of 0.5, less the edges of cards; their light alone would be 0.04. The noise is 1 %.
-    assert render(out, 64, 1).mean(axis=(0, 1)) == pytest.approx(wanted, rel=0.03)
+    assert traced(out, 64).mean(axis=(0, 1)) == pytest.approx(wanted, rel=0.03)
 
 
 def test_generated_coordinates_are_those_before_modifiers(blender):
@@ -168,7 +169,7 @@ def test_generated_coordinates_are_those_before_modifiers(blender):
     _, theirs, _ = blender.job(
         blender.make("modified_and_generated")[0], "generated of cycles", task="cycles", spp=64, unbiased=True
     )
-    wanted, found = read_exr(theirs / "cycles-0001.exr"), render(out, 64, 1)
+    wanted, found = read_exr(theirs / "cycles-0001.exr")["RGB"], traced(out, 64)
     difference = found - wanted
     # 0.019 of noise and interpolated edges; with coordinates of the modified objects it is 0.056.
     assert np.sqrt(np.square(difference).mean()) < 0.03
