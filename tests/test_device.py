@@ -24,6 +24,13 @@ def test_the_lower_layers_load_nothing_heavy(module):
     assert done.stdout.split() == []
 
 
+@pytest.mark.parametrize("module", ["enfilade.images", "enfilade.comparison", "enfilade.kernels.tone"])
+def test_what_needs_no_device_loads_no_dr_jit(module):
+    code = f"import sys, {module}; print('drjit' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.split() == ["False"]
+
+
 def pretend(monkeypatch, *, llvm, cuda=False, optix=True, version=(19, 1, 7)):
     def library(name):
         if not optix:

@@ -11,7 +11,6 @@ import click
 import numpy as np
 
 from enfilade.device import activate
-from enfilade.records import F32
 from studies.blender.measures import Fidelity, compare, displayed
 
 if TYPE_CHECKING:
@@ -76,11 +75,7 @@ def _write_pictures(file: Path, frame: CheckedFrame) -> None:
     """Cycles, ours, and the displayed difference, times four about mid grey."""
     from PIL import Image
 
-    a, b = (displayed(_mean(halves)) for halves in (frame.cycles, frame.imported))
+    a, b = (displayed(0.5 * (one + other)) for one, other in (frame.cycles, frame.imported))
     row = np.concatenate([a, b, np.clip(0.5 + 4.0 * (b - a), 0.0, 1.0)], axis=1)
     picture = Image.fromarray(np.rint(row * 255.0).astype(np.uint8))
     picture.resize((row.shape[1] * 3, row.shape[0] * 3), Image.Resampling.NEAREST).save(file)
-
-
-def _mean(halves: tuple[F32, F32]) -> F32:
-    return np.float32(0.5) * (halves[0] + halves[1])

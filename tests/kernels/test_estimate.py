@@ -12,6 +12,7 @@ from enfilade.arrays import Array3f
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.kernels.tone import luminance
 from enfilade.records import SurfaceClass
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
@@ -113,45 +114,47 @@ def test_nan_samples_are_dropped_and_counted():
 def test_rays_of_centred_pixels_pass_through_their_centre():
     camera = slide(1, size=(16, 12)).cameras[0]
     pixels = np.arange(0, 192, 2, dtype=np.uint32)
-    centred = pixels % 3 == 0
-    found = []
+    centred, chosen = pixels % 3 == 0, pixels % 5 != 0
 
-    def radiance(rays, sampler):
-        found.append(np.stack([np.array(axis) for axis in rays.direction / rays.direction.z], axis=1))
-        return Array3f(sampler.next_1d())
+    def directions(pixel_filter, centred):
+        found = []
 
-    means = []
-    for chosen in (centred, np.zeros_like(centred)):
-        random = RandomKey(7, 3, Purpose.FILL)
+        def radiance(rays, _):
+            found.append(np.stack([np.array(axis) for axis in rays.direction], axis=1))
+            return Array3f(0.5)
+
         whole = Estimate(
             camera,
             pixels,
             radiance,
-            chunk=1 << 20,
-            pixel_filter=PixelFilter.GAUSSIAN,
-            random=random,
-            centred=chosen,
+            chunk=64,  # of several in each call
+            pixel_filter=pixel_filter,
+            random=RandomKey(7, 3, Purpose.FILL),
+            centred=centred,
         )
-        whole.add(5)
-        means.append(whole.shading.color)
-    some, none = (of.reshape(len(pixels), 5, 3) for of in found)
-    assert (some[centred] == some[centred][:, :1]).all()
-    np.testing.assert_array_equal(some[~centred], none[~centred])
-    assert (np.ptp(none, axis=1)[:, :2] > 0.0).any(axis=1).all()
-    np.testing.assert_array_equal(*means)  # of the same random numbers
+        whole.add(2)
+        whole.add(3, chosen)
+        return np.concatenate(found)
+
+    some, none = (directions(PixelFilter.GAUSSIAN, of) for of in (centred, np.zeros_like(centred)))
+    through_centres = directions(PixelFilter.CENTRE, None)
+    is_centred = np.concatenate([centred.repeat(2), centred[chosen].repeat(3)])
+    np.testing.assert_allclose(some[is_centred], through_centres[is_centred], atol=1e-6)
+    np.testing.assert_array_equal(some[~is_centred], none[~is_centred])
+    assert abs(none - through_centres).max(axis=1).min() > 1e-5
 
 
 @pytest.mark.parametrize("layers", [1, 2])
-def test_the_luminance_is_that_of_all_layers_together(layers):
+@pytest.mark.parametrize("kind", [Estimate, ReconstructedEstimate])
+def test_the_luminance_is_that_of_all_layers_together(kind, layers):
     camera, pixels = slide(1, size=(16, 12)).cameras[0], np.arange(0, 192, 3, dtype=np.uint32)
 
     def radiance(_, sampler):
         return Samples(tuple(Array3f(sampler.next_1d(), sampler.next_1d(), 0.5) for _ in range(layers)))
 
+    options = {"pixel_filter": PixelFilter.BOX} if kind is Estimate else {}
     random = RandomKey(7, 3, Purpose.FILL)
-    whole = Estimate(
-        camera, pixels, radiance, chunk=1 << 20, pixel_filter=PixelFilter.BOX, random=random, layers=layers
-    )
+    whole = kind(camera, pixels, radiance, chunk=1 << 20, random=random, layers=layers, **options)
     whole.add(6)
     mean, variance = (np.array(of) for of in whole.luminance)
     np.testing.assert_allclose(mean, luminance(sum(of.color for of in whole.shadings)), rtol=1e-6)

@@ -5,15 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enfilade.arrays import lanes
 from enfilade.errors import InputError
-from enfilade.kernels.tone import (
-    display_luminance,
-    luminance,
-    srgb_decode,
-    srgb_encode,
-    srgb_encode_lanes,
-)
+from enfilade.kernels.tone import display_luminance, luminance, srgb_decode, srgb_encode
 
 
 @pytest.mark.parametrize(
@@ -24,11 +17,6 @@ from enfilade.kernels.tone import (
 def test_srgb_values(linear, encoded):
     assert srgb_encode(np.float32([linear])) == pytest.approx(encoded, abs=2e-6)
     assert srgb_decode(np.float32([encoded])) == pytest.approx(linear, abs=2e-6)
-
-
-def test_lanes_are_encoded_as_images_are():
-    linear = np.linspace(-0.1, 4.0, 4097, dtype=np.float32)
-    np.testing.assert_allclose(np.array(srgb_encode_lanes(lanes(linear))), srgb_encode(linear), atol=1e-6)
 
 
 @given(st.floats(-1, 16, width=32))

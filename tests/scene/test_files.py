@@ -125,6 +125,14 @@ def test_a_loop_of_links_is_no_scene(tmp_path):
     refused(tmp_path / "scene.xml", "there is no scene file")
 
 
+def test_a_path_that_is_not_utf_8_is_refused(tmp_path):
+    folder = tmp_path / os.fsdecode(b"sc\xe9ne")
+    folder.mkdir()
+    (folder / "scene.xml").write_text('<scene version="3.0.0"/>')
+    with pytest.raises(SceneError, match=r"sc\\xe9ne.scene\.xml is not UTF-8.*: rename"):
+        check_scene(folder / "scene.xml", LimitSettings())
+
+
 def test_no_file_is_quoted(scene, tmp_path):
     (tmp_path / "secret").write_text("password\n")
     file = scene('<spectrum name="x" filename="../secret"/>')

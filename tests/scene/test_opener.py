@@ -1,7 +1,5 @@
 """A scene, and the renderer that reads it."""
 
-import os
-
 import pytest
 
 from enfilade.errors import SceneError, SettingsError
@@ -62,11 +60,4 @@ def test_other_files_are_refused_with_advice(tmp_path, name, words):
     of = Scene(tmp_path / name)
     for refused in (lambda: of.check(LimitSettings()), lambda: of.open(Settings()), of.identity):
         with pytest.raises(SceneError, match=words):
-            refused()
-
-
-def test_paths_that_are_not_utf_8_are_refused(tmp_path):
-    of = Scene(tmp_path / os.fsdecode(b"sc\xe9ne") / "scene.xml")
-    for refused in (lambda: of.check(LimitSettings()), lambda: of.open(Settings()), of.identity):
-        with pytest.raises(SceneError, match=r"sc\\xe9ne.scene\.xml is not UTF-8.*: rename"):
             refused()

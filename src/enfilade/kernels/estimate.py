@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array2f, Array3f, Float, Float64, UInt, lanes, opaque, rows
+from enfilade.arrays import Array2f, Array3f, Bool, Float, Float64, UInt, lanes, opaque, rows
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, pixel_centres
@@ -80,7 +80,7 @@ class Estimate:
         self._radiance = radiance
         self._chunk = chunk
         self._filter = pixel_filter
-        self._scale = None if centred is None else lanes((~centred).astype(np.float32))  # of offsets
+        self._centred = centred
         self._random = random
         self._next = 0  # index of the next path of each pixel
         self._traced = 0  # paths of all pixels together
@@ -105,11 +105,11 @@ class Estimate:
             for start in range(0, len(chosen), step):
                 # Generate camera rays, `count` neighbouring lanes a pixel.
                 part = chosen[start : start + step]
-                pixel, path = _numbered(self._pixels[part], first, count)
+                slot, pixel, path = _numbered(self._pixels[part], first, count)
                 sampler = samplers(pixel, path, self._random)
                 offset = self._offset(sampler)
-                if self._scale is not None:
-                    offset = offset * dr.repeat(dr.gather(Float, self._scale, lanes(part)), count)
+                if self._centred is not None:
+                    offset = dr.select(dr.gather(Bool, lanes(self._centred[part]), slot), 0.0, offset)
                 rays = camera_rays(self._camera, pixel_centres(self._camera, pixel) + offset)
 
                 # Trace them, and add the sums over each pixel's lanes to the totals.
@@ -144,9 +144,9 @@ class Estimate:
 
     @property
     def luminance(self) -> tuple[Any, Any]:
-        """Mean luminance of each pixel over all layers together, and the variance of this mean; Float, Float.
+        """Mean luminance of each pixel, of all layers together, and the sum of the layers' variances.
 
-        As lanes of the list; one of zeros where the list is empty.
+        Float, Float; a single lane where the list is empty.
         """
         means = self._means()
         color = sum((color for color, _ in means), Array3f(0))
@@ -224,11 +224,11 @@ def estimate(
     return whole.shading
 
 
-def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[Any, Any]:
-    """Pixel and index of each path, UInt: `count` neighbouring lanes a pixel."""
+def _numbered(pixels: npt.NDArray[np.uint32], first: int, count: int) -> tuple[Any, Any, Any]:
+    """Index in the list, pixel, and index of each path, UInt: `count` neighbouring lanes a pixel."""
     lane = dr.arange(UInt, len(pixels) * count)
     slot = lane // opaque(count)
-    return dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(count) + opaque(first)
+    return slot, dr.gather(UInt, lanes(pixels), slot), lane - slot * opaque(count) + opaque(first)
 
 
 def is_finite(samples: Samples) -> Any:

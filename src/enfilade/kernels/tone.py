@@ -7,9 +7,6 @@ videos with a view of an OpenColorIO configuration, which may compress highlight
 
 from __future__ import annotations
 
-from typing import Any
-
-import drjit as dr
 import numpy as np
 
 from enfilade.errors import InputError
@@ -45,14 +42,6 @@ def srgb_encode(linear: F32) -> F32:
     curved = (1.0 + SRGB_OFFSET) * power - SRGB_OFFSET
     encoded: F32 = np.where(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
     return encoded
-
-
-def srgb_encode_lanes(linear: Any) -> Any:
-    """:func:`srgb_encode` of lanes; Float."""
-    curved = (1.0 + SRGB_OFFSET) * dr.power(
-        dr.maximum(linear, SRGB_LINEAR_LIMIT), 1.0 / SRGB_GAMMA
-    ) - SRGB_OFFSET
-    return dr.select(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
 
 
 def srgb_decode(encoded: F32) -> F32:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.metadata
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,7 +59,7 @@ class Scene:
             if not self.file.is_file():
                 raise SceneError(f"there is no scene file {self.file}")
             return
-        self._check_name()
+        self._check_suffix()
         from enfilade.scene.mitsuba.files import check_scene
 
         check_scene(self.file, limits)
@@ -79,7 +78,7 @@ class Scene:
             except OSError as error:
                 raise SceneError(f"can't read the scene {self.file}: {error.strerror}") from error
             return {"renderer": self.renderer, "variant": active().backend, "fingerprint": digest}
-        self._check_name()
+        self._check_suffix()
         from enfilade.scene.mitsuba.files import fingerprint
 
         name = f"Mitsuba {importlib.metadata.version('mitsuba')}"
@@ -122,7 +121,7 @@ class Scene:
         if self.renderer:
             opened: Renderer = _imported(self.renderer)(self.file, **options)
             return opened
-        self._check_name()
+        self._check_suffix()
         from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
         return MitsubaRenderer(self.file, **options)
@@ -136,19 +135,11 @@ class Scene:
         """Read back from :meth:`to_json`."""
         return Scene(Path(table["file"]), str(table["renderer"]))
 
-    def _check_name(self) -> None:
+    def _check_suffix(self) -> None:
         suffix = self.file.suffix.lower()
         if suffix != ".xml":
             advice = f": {ADVICE[suffix]}" if suffix in ADVICE else ""
             raise SceneError(f"{self.file} is not a scene in Mitsuba's XML format (.xml){advice}")
-        path = os.fsencode(self.file.resolve())
-        try:
-            path.decode("utf-8")
-        except UnicodeDecodeError as error:
-            name = path.decode("utf-8", "backslashreplace")
-            raise SceneError(
-                f"the path {name} is not UTF-8, and Mitsuba can't read it: rename its file or folders"
-            ) from error
 
 
 def _imported(renderer: str) -> Any:

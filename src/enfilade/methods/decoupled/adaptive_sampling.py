@@ -11,7 +11,13 @@ import numpy as np
 
 from enfilade.arrays import Float, Int, UInt, image, lanes, opaque
 from enfilade.kernels.estimate import Estimate
-from enfilade.kernels.tone import luminance, srgb_encode_lanes
+from enfilade.kernels.tone import (
+    SRGB_GAMMA,
+    SRGB_LINEAR_LIMIT,
+    SRGB_OFFSET,
+    SRGB_SLOPE,
+    luminance,
+)
 from enfilade.methods.decoupled.edges import beside, dilated
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U32, Mask
@@ -59,7 +65,7 @@ class AdaptiveSampling:
         low, high = _extremes(lanes(luminance(color)), pixel, shape)
         return image(self._exceeds(low, high, pixel), *shape)
 
-    def uncertain(self, estimate: Estimate, sampled: Mask, spp: int | U32 | None = None) -> Mask:
+    def uncertain(self, estimate: Estimate, sampled: Mask, counts: U32 | None = None) -> Mask:
         """Pixels whose displayed value is uncertain, (H, W).
 
         Their mean luminance has a deviation above the tolerance as it is displayed. Values above white count
@@ -70,9 +76,9 @@ class AdaptiveSampling:
         estimate
             Of the pixels of `sampled`, row by row.
         sampled : (H, W) bool
-        spp : int or (H, W) uint32
-            Rays of a pixel, which may all have missed what makes the brightest pixel beside it bright. Its
-            share is taken to be 1 / (spp + 1), in the manner of the rule of succession. None: leave this out.
+        counts : (H, W) uint32
+            Rays of each pixel, n, which may all have missed what makes the brightest pixel beside it bright.
+            Its share is taken to be 1 / (n + 1), in the manner of the rule of succession. None: no such share.
         """
         found = np.zeros_like(sampled)
         if not sampled.any():
@@ -80,19 +86,19 @@ class AdaptiveSampling:
         mean, variance = estimate.luminance
         dr.eval(mean, variance)
         deviation, pixel = dr.sqrt(variance), lanes(np.flatnonzero(sampled).astype(np.uint32))
-        if spp is not None:
+        if counts is not None:
             means = dr.zeros(Float, sampled.size)
             dr.scatter(means, mean, pixel)
             _, brightest = _extremes(means, pixel, sampled.shape)
-            rays = opaque(spp) if isinstance(spp, int) else dr.gather(UInt, lanes(spp), pixel)
-            deviation = dr.maximum(deviation, (brightest - mean) / (1.0 + Float(rays)))
+            rays = Float(dr.gather(UInt, lanes(counts), pixel))
+            deviation = dr.maximum(deviation, (brightest - mean) / (1.0 + rays))
         found[sampled] = np.array(self._exceeds(mean - deviation, mean + deviation, pixel))
         return found
 
     def _exceeds(self, low: Any, high: Any, pixel: Any) -> Any:
         """Whether two luminances of pixels (UInt, flat indices) differ by twice the tolerance; Bool."""
         of = self.beneath
-        beneath = opaque(of) if isinstance(of, float) else dr.gather(Float, lanes(of), pixel)
+        beneath = dr.gather(Float, lanes(of), pixel) if isinstance(of, np.ndarray) else opaque(float(of))
         deviation = displayed_deviation(low + beneath, high + beneath, self.exposure_ev)
         return deviation > opaque(self.tolerance)
 
@@ -157,8 +163,15 @@ def displayed_tolerance(quality: float) -> float:
 def displayed_deviation(low: Any, high: Any, exposure_ev: float) -> Any:
     """Half the difference between two luminances (Float) as they are displayed, sRGB-encoded, 0..1."""
     scale = opaque(2.0**exposure_ev)
-    low, high = (srgb_encode_lanes(dr.clip(value * scale, 0.0, 1.0)) for value in (low, high))
+    low, high = (_srgb_encode(dr.clip(value * scale, 0.0, 1.0)) for value in (low, high))
     return 0.5 * (high - low)
+
+
+def _srgb_encode(linear: Any) -> Any:
+    """:func:`enfilade.kernels.tone.srgb_encode` of lanes; Float."""
+    power = dr.power(dr.maximum(linear, SRGB_LINEAR_LIMIT), 1.0 / SRGB_GAMMA)
+    curved = (1.0 + SRGB_OFFSET) * power - SRGB_OFFSET
+    return dr.select(linear <= SRGB_LINEAR_LIMIT, SRGB_SLOPE * linear, curved)
 
 
 def _extremes(values: Any, pixel: Any, shape: tuple[int, ...]) -> tuple[Any, Any]:

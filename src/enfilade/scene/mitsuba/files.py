@@ -113,6 +113,14 @@ def _parsed(scene: Path) -> Iterator[tuple[Any, Any]]:
 def _check_there(scene: Path) -> None:
     if not scene.is_file():  # nor a loop of links, which Path.resolve does not survive
         raise SceneError(f"there is no scene file {scene}")
+    path = os.fsencode(scene.resolve())
+    try:
+        path.decode("utf-8")
+    except UnicodeDecodeError as error:
+        name = path.decode("utf-8", "backslashreplace")
+        raise SceneError(
+            f"the path {name} is not UTF-8, and Mitsuba can't read it: rename its file or folders"
+        ) from error
 
 
 def _is_own_plugin(name: str, resolver: Any) -> bool:
