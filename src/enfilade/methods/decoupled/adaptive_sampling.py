@@ -78,7 +78,7 @@ class AdaptiveSampling:
         sampled : (H, W) bool
         counts : (H, W) uint32
             Rays of each pixel, n, which may all have missed what makes the brightest pixel beside it bright.
-            Its share is taken to be 1 / (n + 1), in the manner of the rule of succession. None: no such share.
+            Its share is taken to be 1 / (n + 1), as by the rule of succession. None: no such share.
         """
         found = np.zeros_like(sampled)
         if not sampled.any():
