@@ -20,6 +20,11 @@ LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
 AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/><rotate x="1" angle="90"/>
 <translate y="1.5"/></transform>
 <emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>"""
+BULB = """<shape type="sphere"><float name="radius" value="{0}"/><point name="center" value="{1}"/>
+<emitter type="area"><rgb name="radiance" value="{2}"/></emitter></shape>"""
+BULBS = BULB.format(0.05, "0.2, 2.2, -0.2", "400, 300, 200") + BULB.format(
+    0.03, "0.28, 0.66, 0.28", "40, 60, 80"
+)
 SKIES = {
     "sun and sky": '<emitter type="sunsky"><vector name="sun_direction" x="0.6" y="0.64" z="0.48"/>'
     '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>',
@@ -32,9 +37,10 @@ SKIES = {
     '<lookat origin="1, 2, 0" target="0, 0, 0" up="0, 0, 1"/></transform>'
     f'<rgb name="intensity" value="3"/></emitter>{LAMP.format(0.4, -0.8, 0.5)}{AREA}',
     "many lamps": "".join(LAMP.format(0.1 + 0.01 * i, i / 10 - 1, i % 3 - 1) for i in range(20)) + AREA,
+    "bulbs": '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>' + BULBS + AREA,
     "soft": '<emitter type="constant"/>' + AREA,
 }
-SHARP = {"sun and sky", "photographed", "lamps", "many lamps"}
+SHARP = {"sun and sky", "photographed", "lamps", "many lamps", "bulbs"}
 
 
 def photographed_sky():
@@ -101,6 +107,23 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
     deviation = np.sqrt(ours.variance + whole.variance) + 1e-4 * whole.color.max()
     assert np.mean(np.abs(error) > 4.0 * deviation) < 0.02
     assert ours.color.mean() == pytest.approx(whole.color.mean(), rel=0.02)
+
+
+def test_the_light_of_a_small_lamp_counts_once(tmp_path):
+    """On the cube's side, so near to a bulb that samples of the BSDF often meet it."""
+    sky = '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>'
+    renderer = opened(tmp_path, sky + BULB.format(0.02, "0.33, 0.5, 0.28", "40, 60, 80"))
+    assert renderer.has_sharp_light
+    count = 1 << 16
+    origin, beside = np.array([0.6, 0.05, 0.28]), np.array([0.3, 0.5, 0.28])
+    rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, count) for of in (origin, beside - origin)))
+    sampler = one_sequence(count)
+    point = renderer.intersect(rays)
+    sample = renderer.sample_diffuse(point, sampler, soft_only=True)
+    ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive)
+    found = renderer.sharp_light(point, sampler) + sample.direct + sample.throughput * ahead.emission
+    whole, _ = renderer.estimate_diffuse(point, sampler)
+    assert rows(found).mean(axis=0) == pytest.approx(rows(whole).mean(axis=0), rel=0.01)
 
 
 @pytest.mark.parametrize("name", SKIES)

@@ -1,4 +1,4 @@
-"""Emitters that cast sharp shadows (point, spot and directional ones, and the sun), and all others."""
+"""Emitters that cast sharp shadows (point, spot, directional ones, small lamps, the sun), and all others."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import mitsuba as mi
 import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
-from enfilade.kernels.random import BELOW_ONE, Discrete
+from enfilade.kernels.random import BELOW_ONE, Discrete, one_sequence
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
 from enfilade.scene.mitsuba.shadow_rays import ShadowRays
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
+SMALL = 0.08  # half the width of a small lamp, over the mean distance of what it lights
+DISTANCE_RAYS = 256  # for this mean
 
 
 class SharpEmitters:
@@ -39,15 +41,17 @@ class SharpEmitters:
         emitters = scene.emitters()
         weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
-        is_delta &= weights > 0.0  # Mitsuba never samples the others
-        self._delta_count = int(is_delta.sum())
-        self._delta = lanes(np.flatnonzero(is_delta).astype(np.uint32)) if self._delta_count else None
+        is_small = np.array([_is_small(scene, e) for e in emitters], bool)
+        is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
+        self._sharp_count = int(is_sharp.sum())
+        self._sharp = lanes(np.flatnonzero(is_sharp).astype(np.uint32)) if self._sharp_count else None
+        self._small = [e for e, chosen in zip(emitters, is_small & is_sharp, strict=True) if chosen]
         self._sun = find_sun(scene.environment())
 
         # The intervals of the first random number in which the scene samples each emitter.
         pmf = weights / max(weights.sum(), 1e-30)
         self._first, self._pmf = (lanes(a.astype(np.float32)) for a in (np.cumsum(pmf) - pmf, pmf))
-        soft = np.where(is_delta, 0.0, pmf)
+        soft = np.where(is_sharp, 0.0, pmf)
         self._soft_share = opaque(max(float(soft.sum()), 1e-30))
         self._soft = Discrete.of(soft) if soft.any() else None
         self.soft_count = int((soft > 0.0).sum())
@@ -56,13 +60,13 @@ class SharpEmitters:
     @property
     def is_empty(self) -> bool:
         """Whether no emitter casts sharp shadows."""
-        return not self._delta_count and self._sun is None
+        return not self._sharp_count and self._sun is None
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
         sun = self._sun and self._sun.state
-        return self._delta, sun, self._first, self._pmf, self._soft_share, self._soft
+        return self._sharp, sun, self._first, self._pmf, self._soft_share, self._soft
 
     def estimate(self, si: Any, sampler: Any, evaluate: Callable[[Any], Any], active: Any) -> Any:
         """Radiance that a surface reflects of the light of sharp emitters.
@@ -83,14 +87,14 @@ class SharpEmitters:
         -------
         Array3f
         """
-        groups = min(self._delta_count, SHADOW_RAYS)
-        size = self._delta_count / max(groups, 1)  # emitters of a group
+        groups = min(self._sharp_count, SHADOW_RAYS)
+        size = self._sharp_count / max(groups, 1)  # emitters of a group
         found = Array3f(0)
         for group in range(groups):
 
             def candidate(place: Any, group: int = group) -> tuple[Any, Any]:
-                number = dr.minimum(UInt((group + place.x) * size), self._delta_count - 1)
-                index = dr.gather(UInt, self._delta, number)
+                number = dr.minimum(UInt((group + place.x) * size), self._sharp_count - 1)
+                index = dr.gather(UInt, self._sharp, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
                 sample, radiance = emitter.sample_direction(si, place, active)
                 return sample.p, Array3f(evaluate(sample.d) * radiance) * size
@@ -119,7 +123,8 @@ class SharpEmitters:
         first, pmf = dr.gather(Float, self._first, index), dr.gather(Float, self._pmf, index)
         point = mi.Point2f(dr.minimum(first + within * pmf, BELOW_ONE), sample_point.y)
         sample, radiance = self._scene.sample_emitter_direction(si, point, False, active)
-        is_soft = active & ~sample.delta & ~(self._is_environment(sample) & self.is_sun(sample.d))
+        is_soft = active & ~sample.delta & ~self.is_small(sample.emitter)
+        is_soft &= ~(self._is_environment(sample) & self.is_sun(sample.d))
         sample.pdf = dr.select(is_soft, self.soft_pdf(sample.pdf), 0.0)
         return sample, dr.select(is_soft, radiance * self._soft_share, 0.0)
 
@@ -127,9 +132,30 @@ class SharpEmitters:
         """Density of :meth:`sample_soft` where ``scene.pdf_emitter_direction`` is `pdf`."""
         return pdf / self._soft_share
 
+    def is_small(self, emitter: Any) -> Any:
+        """Whether emitters (mitsuba.EmitterPtr) are small lamps; Bool."""
+        found = Bool(False)
+        for lamp in self._small:
+            found |= emitter == mi.EmitterPtr(lamp)
+        return found
+
     def is_sun(self, direction: Any) -> Any:
         """Whether the environment shows the sun in a direction in world space; Bool."""
         return Bool(False) if self._sun is None else self._sun.contains(direction)
 
     def _is_environment(self, sample: Any) -> Any:
         return sample.emitter == mi.EmitterPtr(self._scene.environment())
+
+
+def _is_small(scene: Any, emitter: Any) -> bool:
+    """Whether an emitting shape is small, seen from what it lights."""
+    shape = emitter.get_shape()
+    if shape is None:
+        return False
+    sampler = one_sequence(DISTANCE_RAYS)
+    points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
+    ray, _ = emitter.sample_ray(0.0, 0.5, *points)
+    hit = scene.ray_intersect(ray)
+    distance = np.array(dr.select(hit.is_valid(), hit.t, 0.0))
+    half_width = 0.5 * float(np.array(shape.bbox().extents()).max())
+    return bool(distance.any()) and half_width < SMALL * float(distance[distance > 0.0].mean())

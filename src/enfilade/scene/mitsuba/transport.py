@@ -43,7 +43,8 @@ class LightTransport:
 
     def emission(self, si: Any, bounce: Bounce | None, active: Any = True) -> Any:
         """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
-        emitted = si.emitter(self._scene, active).eval(si, active)
+        emitter = si.emitter(self._scene, active)
+        emitted = emitter.eval(si, active)
         if bounce is None:
             return Array3f(emitted)
         origin = dr.zeros(mi.Interaction3f)
@@ -51,8 +52,9 @@ class LightTransport:
         direction = mi.DirectionSample3f(self._scene, si, origin)
         emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
         emitter_pdf = dr.select(bounce.is_soft, self.sharp_emitters.soft_pdf(emitter_pdf), emitter_pdf)
-        is_left_out = bounce.is_soft & ~si.is_valid() & self.sharp_emitters.is_sun(-si.wi)
-        emitted = dr.select(is_left_out, 0.0, emitted)
+        is_sharp = self.sharp_emitters.is_small(emitter)
+        is_sharp |= ~si.is_valid() & self.sharp_emitters.is_sun(-si.wi)
+        emitted = dr.select(bounce.is_soft & is_sharp, 0.0, emitted)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
 
     def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
