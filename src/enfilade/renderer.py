@@ -308,7 +308,7 @@ class LobeRenderer(Renderer, Protocol):
 
     @property
     def has_sharp_light(self) -> bool:
-        """Whether any emitter casts sharp shadows: a point, spot or directional one, a small lamp, the sun."""
+        """Whether any emitter casts sharp shadows: a point, spot or directional one, small lamp, or sun."""
         ...
 
     def intersect(
