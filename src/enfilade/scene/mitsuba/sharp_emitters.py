@@ -45,7 +45,11 @@ class SharpEmitters:
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
         self._sharp_count = int(is_sharp.sum())
         self._sharp = lanes(np.flatnonzero(is_sharp).astype(np.uint32)) if self._sharp_count else None
-        self._small = [e for e, chosen in zip(emitters, is_small & is_sharp, strict=True) if chosen]
+        # Whether each emitter is a small lamp, by its number in Dr.Jit's registry; 0 is none.
+        numbers = [int(_number(mi.EmitterPtr(e))[0]) for e in emitters]
+        table = np.zeros(max(numbers, default=0) + 1, bool)
+        table[numbers] = is_small & is_sharp
+        self._is_small = lanes(table)
         self._sun = find_sun(scene.environment())
 
         # The intervals of the first random number in which the scene samples each emitter.
@@ -66,7 +70,7 @@ class SharpEmitters:
     def state(self) -> Any:
         """Arrays that the methods read."""
         sun = self._sun and self._sun.state
-        return self._sharp, sun, self._first, self._pmf, self._soft_share, self._soft
+        return self._sharp, self._is_small, sun, self._first, self._pmf, self._soft_share, self._soft
 
     def estimate(self, si: Any, sampler: Any, evaluate: Callable[[Any], Any], active: Any) -> Any:
         """Radiance that a surface reflects of the light of sharp emitters.
@@ -134,10 +138,7 @@ class SharpEmitters:
 
     def is_small(self, emitter: Any) -> Any:
         """Whether emitters (mitsuba.EmitterPtr) are small lamps; Bool."""
-        found = Bool(False)
-        for lamp in self._small:
-            found |= emitter == mi.EmitterPtr(lamp)
-        return found
+        return dr.gather(Bool, self._is_small, _number(emitter))
 
     def is_sun(self, direction: Any) -> Any:
         """Whether the environment shows the sun in a direction in world space; Bool."""
@@ -145,6 +146,11 @@ class SharpEmitters:
 
     def _is_environment(self, sample: Any) -> Any:
         return sample.emitter == mi.EmitterPtr(self._scene.environment())
+
+
+def _number(emitter: Any) -> Any:
+    """Numbers of emitters (mitsuba.EmitterPtr) in Dr.Jit's registry; UInt."""
+    return dr.reinterpret_array(UInt, emitter)
 
 
 def _is_small(scene: Any, emitter: Any) -> bool:
