@@ -163,7 +163,7 @@ class Bounce:
     is_delta : Bool
         Whether the direction comes from a delta lobe, which next-event estimation can't sample.
     is_soft : Bool
-        Whether emitters that cast sharp shadows are left out.
+        Whether emitters that cast sharp shadows are estimated apart: :meth:`LobeRenderer.sharp_light`.
     """
 
     position: Any
@@ -358,18 +358,22 @@ class LobeRenderer(Renderer, Protocol):
         """Estimate the radiance scattered by the specular lobes; see :meth:`estimate_diffuse`."""
         ...
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
-        """Estimate the light of emitters with sharp shadows that the diffuse lobe reflects.
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
+        """Estimate the light of emitters with sharp shadows that the lobes reflect.
 
         Parameters
         ----------
         point
         sampler : PaddedSobolSampler
+        specular
+            Also that of the specular lobes, but for delta lobes.
 
         Returns
         -------
-        Array3f
-            Reflected radiance divided by the albedo.
+        diffuse : Array3f
+            Radiance reflected by the diffuse lobe, divided by the albedo.
+        specular : Array3f
+            Radiance reflected by the specular lobes.
         """
         ...
 
@@ -381,12 +385,18 @@ class LobeRenderer(Renderer, Protocol):
         point
         sampler : PaddedSobolSampler
         soft_only
-            Leave out emitters that cast sharp shadows: :meth:`sharp_light`.
+            Without next-event estimation of emitters that cast sharp shadows: :meth:`sharp_light`.
         """
         ...
 
     def sample_specular(
-        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
+        self,
+        point: ShadingPoint,
+        sampler: Any,
+        choice: Any = None,
+        branch: Any = None,
+        *,
+        soft_only: bool = False,
     ) -> BsdfSample:
         """Sample a direction of the specular lobes.
 
@@ -399,6 +409,8 @@ class LobeRenderer(Renderer, Protocol):
         branch : UInt
             :class:`Branch` of each lane at clear interfaces; random by default. A sum over both branches has
             no noise of their choice. Other lobes are sampled as usual.
+        soft_only
+            As of :meth:`sample_diffuse`.
         """
         ...
 

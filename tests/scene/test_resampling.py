@@ -25,10 +25,10 @@ def drawn(values, count):
     def candidate(place):
         number = dr.minimum(UInt(place.x * len(values)), len(values) - 1)
         value = dr.gather(Float, table, number)
-        return mi.Point3f(Float(number), 0.0, 0.0), Array3f(value, 2.0 * value, 0.5 * value)
+        return mi.Point3f(Float(number), 0.0, 0.0), (Array3f(value, 2.0 * value, 0.5 * value),)
 
     sampler = one_sequence(COUNT)
-    target, found = resample(candidate, count, sampler)
+    target, (found,) = resample(candidate, count, sampler)
     dr.eval(target, found, sampler.dimension)
     return rows(found), np.array(target.x), int(sampler.dimension[0])
 

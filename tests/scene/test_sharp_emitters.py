@@ -92,7 +92,7 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
             sample = renderer.sample_specular(ahead, sampler)
             is_alive = is_alive & sample.is_alive & sample.is_passed
             throughput = throughput * sample.throughput
-        sharp = renderer.sharp_light(point, sampler) if renderer.has_sharp_light else Array3f(0)
+        sharp = renderer.sharp_light(point, sampler)[0] if renderer.has_sharp_light else Array3f(0)
         whole, _ = renderer.estimate_diffuse(point, sampler)
         return Samples((soft + sharp, whole))
 
@@ -121,7 +121,7 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path):
     point = renderer.intersect(rays)
     sample = renderer.sample_diffuse(point, sampler, soft_only=True)
     ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive)
-    found = renderer.sharp_light(point, sampler) + sample.direct + sample.throughput * ahead.emission
+    found = renderer.sharp_light(point, sampler)[0] + sample.direct + sample.throughput * ahead.emission
     whole, _ = renderer.estimate_diffuse(point, sampler)
     assert rows(found).mean(axis=0) == pytest.approx(rows(whole).mean(axis=0), rel=0.01)
 
@@ -156,7 +156,7 @@ def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):
         '<rgb name="irradiance" value="2, 1, 1"/></emitter>',
     )
     rays = Rays(Array3f([0.0, 1.0, 1.5], 0.1, 0.0), Array3f(0.0, -1.0, 0.0) + dr.zeros(Array3f, 3))
-    found = rows(renderer.sharp_light(renderer.intersect(rays), one_sequence(3)))
+    found = rows(renderer.sharp_light(renderer.intersect(rays), one_sequence(3))[0])
     assert np.allclose(found[1:], np.array([2.0, 1.0, 1.0]) / np.pi, rtol=1e-5)
     assert not found[0].any()  # inside the cube
 

@@ -125,8 +125,11 @@ class PathKernels:
         albedo = point.surfaces.albedo
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         sharp: tuple[Any, ...] = ()
-        if cache.is_soft:
-            sharp = (self._renderer.sharp_light(point, path.sampler.fork(SHARP_SALT)),)
+        direct = Array3f(0)
+        if cache.is_soft:  # the camera sees the highlights of sharp emitters, too
+            sampler, is_seen = path.sampler.fork(SHARP_SALT), path.bounce is None
+            reflected_sharp, direct = self._renderer.sharp_light(point, sampler, specular=is_seen)
+            sharp = (reflected_sharp,)
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
@@ -138,7 +141,7 @@ class PathKernels:
         reflected, is_miss = query_view(cache, query)
         vertex = Vertex(reflected, is_miss, Bool(point.has_specular), _surviving(path, point), path, query)
         # Where a lobe absorbs the path, its direction is undefined, and so may be the environment's emission.
-        emitted = dr.select(path.is_active, path.throughput * point.emission, 0.0)
+        emitted = dr.select(path.is_active, path.throughput * (point.emission + direct), 0.0)
         return Array3f(emitted), vertex
 
     def _extend(
@@ -156,7 +159,8 @@ class PathKernels:
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        sample = self._renderer.sample_specular(point, sampler, branch=path.branch)
+        soft_only = cache.is_soft and path.bounce is None  # the rest is in the diffuse image
+        sample = self._renderer.sample_specular(point, sampler, branch=path.branch, soft_only=soft_only)
 
         # Extend the path; a broad lobe widens it.
         is_narrow = sample.bounce.is_delta | sample.is_passed

@@ -174,19 +174,25 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
         return self._transport.estimate(self._transport.sample_specular(point, sampler), sampler, path_depth)
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
-        return self._transport.sharp_light(point, sampler)
+        return self._transport.sharp_light(point, sampler, specular=specular)
 
     def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         return self._transport.sample_diffuse(point, sampler, soft_only=soft_only)
 
     def sample_specular(
-        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
+        self,
+        point: ShadingPoint,
+        sampler: Any,
+        choice: Any = None,
+        branch: Any = None,
+        *,
+        soft_only: bool = False,
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
-        return self._transport.sample_specular(point, sampler, choice, branch)
+        return self._transport.sample_specular(point, sampler, choice, branch, soft_only=soft_only)
 
     def _intersect(
         self, rays: Rays, active: Any = True, null_transmittance: float | None = NULL_GBUFFER

@@ -12,56 +12,65 @@ import mitsuba as mi
 from enfilade.arrays import Array3f, Float, UInt, opaque
 from enfilade.kernels.random import BELOW_ONE, PaddedSobolSampler
 
+Contributions = tuple[Any, ...]  # Array3f each
+
 MOST_CANDIDATES = 8  # of which one has a shadow ray
 
 
 def resample(
-    candidate: Callable[[Any], tuple[Any, Any]], count: int, sampler: PaddedSobolSampler
-) -> tuple[Any, Any]:
+    candidate: Callable[[Any], tuple[Any, Contributions]],
+    count: int,
+    sampler: PaddedSobolSampler,
+    parts: int = 1,
+) -> tuple[Any, Contributions]:
     """One of several candidates, with a probability in proportion to its contribution without occluders.
 
     Parameters
     ----------
     candidate
         Maps a point of the unit square (mitsuba.Point2f) to a point of an emitter (mitsuba.Point3f) and its
-        contribution (Array3f), divided by the density.
+        contributions (tuple of Array3f), divided by the density.
     count
         Number of candidates, each from a part of the square's first axis.
     sampler
+    parts
+        Number of contributions of a candidate.
 
     Returns
     -------
     target : mitsuba.Point3f
         Of the chosen candidate.
-    contribution : Array3f
+    contributions : tuple of Array3f
         Its own, divided by the probability: the expectation is the mean of all candidates' contributions.
     """
     if count == 1:
         return candidate(mi.Point2f(sampler.next_2d()))
     first, size = sampler.dimension, opaque(count)
+    nothing = tuple(Array3f(0) for _ in range(parts))
 
     def draw(k: Any, target: Any, chosen: Any, chosen_weight: Any, total: Any) -> tuple[Any, ...]:
         own = replace(sampler, dimension=first + 2 * k)
         point = own.next_2d()
         place = mi.Point2f(dr.minimum((Float(k) + point.x) / Float(size), BELOW_ONE), point.y)
-        new_target, contribution = candidate(place)
-        weight = dr.max(dr.abs(contribution))
+        new_target, contributions = candidate(place)
+        weight = sum((dr.max(dr.abs(of)) for of in contributions), Float(0))
         total = total + weight
         is_taken = own.next_1d() * total < weight
         return (
             k + 1,
             dr.select(is_taken, new_target, target),
-            dr.select(is_taken, contribution, chosen),
+            tuple(dr.select(is_taken, *pair) for pair in zip(contributions, chosen, strict=True)),
             dr.select(is_taken, weight, chosen_weight),
             total,
         )
 
     _, target, chosen, chosen_weight, total = dr.while_loop(
-        (UInt(0), mi.Point3f(0.0), Array3f(0), Float(0), Float(0)),
+        (UInt(0), mi.Point3f(0.0), nothing, Float(0), Float(0)),
         lambda k, *_: k < size,
         draw,
         labels=("k", "target", "chosen", "chosen_weight", "total"),
     )
     sampler.dimension = first + 2 * count
     # What is not finite stays so, and is left out with its path.
-    return target, chosen * dr.select(total == 0.0, 0.0, total / (chosen_weight * Float(size)))
+    scale = dr.select(total == 0.0, 0.0, total / (chosen_weight * Float(size)))
+    return target, tuple(of * scale for of in chosen)

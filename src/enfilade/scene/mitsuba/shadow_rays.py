@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from enfilade.arrays import Array3f, Bool, UInt
+from enfilade.arrays import Array3f, Bool, Float, UInt
 
 NULL_LAYERS = 32  # null interactions along a ray before it gives up
 
@@ -30,10 +30,14 @@ class ShadowRays:
         self._scene = scene
         self.pass_null = pass_null
 
-    def unoccluded(self, si: Any, target: Any, contribution: Any, active: Any) -> Any:
-        """A contribution from a point of an emitter, times the transmittance in between; Array3f."""
-        is_lit = active & ~(dr.max(dr.abs(contribution)) <= 0.0)  # what is not finite stays so
-        return dr.select(is_lit, contribution * Array3f(self._transmittance(si, target, is_lit)), 0.0)
+    def unoccluded(
+        self, si: Any, target: Any, contributions: tuple[Any, ...], active: Any
+    ) -> tuple[Any, ...]:
+        """Contributions (Array3f) from a point of an emitter, times the transmittance in between."""
+        largest = sum((dr.max(dr.abs(of)) for of in contributions), Float(0))
+        is_lit = active & ~(largest <= 0.0)  # what is not finite stays so
+        share = Array3f(self._transmittance(si, target, is_lit))
+        return tuple(dr.select(is_lit, of * share, 0.0) for of in contributions)
 
     def _transmittance(self, si: Any, target: Any, active: Any) -> Any:
         """Share of light that reaches a surface from a point; Color3f."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import drjit as dr
@@ -45,11 +45,6 @@ class SharpEmitters:
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
         self._sharp_count = int(is_sharp.sum())
         self._sharp = lanes(np.flatnonzero(is_sharp).astype(np.uint32)) if self._sharp_count else None
-        # Whether each emitter is a small lamp, by its number in Dr.Jit's registry; 0 is none.
-        numbers = [int(_number(mi.EmitterPtr(e))[0]) for e in emitters]
-        table = np.zeros(max(numbers, default=0) + 1, bool)
-        table[numbers] = is_small & is_sharp
-        self._is_small = lanes(table)
         self._sun = find_sun(scene.environment())
 
         # The intervals of the first random number in which the scene samples each emitter.
@@ -59,6 +54,15 @@ class SharpEmitters:
         self._soft_share = opaque(max(float(soft.sum()), 1e-30))
         self._soft = Discrete.of(soft) if soft.any() else None
         self.soft_count = int((soft > 0.0).sum())
+
+        # What makes the density of each emitter among all that of its own estimate: by its number in the
+        # registry of Dr.Jit, where 0 is none.
+        group = self._sharp_count / max(min(self._sharp_count, SHADOW_RAYS), 1)
+        scale = np.where(is_sharp, 1.0 / np.maximum(group * pmf, 1e-30), 1.0 / max(soft.sum(), 1e-30))
+        numbers = [int(_number(mi.EmitterPtr(e))[0]) for e in emitters]
+        table = np.zeros(max(numbers, default=0) + 1, np.float32)
+        table[numbers] = np.where(pmf > 0.0, scale, 0.0)
+        self._scale = lanes(table)
         self.count = int((weights > 0.0).sum())
 
     @property
@@ -70,10 +74,17 @@ class SharpEmitters:
     def state(self) -> Any:
         """Arrays that the methods read."""
         sun = self._sun and self._sun.state
-        return self._sharp, self._is_small, sun, self._first, self._pmf, self._soft_share, self._soft
+        return self._sharp, self._scale, sun, self._first, self._pmf, self._soft_share, self._soft
 
-    def estimate(self, si: Any, sampler: Any, evaluate: Callable[[Any], Any], active: Any) -> Any:
-        """Radiance that a surface reflects of the light of sharp emitters.
+    def estimate(
+        self,
+        si: Any,
+        sampler: Any,
+        evaluate: Callable[[Any], Sequence[tuple[Any, Any]]],
+        parts: int,
+        active: Any,
+    ) -> list[Any]:
+        """Radiance that lobes of a surface reflect of the light of sharp emitters, MIS-weighted.
 
         Up to :data:`SHADOW_RAYS` emitters have a shadow ray each. More are divided into groups with one
         shadow ray each, to an emitter that is chosen in proportion to its contribution without occluders.
@@ -84,32 +95,37 @@ class SharpEmitters:
         si : mitsuba.SurfaceInteraction3f
         sampler : PaddedSobolSampler
         evaluate
-            The BSDF times the cosine, by incident direction in world space.
+            By incident direction in world space: of each lobe the BSDF times the cosine, and the density with
+            which it is sampled.
+        parts
+            Number of lobes.
         active : Bool
 
         Returns
         -------
-        Array3f
+        list of Array3f
+            Of each lobe.
         """
         groups = min(self._sharp_count, SHADOW_RAYS)
         size = self._sharp_count / max(groups, 1)  # emitters of a group
-        found = Array3f(0)
+        found = [Array3f(0)] * parts
         for group in range(groups):
 
-            def candidate(place: Any, group: int = group) -> tuple[Any, Any]:
+            def candidate(place: Any, group: int = group) -> tuple[Any, tuple[Any, ...]]:
                 number = dr.minimum(UInt((group + place.x) * size), self._sharp_count - 1)
                 index = dr.gather(UInt, self._sharp, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
                 sample, radiance = emitter.sample_direction(si, place, active)
-                return sample.p, Array3f(evaluate(sample.d) * radiance) * size
+                pdf = dr.select(sample.delta, dr.inf, sample.pdf / size)
+                return sample.p, _weighted(evaluate(sample.d), radiance * size, pdf)
 
-            target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler)
-            found += self._shadow_rays.unoccluded(si, target, chosen, active)
+            target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler, parts)
+            found = _added(found, self._shadow_rays.unoccluded(si, target, chosen, active))
         if self._sun is not None:
-            direction, radiance = self._sun.sample(sampler)
+            direction, radiance, pdf = self._sun.sample(sampler)
             target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
-            contribution = Array3f(evaluate(direction) * radiance)
-            found += self._shadow_rays.unoccluded(si, target, contribution, active)
+            contributions = _weighted(evaluate(direction), radiance, pdf)
+            found = _added(found, self._shadow_rays.unoccluded(si, target, contributions, active))
         return found
 
     def sample_soft(self, si: Any, sample_point: Any, active: Any) -> tuple[Any, Any]:
@@ -127,25 +143,55 @@ class SharpEmitters:
         first, pmf = dr.gather(Float, self._first, index), dr.gather(Float, self._pmf, index)
         point = mi.Point2f(dr.minimum(first + within * pmf, BELOW_ONE), sample_point.y)
         sample, radiance = self._scene.sample_emitter_direction(si, point, False, active)
-        is_soft = active & ~sample.delta & ~self.is_small(sample.emitter)
-        is_soft &= ~(self._is_environment(sample) & self.is_sun(sample.d))
-        sample.pdf = dr.select(is_soft, self.soft_pdf(sample.pdf), 0.0)
+        is_sharp = self._is_environment(sample) & self._is_sun(sample.d)
+        is_soft = active & ~sample.delta & ~is_sharp
+        sample.pdf = dr.select(is_soft, sample.pdf / self._soft_share, 0.0)
         return sample, dr.select(is_soft, radiance * self._soft_share, 0.0)
 
-    def soft_pdf(self, pdf: Any) -> Any:
-        """Density of :meth:`sample_soft` where ``scene.pdf_emitter_direction`` is `pdf`."""
-        return pdf / self._soft_share
+    def pdf(self, emitter: Any, direction: Any, pdf: Any) -> Any:
+        """Density with which an emitter is sampled where sharp ones are estimated apart.
 
-    def is_small(self, emitter: Any) -> Any:
-        """Whether emitters (mitsuba.EmitterPtr) are small lamps; Bool."""
-        return dr.gather(Bool, self._is_small, _number(emitter))
+        Parameters
+        ----------
+        emitter : mitsuba.EmitterPtr
+            Seen in the direction.
+        direction : mitsuba.Vector3f
+            In world space.
+        pdf : Float
+            Of ``scene.pdf_emitter_direction``.
 
-    def is_sun(self, direction: Any) -> Any:
+        Returns
+        -------
+        Float
+        """
+        found = pdf * dr.gather(Float, self._scale, _number(emitter))
+        if self._sun is None:
+            return found
+        is_sun = (emitter == mi.EmitterPtr(self._scene.environment())) & self._is_sun(direction)
+        return dr.select(is_sun, self._sun.pdf(direction), found)
+
+    def _is_sun(self, direction: Any) -> Any:
         """Whether the environment shows the sun in a direction in world space; Bool."""
         return Bool(False) if self._sun is None else self._sun.contains(direction)
 
     def _is_environment(self, sample: Any) -> Any:
         return sample.emitter == mi.EmitterPtr(self._scene.environment())
+
+
+def mis_weight(pdf: Any, other_pdf: Any) -> Any:
+    """Veach's power heuristic: 0 where both densities are 0, 1 where the first is infinite."""
+    ratio = dr.select(pdf == dr.inf, 0.0, other_pdf / pdf)
+    weight = dr.rcp(1.0 + ratio * ratio)
+    return dr.select(pdf > 0.0, weight, 0.0)
+
+
+def _weighted(lobes: Sequence[tuple[Any, Any]], radiance: Any, pdf: Any) -> tuple[Any, ...]:
+    """Contributions of a sample of an emitter, whose radiance is divided by its density."""
+    return tuple(Array3f(value * radiance * mis_weight(pdf, own)) for value, own in lobes)
+
+
+def _added(totals: Sequence[Any], more: Sequence[Any]) -> list[Any]:
+    return [total + of for total, of in zip(totals, more, strict=True)]
 
 
 def _number(emitter: Any) -> Any:

@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Float, lanes, opaque
+from enfilade.arrays import Array3f, Float, UInt, lanes, opaque
 from enfilade.kernels.random import Discrete
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import F32
@@ -54,8 +54,21 @@ class Sun:
         limit = self.extent * local.z
         return (local.z > 0.0) & (dr.abs(local.x) < limit) & (dr.abs(local.y) < limit)
 
-    def sample(self, sampler: Any) -> tuple[Any, Any]:
-        """A direction on the map (Vector3f), and its radiance over its density (Color3f)."""
+    def pdf(self, direction: Any) -> Any:
+        """Density of :meth:`sample` in directions on the map, per steradian; Float."""
+        local = self.frame.to_local(direction)
+        half = 0.5 * TEXELS
+        column, row = (
+            UInt(dr.clip((of / (local.z * self.extent) + 1.0) * half, 0.0, TEXELS - 1.0)) for of in local.xy
+        )
+        return dr.gather(Float, self.texels.pmf, row * TEXELS + column) / self._solid_angle(local.z)
+
+    def _solid_angle(self, cosine: Any) -> Any:
+        """Of a texel at an angle to the centre; Float."""
+        return dr.square(self.extent * (2.0 / TEXELS)) * cosine**3
+
+    def sample(self, sampler: Any) -> tuple[Any, Any, Any]:
+        """A direction on the map (Vector3f), its radiance over its density (Color3f), and the density."""
         sample_point = sampler.next_2d()
         texel, across, pmf = self.texels.sample(sample_point.x)
         row = texel // TEXELS
@@ -64,8 +77,8 @@ class Sun:
         direction = mi.Vector3f(x * self.extent, y * self.extent, 1.0)
         cosine = dr.rsqrt(dr.squared_norm(direction))
         direction = self.frame.to_world(direction * cosine)
-        solid_angle = dr.square(self.extent * (2.0 / TEXELS)) * cosine**3  # of a texel
-        return direction, _radiance(self.environment, direction) * (solid_angle / pmf)
+        density = pmf / self._solid_angle(cosine)
+        return direction, _radiance(self.environment, direction) / density, density
 
 
 def find_sun(environment: Any) -> Sun | None:

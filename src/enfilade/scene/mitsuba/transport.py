@@ -14,7 +14,7 @@ from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
-from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters
+from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
 Radiance = Callable[[Rays, Any, int, Any], Any]
 
@@ -51,11 +51,9 @@ class LightTransport:
         origin.p = mi.Point3f(bounce.position)
         direction = mi.DirectionSample3f(self._scene, si, origin)
         emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
-        emitter_pdf = dr.select(bounce.is_soft, self.sharp_emitters.soft_pdf(emitter_pdf), emitter_pdf)
-        is_sharp = self.sharp_emitters.is_small(emitter)
-        is_sharp |= ~si.is_valid() & self.sharp_emitters.is_sun(-si.wi)
-        emitted = dr.select(bounce.is_soft & is_sharp, 0.0, emitted)
-        return Array3f(emitted * dr.select(bounce.is_delta, 1.0, _mis_weight(bounce.pdf, emitter_pdf)))
+        apart = self.sharp_emitters.pdf(emitter, direction.d, emitter_pdf)
+        emitter_pdf = dr.select(bounce.is_soft, apart, emitter_pdf)
+        return Array3f(emitted * dr.select(bounce.is_delta, 1.0, mis_weight(bounce.pdf, emitter_pdf)))
 
     def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
@@ -93,17 +91,22 @@ class LightTransport:
         )
         return unweighted, weighted
 
-    def sharp_light(self, point: ShadingPoint, sampler: Any) -> Any:
+    def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
         si, albedo = point.native, point.surfaces.albedo
-        active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         bsdf = si.bsdf()
+        is_diffuse = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
+        is_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf) & specular
 
-        def evaluate(direction: Any) -> Any:
-            value, _ = self._lobes.eval_diffuse(si, bsdf, si.to_local(direction), active)
-            return _divided(value, albedo)
+        def evaluate(direction: Any) -> list[tuple[Any, Any]]:
+            wo = si.to_local(direction)
+            value, pdf = self._lobes.eval_diffuse(si, bsdf, wo, is_diffuse)
+            lobes = [(_divided(value, albedo), pdf)]
+            return [*lobes, self._lobes.eval_specular(si, bsdf, wo, is_glossy)] if specular else lobes
 
-        return self.sharp_emitters.estimate(si, sampler, evaluate, active)
+        active = is_diffuse | is_glossy
+        found = self.sharp_emitters.estimate(si, sampler, evaluate, 1 + specular, active)
+        return found[0], found[1] if specular else Array3f(0)
 
     def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
@@ -124,7 +127,13 @@ class LightTransport:
         )
 
     def sample_specular(
-        self, point: ShadingPoint, sampler: Any, choice: Any = None, branch: Any = None
+        self,
+        point: ShadingPoint,
+        sampler: Any,
+        choice: Any = None,
+        branch: Any = None,
+        *,
+        soft_only: bool = False,
     ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_specular`."""
         si = point.native
@@ -134,9 +143,11 @@ class LightTransport:
         is_split = point.has_specular & self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
         has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
-        direct = self._next_event(si, bsdf, self._lobes.eval_specular, sampler, has_glossy)
+        direct = self._next_event(
+            si, bsdf, self._lobes.eval_specular, sampler, has_glossy, soft_only=soft_only
+        )
         ray = si.spawn_ray(si.to_world(wo))
-        bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(False))
+        bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(soft_only))
         is_passed = Bool(is_null & self._shadow_rays.pass_null)
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
@@ -172,12 +183,13 @@ class LightTransport:
             value, pdf = evaluate(si, bsdf, si.to_local(emitter.d), is_lit)
             if albedo is not None:
                 value = _divided(value, albedo)
-            weight = dr.select(emitter.delta, 1.0, _mis_weight(emitter.pdf, pdf))
-            return emitter.p, Array3f(dr.select(is_lit, value * radiance * weight, 0.0))
+            weight = dr.select(emitter.delta, 1.0, mis_weight(emitter.pdf, pdf))
+            return emitter.p, (Array3f(dr.select(is_lit, value * radiance * weight, 0.0)),)
 
         emitters = self.sharp_emitters.soft_count if soft_only else self.sharp_emitters.count
         target, light = resample(candidate, min(max(emitters, 1), MOST_CANDIDATES), sampler)
-        return self._shadow_rays.unoccluded(si, target, light, active)
+        (found,) = self._shadow_rays.unoccluded(si, target, light, active)
+        return found
 
 
 def _divided(lobe: Any, albedo: Any) -> Any:
@@ -195,10 +207,3 @@ def _divided(lobe: Any, albedo: Any) -> Any:
         for v, a in channels
     )
     return Array3f(*quotients)
-
-
-def _mis_weight(pdf: Any, other_pdf: Any) -> Any:
-    """Veach's power heuristic; 0 where both densities are 0."""
-    pdf, other_pdf = pdf * pdf, other_pdf * other_pdf
-    weight = pdf / (pdf + other_pdf)
-    return dr.select(dr.isfinite(weight), weight, 0.0)
