@@ -6,6 +6,7 @@ from PIL import Image
 
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Samples
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from support.integrated import (
     EMPTY,
     LUMINANCE,
@@ -49,6 +50,45 @@ def test_without_a_cache_every_material_keeps_its_energy(materials):
     assert set(MATERIALS) < set(errors)
     # Of 18 shapes one exceeds four standard errors once in 1000 runs.
     assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+
+
+def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
+    """Those of small lamps, the sun and a point, by camera rays and specular rays, on every material."""
+    sky = (
+        '<emitter type="sunsky"><vector name="sun_direction" x="0.3" y="0.6" z="0.7"/>'
+        '<float name="sun_scale" value="0.01"/><float name="sky_scale" value="0.3"/></emitter>'
+        '<emitter type="point"><point name="position" value="-2, 3.5, 2.5"/>'
+        '<rgb name="intensity" value="4"/></emitter>'
+    )
+    bulbs = "".join(
+        f'<shape type="sphere"><float name="radius" value="0.06"/><point name="center" value="{at}"/>'
+        '<emitter type="area"><rgb name="radiance" value="150"/></emitter></shape>'
+        for at in ("1.8, 3.6, 2.2", "0.2, 3.8, 3")
+    )
+    renderer, camera = opened_scene(tmp_path, MATERIALS, sky + bulbs), front_camera()
+    ours = shaded(renderer, IrradianceCache(is_soft=True), camera, 256)
+    reference = traced(renderer, camera, 256)
+    shape_index = find_geometry(renderer, camera).shape_index.ravel()
+    names = renderer.describe().shapes
+    errors = {
+        names[number - 1]: standard_errors(ours, reference, shape_index == number)
+        for number in np.unique(shape_index[shape_index > 0])
+    }
+    assert set(MATERIALS) < set(errors)
+    assert {name: error for name, error in errors.items() if abs(error) > 4.0} == {}
+
+    # Metal has no diffuse lobe: what camera rays see there are its highlights.
+    is_metal = shape_index == names.index("roughconductor") + 1
+
+    def seen(cache):
+        def radiance(rays, sampler):
+            found = integrator_of(renderer).diffuse_radiance(cache, rays, sampler, pixel_angle=PIXEL_ANGLE)
+            return found.layers[0]
+
+        return estimated(radiance, camera, 16)[0].color.reshape(-1, 3)[is_metal]
+
+    assert seen(IrradianceCache(is_soft=True)).max() > 0.2
+    assert not seen(EMPTY).any()
 
 
 def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
