@@ -140,7 +140,7 @@ def _exposure_ev(shot: ShotContext) -> float:
 
 
 def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tuple[Estimate, Mask]:
-    """Emission and diffuse reflection, with more camera rays at edges and fine textures; where, (H, W)."""
+    """Emission, diffuse reflection and highlights of sharp emitters; where it has more rays, (H, W)."""
     walk, settings = shot.walk, shot.settings
     camera = walk.path.cameras[frame]
     estimate = ReconstructedEstimate(

@@ -98,6 +98,8 @@ class Integrator:
     ) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
 
+        With the highlights of emitters that cast sharp shadows, where the cache is without their light.
+
         Parameters
         ----------
         cache
@@ -131,6 +133,8 @@ class Integrator:
         pixel_angle: float,
     ) -> Samples:
         """Radiance that visible surfaces reflect and transmit by their specular lobes.
+
+        Without the highlights that :meth:`diffuse_radiance` has.
 
         Parameters
         ----------

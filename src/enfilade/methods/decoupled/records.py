@@ -65,7 +65,7 @@ class ShadedFrame:
     Attributes
     ----------
     diffuse : (H, W, 3) float16
-        Radiance emitted, and reflected by diffuse lobes.
+        Radiance emitted, reflected by diffuse lobes, and by specular lobes from sharp emitters.
     reflection : SpecularAov
     transmission : SpecularAov or None
         Straight through clear surfaces; None for frames without any.
