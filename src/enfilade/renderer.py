@@ -359,7 +359,9 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
-        """Estimate the light of emitters with sharp shadows that the lobes reflect.
+        """Estimate the light of emitters with sharp shadows that the lobes reflect, by next-event estimation.
+
+        It is MIS-weighted: samples of the lobes with `soft_only` have the rest of this light.
 
         Parameters
         ----------

@@ -10,9 +10,11 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.images import write_exr
 from enfilade.kernels.estimate import Estimate, Samples, estimate
 from enfilade.kernels.random import Discrete, one_sequence
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.scene.mitsuba.sun import find_sun
+from support.integrated import shaded, standard_errors, traced
 
 SUN = np.array([0.6, 0.64, 0.48])
 LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
@@ -109,11 +111,13 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
     assert ours.color.mean() == pytest.approx(whole.color.mean(), rel=0.02)
 
 
-def test_the_light_of_a_small_lamp_counts_once(tmp_path):
-    """On the cube's side, so near to a bulb that samples of the BSDF often meet it."""
+@pytest.mark.parametrize("others", [0, 4, 7])
+def test_the_light_of_a_small_lamp_counts_once(tmp_path, others):
+    """On the cube's side, so near to a bulb that samples of the BSDF often meet it; and in groups."""
     sky = '<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>'
-    renderer = opened(tmp_path, sky + BULB.format(0.02, "0.33, 0.5, 0.28", "40, 60, 80"))
-    assert renderer.has_sharp_light
+    far = "".join(BULB.format(0.03, f"{1.5 + 0.1 * i}, 1.5, {i - 2}", "30, 20, 10") for i in range(others))
+    renderer = opened(tmp_path, sky + BULB.format(0.02, "0.33, 0.5, 0.28", "40, 60, 80") + far)
+    assert dr.width(renderer.state[-1][0]) == 1 + others
     count = 1 << 16
     origin, beside = np.array([0.6, 0.05, 0.28]), np.array([0.3, 0.5, 0.28])
     rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, count) for of in (origin, beside - origin)))
@@ -124,6 +128,24 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path):
     found = renderer.sharp_light(point, sampler)[0] + sample.direct + sample.throughput * ahead.emission
     whole, _ = renderer.estimate_diffuse(point, sampler)
     assert rows(found).mean(axis=0) == pytest.approx(rows(whole).mean(axis=0), rel=0.01)
+
+
+def test_of_many_small_lamps_none_casts_sharp_shadows(tmp_path):
+    bulbs = "".join(BULB.format(0.02, f"{i / 10 - 1}, 1.5, 0.5", "30, 20, 10") for i in range(17))
+    assert not opened(tmp_path, bulbs).has_sharp_light
+
+
+def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
+    """Then next-event estimates of soft ones are zero, for any number of lanes."""
+    ball = """<shape type="sphere"><float name="radius" value="0.4"/>
+<point name="center" value="0.9, 0.4, 0.6"/>
+<bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>"""
+    renderer, cache = opened(tmp_path, BULBS + ball), IrradianceCache(is_soft=True)
+    camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 48, 36)
+    few = shaded(renderer, cache, camera, 4, pixels=300)
+    ours, reference = shaded(renderer, cache, camera, 64), traced(renderer, camera, 64)
+    assert few.color.shape == (300, 3)
+    assert abs(standard_errors(ours, reference)) < 4.0
 
 
 @pytest.mark.parametrize("name", SKIES)

@@ -28,7 +28,7 @@ class CacheQuery:
     weight : Array3f
         Contribution of irradiance over pi to the pixel sample; 0 where there is no diffuse lobe.
     sharp : tuple of Array3f
-        Irradiance over pi by emitters with sharp shadows, where the images of the cache are without it.
+        Irradiance over pi by emitters with sharp shadows, where the images of the cache are soft.
     """
 
     position: Any

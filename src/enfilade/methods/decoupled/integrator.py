@@ -98,7 +98,7 @@ class Integrator:
     ) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
 
-        With the highlights of emitters that cast sharp shadows, where the cache is without their light.
+        With the highlights of emitters that cast sharp shadows, if the cache is soft.
 
         Parameters
         ----------
@@ -231,8 +231,8 @@ class Integrator:
         Returns
         -------
         Samples
-            Two layers: by light straight from emitters, without those that cast sharp shadows; and by all
-            other.
+            Two layers: by light straight from emitters, without next-event estimates of those that cast
+            sharp shadows; and by all other.
         """
         path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         direct, vertex = self._kernels.gather(cache, path, True)

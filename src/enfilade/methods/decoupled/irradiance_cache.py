@@ -43,7 +43,7 @@ class IrradianceCache:
         One an image, for surfaces that several of them show.
     hash_grid : HashGrid or None
     is_soft : bool
-        Whether the images are without direct light of emitters that cast sharp shadows.
+        Whether the images are without next-event estimates of emitters that cast sharp shadows.
     """
 
     view: UploadedImage | None = None

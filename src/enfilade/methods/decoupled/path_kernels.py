@@ -188,7 +188,7 @@ class PathKernels:
     def _gather(self, cache: IrradianceCache, path: Path, is_visible: bool) -> tuple[Any, Vertex]:
         """Scatter off the diffuse lobe of the next surface, and intersect the one after.
 
-        A visible surface is that of the G-buffer, and emitters with sharp shadows are left out.
+        A visible surface is that of the G-buffer, and emitters with sharp shadows are estimated apart.
         """
         sampler = path.sampler.copy()
 

@@ -57,7 +57,7 @@ def shade_specular(
     virtual
         G-buffers of the frame with the virtual images of its AOVs; empty where no pixel has specular lobes.
     beneath : (H, W) float32
-        Luminance of emission and diffuse reflection, which is displayed together with the AOVs.
+        Luminance of what camera rays see, which is displayed together with the AOVs.
     """
     nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
     black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ def resample(
     candidate: Callable[[Any], tuple[Any, Contributions]],
     count: int,
     sampler: PaddedSobolSampler,
-    parts: int = 1,
+    factors: Sequence[Any] = (1.0,),
 ) -> tuple[Any, Contributions]:
     """One of several candidates, with a probability in proportion to its contribution without occluders.
 
@@ -33,8 +33,8 @@ def resample(
     count
         Number of candidates, each from a part of the square's first axis.
     sampler
-    parts
-        Number of contributions of a candidate.
+    factors
+        Of each contribution in the choice.
 
     Returns
     -------
@@ -46,14 +46,15 @@ def resample(
     if count == 1:
         return candidate(mi.Point2f(sampler.next_2d()))
     first, size = sampler.dimension, opaque(count)
-    nothing = tuple(Array3f(0) for _ in range(parts))
+    nothing = tuple(Array3f(0) for _ in factors)
 
     def draw(k: Any, target: Any, chosen: Any, chosen_weight: Any, total: Any) -> tuple[Any, ...]:
         own = replace(sampler, dimension=first + 2 * k)
         point = own.next_2d()
         place = mi.Point2f(dr.minimum((Float(k) + point.x) / Float(size), BELOW_ONE), point.y)
         new_target, contributions = candidate(place)
-        weight = sum((dr.max(dr.abs(of)) for of in contributions), Float(0))
+        scaled = (factor * of for factor, of in zip(factors, contributions, strict=True))
+        weight = sum((dr.max(dr.abs(of)) for of in scaled), Float(0))
         total = total + weight
         is_taken = own.next_1d() * total < weight
         return (

@@ -12,13 +12,14 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import BELOW_ONE, Discrete, one_sequence
-from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
+from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import ShadowRays
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
 SMALL = 0.08  # half the width of a small lamp, over the mean distance of what it lights
 DISTANCE_RAYS = 256  # for this mean
+MOST_LAMPS = 16  # small ones: of more, shadow rays would meet a few at random
 
 
 class SharpEmitters:
@@ -41,7 +42,11 @@ class SharpEmitters:
         emitters = scene.emitters()
         weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
-        is_small = np.array([_is_small(scene, e) for e in emitters], bool)
+        is_small = np.array(
+            [w > 0.0 and _is_small(scene, e) for e, w in zip(emitters, weights, strict=True)], bool
+        )
+        if is_small.sum() > MOST_LAMPS:
+            is_small[:] = False
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
         self._sharp_count = int(is_sharp.sum())
         self._sharp = lanes(np.flatnonzero(is_sharp).astype(np.uint32)) if self._sharp_count else None
@@ -53,14 +58,17 @@ class SharpEmitters:
         soft = np.where(is_sharp, 0.0, pmf)
         self._soft_share = opaque(max(float(soft.sum()), 1e-30))
         self._soft = Discrete.of(soft) if soft.any() else None
+        self._zero = opaque(
+            0.0
+        )  # a literal has the size of its lanes, which a recorded kernel does not adapt
         self.soft_count = int((soft > 0.0).sum())
 
-        # What makes the density of each emitter among all that of its own estimate: by its number in the
+        # Factors from the scene's density of an emitter to that of its own estimate, by its number in the
         # registry of Dr.Jit, where 0 is none.
         group = self._sharp_count / max(min(self._sharp_count, SHADOW_RAYS), 1)
         scale = np.where(is_sharp, 1.0 / np.maximum(group * pmf, 1e-30), 1.0 / max(soft.sum(), 1e-30))
-        numbers = [int(_number(mi.EmitterPtr(e))[0]) for e in emitters]
-        table = np.zeros(max(numbers, default=0) + 1, np.float32)
+        numbers = np.array(_number(scene.emitters_dr()))
+        table = np.zeros(numbers.max(initial=0) + 1, np.float32)
         table[numbers] = np.where(pmf > 0.0, scale, 0.0)
         self._scale = lanes(table)
         self.count = int((weights > 0.0).sum())
@@ -74,14 +82,14 @@ class SharpEmitters:
     def state(self) -> Any:
         """Arrays that the methods read."""
         sun = self._sun and self._sun.state
-        return self._sharp, self._scale, sun, self._first, self._pmf, self._soft_share, self._soft
+        return self._sharp, self._scale, self._zero, sun, self._first, self._pmf, self._soft_share, self._soft
 
     def estimate(
         self,
         si: Any,
         sampler: Any,
         evaluate: Callable[[Any], Sequence[tuple[Any, Any]]],
-        parts: int,
+        factors: Sequence[Any],
         active: Any,
     ) -> list[Any]:
         """Radiance that lobes of a surface reflect of the light of sharp emitters, MIS-weighted.
@@ -97,8 +105,8 @@ class SharpEmitters:
         evaluate
             By incident direction in world space: of each lobe the BSDF times the cosine, and the density with
             which it is sampled.
-        parts
-            Number of lobes.
+        factors
+            Of each lobe in the choice among the emitters of a group.
         active : Bool
 
         Returns
@@ -108,18 +116,20 @@ class SharpEmitters:
         """
         groups = min(self._sharp_count, SHADOW_RAYS)
         size = self._sharp_count / max(groups, 1)  # emitters of a group
-        found = [Array3f(0)] * parts
+        found = [Array3f(0)] * len(factors)
         for group in range(groups):
 
-            def candidate(place: Any, group: int = group) -> tuple[Any, tuple[Any, ...]]:
-                number = dr.minimum(UInt((group + place.x) * size), self._sharp_count - 1)
+            def candidate(place: Any, group: int = group) -> tuple[Any, Contributions]:
+                at = (group + place.x) * size
+                number = dr.minimum(UInt(at), self._sharp_count - 1)
+                within = mi.Point2f(dr.minimum(at - Float(number), BELOW_ONE), place.y)
                 index = dr.gather(UInt, self._sharp, number)
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
-                sample, radiance = emitter.sample_direction(si, place, active)
+                sample, radiance = emitter.sample_direction(si, within, active)
                 pdf = dr.select(sample.delta, dr.inf, sample.pdf / size)
                 return sample.p, _weighted(evaluate(sample.d), radiance * size, pdf)
 
-            target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler, parts)
+            target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler, factors)
             found = _added(found, self._shadow_rays.unoccluded(si, target, chosen, active))
         if self._sun is not None:
             direction, radiance, pdf = self._sun.sample(sampler)
@@ -138,13 +148,14 @@ class SharpEmitters:
             Divided by the density; without occluders.
         """
         if self._soft is None:
-            return dr.zeros(mi.DirectionSample3f, dr.width(si)), mi.Color3f(0)
+            sample = dr.zeros(mi.DirectionSample3f, dr.width(si))
+            sample.pdf = self._zero + dr.zeros(Float, dr.width(si))
+            return sample, mi.Color3f(self._zero)
         index, within, _ = self._soft.sample(sample_point.x)
         first, pmf = dr.gather(Float, self._first, index), dr.gather(Float, self._pmf, index)
         point = mi.Point2f(dr.minimum(first + within * pmf, BELOW_ONE), sample_point.y)
         sample, radiance = self._scene.sample_emitter_direction(si, point, False, active)
-        is_sharp = self._is_environment(sample) & self._is_sun(sample.d)
-        is_soft = active & ~sample.delta & ~is_sharp
+        is_soft = active & ~sample.delta & ~self._is_sun(sample.emitter, sample.d)
         sample.pdf = dr.select(is_soft, sample.pdf / self._soft_share, 0.0)
         return sample, dr.select(is_soft, radiance * self._soft_share, 0.0)
 
@@ -167,22 +178,20 @@ class SharpEmitters:
         found = pdf * dr.gather(Float, self._scale, _number(emitter))
         if self._sun is None:
             return found
-        is_sun = (emitter == mi.EmitterPtr(self._scene.environment())) & self._is_sun(direction)
-        return dr.select(is_sun, self._sun.pdf(direction), found)
+        return dr.select(self._is_sun(emitter, direction), self._sun.pdf(direction), found)
 
-    def _is_sun(self, direction: Any) -> Any:
-        """Whether the environment shows the sun in a direction in world space; Bool."""
-        return Bool(False) if self._sun is None else self._sun.contains(direction)
-
-    def _is_environment(self, sample: Any) -> Any:
-        return sample.emitter == mi.EmitterPtr(self._scene.environment())
+    def _is_sun(self, emitter: Any, direction: Any) -> Any:
+        """Whether an emitter (mitsuba.EmitterPtr) is the environment, and a direction is that of the sun."""
+        if self._sun is None:
+            return Bool(False)
+        return (emitter == mi.EmitterPtr(self._scene.environment())) & self._sun.contains(direction)
 
 
 def mis_weight(pdf: Any, other_pdf: Any) -> Any:
     """Veach's power heuristic: 0 where both densities are 0, 1 where the first is infinite."""
     ratio = dr.select(pdf == dr.inf, 0.0, other_pdf / pdf)
     weight = dr.rcp(1.0 + ratio * ratio)
-    return dr.select(pdf > 0.0, weight, 0.0)
+    return dr.select((pdf > 0.0) & dr.isfinite(weight), weight, 0.0)
 
 
 def _weighted(lobes: Sequence[tuple[Any, Any]], radiance: Any, pdf: Any) -> tuple[Any, ...]:

@@ -12,7 +12,7 @@ from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
-from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, resample
+from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
@@ -104,8 +104,8 @@ class LightTransport:
             lobes = [(_divided(value, albedo), pdf)]
             return [*lobes, self._lobes.eval_specular(si, bsdf, wo, is_glossy)] if specular else lobes
 
-        active = is_diffuse | is_glossy
-        found = self.sharp_emitters.estimate(si, sampler, evaluate, 1 + specular, active)
+        active, factors = is_diffuse | is_glossy, [albedo, 1.0][: 2 if specular else 1]
+        found = self.sharp_emitters.estimate(si, sampler, evaluate, factors, active)
         return found[0], found[1] if specular else Array3f(0)
 
     def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
@@ -174,7 +174,7 @@ class LightTransport:
         The point is chosen among one candidate for each of the emitters, or :data:`MOST_CANDIDATES`.
         """
 
-        def candidate(place: Any) -> tuple[Any, Any]:
+        def candidate(place: Any) -> tuple[Any, Contributions]:
             if soft_only:
                 emitter, radiance = self.sharp_emitters.sample_soft(si, place, active)
             else:
