@@ -119,7 +119,7 @@ def test_the_light_of_a_small_lamp_counts_once(tmp_path, others):
     renderer = opened(tmp_path, sky + BULB.format(0.02, "0.33, 0.5, 0.28", "40, 60, 80") + far)
     assert dr.width(renderer.state[-1][0]) == 1 + others
     count = 1 << 16
-    origin, beside = np.array([0.6, 0.05, 0.28]), np.array([0.3, 0.5, 0.28])
+    origin, beside = np.array([0.6, 0.05, 0.28]), np.array([0.3, 0.48, 0.27])
     rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, count) for of in (origin, beside - origin)))
     sampler = one_sequence(count)
     point = renderer.intersect(rays)
