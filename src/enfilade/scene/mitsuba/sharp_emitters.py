@@ -19,7 +19,6 @@ from enfilade.scene.mitsuba.sun import find_sun
 SHADOW_RAYS = 4  # beside that to the sun
 SMALL = 0.08  # half the width of a small lamp, over the mean distance of what it lights
 DISTANCE_RAYS = 256  # for this mean
-MOST_LAMPS = 16  # small ones: of more, shadow rays would meet a few at random
 
 
 class SharpEmitters:
@@ -45,7 +44,7 @@ class SharpEmitters:
         is_small = np.array(
             [w > 0.0 and _is_small(scene, e) for e, w in zip(emitters, weights, strict=True)], bool
         )
-        if is_small.sum() > MOST_LAMPS:
+        if is_small.sum() > SHADOW_RAYS:  # the noise of a choice among them costs more than it gains
             is_small[:] = False
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
         self._sharp_count = int(is_sharp.sum())
