@@ -57,9 +57,8 @@ class SharpEmitters:
         soft = np.where(is_sharp, 0.0, pmf)
         self._soft_share = opaque(max(float(soft.sum()), 1e-30))
         self._soft = Discrete.of(soft) if soft.any() else None
-        self._zero = opaque(
-            0.0
-        )  # a literal has the size of its lanes, which a recorded kernel does not adapt
+        # A literal zero has the size of its lanes, which a recorded kernel does not adapt.
+        self._zero = opaque(0.0)
         self.soft_count = int((soft > 0.0).sum())
 
         # Factors from the scene's density of an emitter to that of its own estimate, by its number in the
