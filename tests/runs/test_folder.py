@@ -245,7 +245,9 @@ def test_a_file_that_another_host_has_written_may_come_late(folder, monkeypatch)
         file = finish(run, "light", 1)
         file.unlink()
         waiting = pool.submit(run.file_of, "light", 1)
-        file.write_bytes(b"pixels")
+        written = folder / "written"
+        written.write_bytes(b"pixels")
+        written.rename(file)  # whole at once, as tasks publish their files
         assert waiting.result() == file
 
 
