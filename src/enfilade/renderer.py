@@ -60,7 +60,7 @@ class RandomKey:
 
 
 class Branch(IntEnum):
-    """The branch of a path at a clear interface, such as a smooth pane of glass."""
+    """The branch of a path at an interface, such as that of glass."""
 
     REFLECTED = 1
     TRANSMITTED = 2
@@ -188,7 +188,7 @@ class BsdfSample:
         Radiance reflected by the lobe from sampled emitters (next-event estimation).
     is_alive : Bool
     is_split : Bool
-        Whether this is one of two branches of a clear interface: with :attr:`Branch.REFLECTED` or
+        Whether this is one of two branches of an interface: with :attr:`Branch.REFLECTED` or
         :attr:`Branch.TRANSMITTED`, and a throughput that is that of the branch.
     is_passed : Bool
         Whether this is such a null interaction.
@@ -409,7 +409,7 @@ class LobeRenderer(Renderer, Protocol):
         choice : Float
             Selects the lobe, in [0, 1), transmission last; random by default.
         branch : UInt
-            :class:`Branch` of each lane at clear interfaces; random by default. A sum over both branches has
+            :class:`Branch` of each lane at interfaces; random by default. A sum over both branches has
             no noise of their choice. Other lobes are sampled as usual.
         soft_only
             As of :meth:`sample_diffuse`.

@@ -199,7 +199,7 @@ class Integrator:
         count = count or dr.width(path.lane)
         light, deferred = Contributions(SPECULAR_AOVS * count), _Deferred()  # one AOV after the other
 
-        # Bounce off the visible surface: all paths, then the other branch at clear interfaces.
+        # Bounce off the visible surface: all paths, then the other branch at interfaces.
         onward = []
         while dr.width(path.lane):
             ahead, path = self._bounce(light, cache, path, deferred, transmitted_at=count)
@@ -333,7 +333,7 @@ class Integrator:
         onward : Path
             Paths that meet another specular lobe.
         other : Path
-            Paths at clear interfaces, whose other branch is left to follow.
+            Paths at interfaces, whose other branch is left to follow.
         """
         # Jitter smooths the hash grid's entries where they are seen, not where they light another surface.
         jitter = 0.0 if path.bounce else JITTER

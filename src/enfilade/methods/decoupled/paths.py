@@ -35,7 +35,7 @@ class Path:
     bounces : UInt
         Made so far.
     branch : UInt
-        :class:`Branch` that it follows at the next clear interface.
+        :class:`Branch` that it follows at the next interface.
     """
 
     lane: Any

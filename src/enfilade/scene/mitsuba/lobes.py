@@ -14,6 +14,7 @@ lobe; it may be negative. A mask over a Lambertian BSDF has nothing but its null
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import drjit as dr
@@ -31,7 +32,8 @@ WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the B
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
-CLEAR = {"SmoothDielectric", "ThinDielectric"}  # their sample chooses reflection first
+CLEAR = {"SmoothDielectric", "ThinDielectric"}
+GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
@@ -70,6 +72,7 @@ class Lobes:
         self._turned = bsdf_table(scene, _is_turned)
         self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
+        self._rough_ior = bsdf_table(scene, _rough_ior, Float)
         self._has_whole = bool(dr.any(self._whole))
         self._has_own_albedo = bool(dr.any(self._own_albedo))
         self._specular_albedo = self._mean_specular_albedo(scene)
@@ -78,7 +81,8 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read."""
         albedos = self._own_albedo, self._bases, self._turned, self._masked, self._specular_albedo
-        return self._whole, self._lambertian, self._sides, self._clear, albedos
+        interfaces = self._clear, self._rough_ior
+        return self._whole, self._lambertian, self._sides, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -163,6 +167,10 @@ class Lobes:
         """Whether a BSDF is a clear interface: it reflects or transmits, in one direction each."""
         return _of(self._clear, si, bsdf)
 
+    def is_rough_interface(self, si: Any, bsdf: Any) -> Any:
+        """Whether a BSDF is a rough interface: it reflects or transmits, by one lobe each."""
+        return _of(self._rough_ior, si, bsdf) > 0.0
+
     def sample_specular(
         self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, ...]:
@@ -171,8 +179,8 @@ class Lobes:
         The difference between a whole BSDF and its Lambertian lobe is sampled by either, the latter with half
         of its albedo as probability, so that the weight stays bounded where only one of them is large. Paths
         pass a masked Lambertian BSDF: only its null interaction counts. A given `choice` of the
-        lobe, 0..1, yields a direction of that lobe, and a weight without meaning. A branch of a clear
-        interface has its own weight: what is reflected, or transmitted.
+        lobe, 0..1, yields a direction of that lobe, and a weight without meaning. A branch of an interface
+        has its own weight: what is reflected, or transmitted; the density remains that of both.
         """
         is_whole = _of(self._whole, si, bsdf)
         first, second = sampler.next_1d(), mi.Point2f(sampler.next_2d())
@@ -183,9 +191,11 @@ class Lobes:
         if choice is not None:
             first, by_bsdf = choice, Bool(True)
         if branch is not None:
-            is_clear = self.is_clear(si, bsdf)
-            of_branch = dr.select(branch == int(Branch.REFLECTED), 0.0, ALMOST_ONE)
-            first = dr.select(is_clear, of_branch, first)
+            # The first number chooses the branch: reflection at 0, but of `principled` at 1.
+            is_clear, is_rough = self.is_clear(si, bsdf), self.is_rough_interface(si, bsdf)
+            is_reflected = branch == int(Branch.REFLECTED)
+            is_first = is_reflected ^ is_whole
+            first = dr.select(is_clear | is_rough, dr.select(is_first, 0.0, ALMOST_ONE), first)
         sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
         whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
@@ -194,7 +204,8 @@ class Lobes:
 
         # Weigh a sample of the mixture; a delta lobe only has the density of the BSDF.
         wo = dr.select(by_bsdf, whole.wo, _cosine_direction(si, second))
-        difference, pdf = self._difference(si, bsdf, wo, albedo, is_whole & ~is_delta)
+        is_failed = by_bsdf & (dr.max(whole_weight) == 0.0)  # such as a reflection to below the surface
+        difference, pdf = self._difference(si, bsdf, wo, albedo, is_whole & ~is_delta & ~is_failed)
         difference = dr.select(pdf > 0.0, difference / pdf, 0.0)
         difference = dr.select(is_delta, whole_weight * dr.rcp(share), difference)
         pdf = dr.select(is_delta, whole.pdf, pdf)
@@ -205,11 +216,13 @@ class Lobes:
             difference, pdf = dr.select(is_masked, passed, difference), dr.select(is_masked, 1.0, pdf)
             wo = dr.select(is_masked, -si.wi, wo)
             is_null, is_delta = is_null | is_masked, is_delta | is_masked
+        wo, weight = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, difference, weight)
+        pdf = dr.select(is_whole, pdf, sample.pdf)
         if branch is not None:
-            weight = dr.select(is_clear, weight * sample.pdf, weight)
-
-        wo, pdf = dr.select(is_whole, wo, sample.wo), dr.select(is_whole, pdf, sample.pdf)
-        return wo, pdf, dr.select(is_whole, difference, weight), is_delta, is_null
+            of_branch = self._reflectance(si, bsdf, wo)
+            of_branch = dr.select(is_reflected, of_branch, 1.0 - of_branch)
+            weight *= dr.select(is_clear, sample.pdf, dr.select(is_rough, of_branch, 1.0))
+        return wo, pdf, weight, is_delta, is_null
 
     def _mean_specular_albedo(self, scene: Any) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
@@ -234,6 +247,13 @@ class Lobes:
         total = np.bincount(entry, np.array(value)[valid], minlength=size)
         mean = np.where(count >= MIN_ALBEDO_SAMPLES, total / np.maximum(count, 1), 1.0)
         return Float(mean.astype(np.float32))
+
+    def _reflectance(self, si: Any, bsdf: Any, wo: Any) -> Any:
+        """Probability with which the sample of a rough interface reflects, at the facet that it met."""
+        ior = dr.maximum(_of(self._rough_ior, si, bsdf), 1e-3)
+        ratio = dr.select(si.wi.z > 0.0, ior, dr.rcp(ior))
+        facet = dr.normalize(si.wi + wo * dr.select(si.wi.z * wo.z > 0.0, 1.0, ratio))
+        return mi.fresnel(dr.dot(si.wi, dr.mulsign(facet, facet.z)), ior)[0]
 
     def _difference(self, si: Any, bsdf: Any, wo: Any, albedo: Any, active: Any) -> tuple[Any, Any]:
         """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""
@@ -279,6 +299,21 @@ def _nested(bsdf: Any) -> list[Any]:
     """BSDFs nested directly in a BSDF."""
     hierarchy = mi.traverse(bsdf).hierarchy.items()
     return [node for node, (_, depth) in hierarchy if depth == 1 and isinstance(node, mi.BSDF)]
+
+
+def _rough_ior(bsdf: Any) -> float:
+    """Relative index of refraction of a rough interface; 0 of other BSDFs."""
+    parameters = mi.traverse(bsdf)
+    if bsdf.class_name() == "Principled":
+        if any(f"{name}.value" not in parameters for name in GLASS):
+            return 0.0
+        if any(parameters[f"{name}.value"] != value for name, value in GLASS.items()):
+            return 0.0
+        if "specular" in parameters:
+            return float(2.0 / (1.0 - math.sqrt(0.08 * parameters["specular"][0])) - 1.0)
+    elif bsdf.class_name() != "RoughDielectric":
+        return 0.0
+    return float(parameters["eta"][0])
 
 
 def _is_turned(bsdf: Any) -> bool:

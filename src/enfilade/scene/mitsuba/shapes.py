@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, UInt
+from enfilade.arrays import Bool, Float, UInt
 from enfilade.records import SurfaceClass
 from enfilade.scene.mitsuba.merge import MergedScene
 
@@ -105,11 +105,12 @@ def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any
     value
         Of a BSDF.
     kind
-        Bool or UInt.
+        Bool, UInt or Float.
     """
     bsdfs = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
     registry = [registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
-    table = np.zeros(max(registry, default=0) + 1, bool if kind is Bool else np.uint32)
+    dtype = {Bool: np.bool_, UInt: np.uint32, Float: np.float32}[kind]
+    table = np.zeros(max(registry, default=0) + 1, dtype)
     table[registry] = [value(bsdf) for bsdf in bsdfs]
     return kind(table)
 

@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool, UInt
 from enfilade.records import MIN_DIFFUSE_ALBEDO
-from enfilade.renderer import Bounce, BsdfSample, Rays, ShadingPoint
+from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
@@ -139,10 +139,14 @@ class LightTransport:
         si = point.native
         bsdf = si.bsdf()
         wo, pdf, weight, is_delta, is_null = self._lobes.sample_specular(si, bsdf, sampler, choice, branch)
-        # Total reflection has a density of one, and no other branch.
-        is_split = point.has_specular & self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
+        # Total reflection at a clear interface has a density of one, and no other branch.
+        is_split = self._lobes.is_clear(si, bsdf) & (pdf < 1.0)
         # Delta lobes reflect nothing from a sampled point: spare its shadow ray.
         has_glossy = point.has_specular & self._lobes.has_glossy(si, bsdf)
+        if branch is not None:
+            is_rough = self._lobes.is_rough_interface(si, bsdf)
+            is_split |= is_rough
+            has_glossy &= ~is_rough | (branch == int(Branch.REFLECTED))  # that of both branches at once
         direct = self._next_event(
             si, bsdf, self._lobes.eval_specular, sampler, has_glossy, soft_only=soft_only
         )
@@ -155,7 +159,7 @@ class LightTransport:
             throughput=Array3f(weight),
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
-            is_split=Bool(is_split & (branch is not None)),
+            is_split=Bool(point.has_specular & is_split & (branch is not None)),
             is_passed=is_passed,
         )
 

@@ -1,0 +1,85 @@
+"""Both branches of rough interfaces: reflection and transmission together are what one random choice is."""
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from enfilade.arrays import Array3f, Bool, UInt, rows
+from enfilade.kernels.random import one_sequence
+from enfilade.renderer import Branch, Rays
+from support.mitsuba_scene import opened, rgb, write
+
+COUNT = 1 << 17
+GLASS = '<float name="spec_trans" value="1"/><float name="roughness" value="0.4"/>'
+INTERFACES = {
+    "rough dielectric": '<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>',
+    "principled": f'<bsdf type="principled">{GLASS}<float name="eta" value="1.5"/></bsdf>',
+    "of a given specular": f'<bsdf type="principled">{GLASS}<float name="specular" value="0.8"/></bsdf>',
+}
+OTHERS = {
+    "partly transmitting": '<bsdf type="principled"><float name="spec_trans" value="0.5"/></bsdf>',
+    "metallic": f'<bsdf type="principled">{GLASS}<float name="metallic" value="0.5"/></bsdf>',
+    "rough metal": '<bsdf type="roughconductor"/>',
+}
+
+
+def plane(folder, bsdf):
+    """A plane, under a lamp that shadow rays find."""
+    emitter = f'<emitter type="area">{rgb("radiance", 3, 3, 3)}</emitter>'
+    lamp = (
+        '<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/>'
+        f'<translate x="0.8" z="2"/></transform>{emitter}</shape>'
+    )
+    return opened(write(folder, f'<shape type="rectangle">{bsdf}</shape>{lamp}'))
+
+
+def scattered(renderer, angle, from_above=True, branch=None):
+    """Samples at the plane, for a viewer at an angle, degrees, from its normal."""
+    tilt = np.radians(angle)
+    away = np.array([np.sin(tilt), 0.0, np.cos(tilt) if from_above else -np.cos(tilt)])
+    rays = Rays(*(Array3f(*map(float, of)) + dr.zeros(Array3f, COUNT) for of in (away, -away)))
+    point, lanes = renderer.intersect(rays), dr.opaque(UInt, branch or 0, COUNT)
+    return renderer.sample_specular(point, one_sequence(COUNT), branch=None if branch is None else lanes)
+
+
+def moments(sample):
+    """Means of what a constant sky, and one that changes from side to side, contribute; and of the lamp."""
+    weight = dr.select(sample.is_alive, sample.throughput, 0.0)
+    parts = weight, weight * sample.rays.direction.x, sample.direct
+    return np.array([rows(part)[:, 0].mean(dtype=float) for part in parts])
+
+
+@pytest.mark.parametrize("from_above", [True, False])
+@pytest.mark.parametrize("name", INTERFACES)
+def test_branches_add_up_to_the_whole(tmp_path, name, from_above):
+    renderer = plane(tmp_path, INTERFACES[name])
+    angle = 38.0  # from below, many facets reflect totally
+    whole = scattered(renderer, angle, from_above)
+    parts = [scattered(renderer, angle, from_above, int(branch)) for branch in Branch]
+    assert dr.all(parts[0].is_split)
+    assert not dr.any(whole.is_split)
+    assert sum(map(moments, parts)) == pytest.approx(moments(whole), abs=0.004)
+    # Each has light of its own side alone, and the lamp is counted once.
+    for sample, side in zip(parts, (1, -1) if from_above else (-1, 1), strict=True):
+        counts = sample.is_alive & (dr.max(sample.throughput) > 0.0)
+        assert dr.all(~counts | (sample.rays.direction.z * side > 0.0))
+    assert not np.any(rows(parts[1].direct))
+    assert np.any(rows(parts[0].direct)) == np.any(rows(whole.direct))
+
+
+def test_a_reflection_is_as_strong_as_its_share(tmp_path):
+    """Of glass, 4 % along the normal: in every sample, not in one of 25."""
+    renderer = plane(tmp_path, INTERFACES["principled"])
+    reflected = scattered(renderer, 0.0, branch=int(Branch.REFLECTED))
+    weight = rows(reflected.throughput)[np.array(Bool(reflected.is_alive)), 0]
+    assert len(weight) > 0.9 * COUNT
+    assert weight.mean() == pytest.approx(0.04, rel=0.1)
+    assert weight.std() < 0.25 * weight.mean()
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_materials_are_left_to_chance(tmp_path, name):
+    renderer = plane(tmp_path, OTHERS[name])
+    one, other = (scattered(renderer, 20.0, branch=int(branch)) for branch in Branch)
+    assert not dr.any(one.is_split | other.is_split)
+    assert moments(one) == pytest.approx(moments(other))
