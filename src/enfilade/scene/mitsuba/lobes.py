@@ -253,7 +253,7 @@ class Lobes:
         ior = dr.maximum(_of(self._rough_ior, si, bsdf), 1e-3)
         ratio = dr.select(si.wi.z > 0.0, ior, dr.rcp(ior))
         facet = dr.normalize(si.wi + wo * dr.select(si.wi.z * wo.z > 0.0, 1.0, ratio))
-        return mi.fresnel(dr.dot(si.wi, dr.mulsign(facet, facet.z)), ior)[0]
+        return mi.fresnel(dr.select(facet.z > 0.0, 1.0, -1.0) * dr.dot(si.wi, facet), ior)[0]
 
     def _difference(self, si: Any, bsdf: Any, wo: Any, albedo: Any, active: Any) -> tuple[Any, Any]:
         """A whole BSDF minus its Lambertian lobe, and the density of the mixture of both."""

@@ -109,8 +109,7 @@ def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any
     """
     bsdfs = [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
     registry = [registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
-    dtype = {Bool: np.bool_, UInt: np.uint32, Float: np.float32}[kind]
-    table = np.zeros(max(registry, default=0) + 1, dtype)
+    table = np.array(kind(0)).repeat(max(registry, default=0) + 1)
     table[registry] = [value(bsdf) for bsdf in bsdfs]
     return kind(table)
 
