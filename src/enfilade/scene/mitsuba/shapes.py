@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, Float, UInt
+from enfilade.arrays import Bool, UInt
 from enfilade.records import SurfaceClass
 from enfilade.scene.mitsuba.merge import MergedScene
 
