@@ -190,6 +190,8 @@ class BsdfSample:
     is_split : Bool
         Whether this is one of two branches of an interface: with :attr:`Branch.REFLECTED` or
         :attr:`Branch.TRANSMITTED`, and a throughput that is that of the branch.
+    is_image : Bool
+        Whether the lobe shows images: it is a delta lobe, or hardly wider.
     is_passed : Bool
         Whether this is such a null interaction.
     """
@@ -200,6 +202,7 @@ class BsdfSample:
     direct: Any
     is_alive: Any
     is_split: Any
+    is_image: Any
     is_passed: Any
 
 

@@ -11,10 +11,20 @@ from enfilade.renderer import Rays
 from support.analytic_truth import projected
 from support.mitsuba_scene import BITMAP_MASK, DIFFUSE, HOLES, opened, placed, rgb, veil, write, write_holes
 
+POLISHED = '<float name="metallic" value="1"/><float name="roughness" value="0"/>'
 MATERIALS = {
     "paint": (DIFFUSE, SurfaceClass.DIFFUSE),
     "both sides": (f'<bsdf type="twosided">{DIFFUSE}</bsdf>', SurfaceClass.DIFFUSE),
     "brushed": ('<bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf>', SurfaceClass.GLOSSY),
+    "polished": (
+        '<bsdf type="roughconductor"><float name="alpha" value="0.002"/></bsdf>',
+        SurfaceClass.MIRROR,
+    ),
+    "polished, principled": (f'<bsdf type="principled">{POLISHED}</bsdf>', SurfaceClass.MIRROR),
+    "coated": (
+        f'<bsdf type="principled">{POLISHED}<float name="clearcoat" value="1"/></bsdf>',
+        SurfaceClass.GLOSSY,
+    ),
     "chrome": ('<bsdf type="conductor"/>', SurfaceClass.MIRROR),
     "chrome both sides": ('<bsdf type="twosided"><bsdf type="conductor"/></bsdf>', SurfaceClass.MIRROR),
     "glass": ('<bsdf type="dielectric"/>', SurfaceClass.TRANSPARENT),

@@ -1,6 +1,7 @@
 """Virtual images: apparent positions of surfaces seen in mirrors and through glass."""
 
 import numpy as np
+import pytest
 
 from enfilade.gbuffer import find_geometry, positions
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
@@ -39,6 +40,44 @@ def test_rough_glass_has_no_virtual_image(tmp_path):
     np.testing.assert_array_equal(shown.shape_index[rough], seen.shape_index[rough])
     np.testing.assert_array_equal(shown.depth[rough], seen.depth[rough])
     assert (shown.shape_index[glass] >= IN_VIRTUAL_IMAGE).all()
+
+
+IOR = '<float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/>'
+SMOOTH = {
+    "metal": '<bsdf type="conductor"/>',
+    "both sides": '<bsdf type="twosided"><bsdf type="conductor"/></bsdf>',
+    "glass": f'<bsdf type="dielectric">{IOR}</bsdf>',
+}
+PRINCIPLED = (
+    '<bsdf type="principled"><float name="eta" value="1.5"/><float name="roughness" value="{}"/>{}</bsdf>'
+)
+METALLIC, CLEAR = (f'<float name="{name}" value="1"/>' for name in ("metallic", "spec_trans"))
+
+
+def of_roughness(roughness):
+    alpha = f'<float name="alpha" value="{roughness**2}"/>'
+    plugins = {
+        "metal": f'<bsdf type="roughconductor">{alpha}</bsdf>',
+        "both sides": f'<bsdf type="twosided"><bsdf type="roughconductor">{alpha}</bsdf></bsdf>',
+        "glass": f'<bsdf type="roughdielectric">{alpha}{IOR}</bsdf>',
+    }
+    metal, glass = (PRINCIPLED.format(roughness, kind) for kind in (METALLIC, CLEAR))
+    both_sides = f'<bsdf type="twosided">{metal}</bsdf>'
+    return [plugins, {"metal": metal, "both sides": both_sides, "glass": glass}]
+
+
+@pytest.mark.parametrize("kind", [0, 1], ids=["plugins", "principled"])
+def test_nearly_smooth_lobes_show_the_images_of_smooth_ones(tmp_path, kind):
+    def images(balls):
+        renderer = opened_scene(tmp_path, balls)
+        seen = find_geometry(renderer, front_camera())
+        is_ball = np.isin(seen.shape_index, [renderer.describe().shapes.index(n) + 1 for n in balls])
+        return np.array([image.shape_index[is_ball] for image in VirtualImages(renderer).find(seen)])
+
+    smooth = images(SMOOTH)
+    assert (smooth[0] >= IN_VIRTUAL_IMAGE).all()
+    assert np.mean(images(of_roughness(0.03)[kind]) == smooth) > 0.9
+    assert (images(of_roughness(0.2)[kind]) < IN_VIRTUAL_IMAGE).all()
 
 
 def test_surfaces_behind_a_pane_keep_their_positions(tmp_path):

@@ -268,7 +268,7 @@ def _aov_lane(path: Path, point: ShadingPoint, sample: BsdfSample, transmitted_a
     normal, bounce = point.surfaces.normal, sample.bounce
     is_through = dr.dot(normal, path.rays.direction) * dr.dot(normal, sample.rays.direction) > 0.0
     if path.bounce is None:
-        return path.lane + dr.select(bounce.is_delta & is_through, transmitted_at, 0)
+        return path.lane + dr.select(sample.is_image & is_through, transmitted_at, 0)
     is_clear = bounce.is_delta & (point.surfaces.surface == int(SurfaceClass.TRANSPARENT))
     is_back = is_clear & ~is_through & (bounce.pdf < BELOW_TOTAL) & (path.lane >= transmitted_at)
     return path.lane - dr.select(is_back, transmitted_at, 0)

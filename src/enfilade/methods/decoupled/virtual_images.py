@@ -154,7 +154,7 @@ class VirtualImages:
         shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)
         # Give the sky a single normal, so that the filter treats it as one surface.
         normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
-        is_image = sample.is_alive & sample.bounce.is_delta
+        is_image = sample.is_alive & sample.is_image
         is_sharp &= surfaces.is_hit & is_image
         return ahead, shape_index, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
 

@@ -35,6 +35,8 @@ LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: La
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24
+# Largest roughness (alpha) of a lobe that shows images: it blurs them by 0.3 degrees.
+SHARP_ALPHA = 0.0025
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
 ALBEDO_SAMPLES, ALBEDO_SEED = 1 << 18, 1
@@ -73,6 +75,7 @@ class Lobes:
         self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._rough_ior = bsdf_table(scene, _rough_ior, Float)
+        self._narrow = bsdf_table(scene, _is_narrow)
         self._has_whole = bool(dr.any(self._whole))
         self._has_own_albedo = bool(dr.any(self._own_albedo))
         self._specular_albedo = self._mean_specular_albedo(scene)
@@ -81,7 +84,7 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read."""
         albedos = self._own_albedo, self._bases, self._turned, self._masked, self._specular_albedo
-        interfaces = self._clear, self._rough_ior
+        interfaces = self._clear, self._rough_ior, self._narrow
         return self._whole, self._lambertian, self._sides, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
@@ -171,6 +174,10 @@ class Lobes:
         """Whether a BSDF is a rough interface: it reflects or transmits, by one lobe each."""
         return _of(self._rough_ior, si, bsdf) > 0.0
 
+    def is_narrow(self, si: Any, bsdf: Any) -> Any:
+        """Whether all lobes of a BSDF are narrow enough to show images, as those of a mirror do."""
+        return _of(self._narrow, si, bsdf)
+
     def sample_specular(
         self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None
     ) -> tuple[Any, ...]:
@@ -189,7 +196,8 @@ class Lobes:
         share = _bsdf_share(albedo)
         by_bsdf = sampler.next_1d() < share
         if choice is not None:
-            first, by_bsdf = choice, Bool(True)
+            is_last = is_whole & self.is_rough_interface(si, bsdf)  # `principled` chooses reflection last
+            first, by_bsdf = dr.select(is_last, 1.0 - choice, choice), Bool(True)
         if branch is not None:
             # The first number chooses the branch: reflection at 0, but of `principled` at 1.
             is_clear, is_rough = self.is_clear(si, bsdf), self.is_rough_interface(si, bsdf)
@@ -301,19 +309,37 @@ def _nested(bsdf: Any) -> list[Any]:
     return [node for node, (_, depth) in hierarchy if depth == 1 and isinstance(node, mi.BSDF)]
 
 
+def _constant(bsdf: Any, name: str) -> float:
+    """A parameter that is the same at all points; not a number if it is not, or if there is none."""
+    value = np.unique(np.array(mi.traverse(bsdf).get(f"{name}.value", [])))
+    return float(value[0]) if len(value) == 1 else math.nan
+
+
 def _rough_ior(bsdf: Any) -> float:
     """Relative index of refraction of a rough interface; 0 of other BSDFs."""
-    parameters = mi.traverse(bsdf)
-    if bsdf.class_name() == "Principled":
-        if any(f"{name}.value" not in parameters for name in GLASS):
-            return 0.0
-        if any(parameters[f"{name}.value"] != value for name, value in GLASS.items()):
-            return 0.0
-        if "specular" in parameters:
-            return float(2.0 / (1.0 - math.sqrt(0.08 * parameters["specular"][0])) - 1.0)
-    elif bsdf.class_name() != "RoughDielectric":
+    is_glass = all(_constant(bsdf, name) == value for name, value in GLASS.items())
+    if not is_glass and bsdf.class_name() != "RoughDielectric":
         return 0.0
+    parameters = mi.traverse(bsdf)
+    if "specular" in parameters:
+        return float(2.0 / (1.0 - math.sqrt(0.08 * parameters["specular"][0])) - 1.0)
     return float(parameters["eta"][0])
+
+
+def _is_narrow(bsdf: Any) -> bool:
+    """Whether a BSDF is a metal or an interface with lobes that are narrow enough to show images."""
+    if bsdf.class_name() == "TwoSidedBRDF":
+        return all(map(_is_narrow, _nested(bsdf)))
+    if bsdf.class_name() == "Principled":
+        is_metal = _constant(bsdf, "metallic") == 1.0 and _constant(bsdf, "clearcoat") == 0.0
+        alpha = _constant(bsdf, "roughness") ** 2
+        return (is_metal or _rough_ior(bsdf) > 0.0) and alpha <= SHARP_ALPHA
+    if bsdf.class_name() not in {"RoughConductor", "RoughDielectric"}:
+        return False
+    return any(
+        all(_constant(bsdf, name) <= SHARP_ALPHA for name in names)
+        for names in (("alpha",), ("alpha_u", "alpha_v"))
+    )
 
 
 def _is_turned(bsdf: Any) -> bool:

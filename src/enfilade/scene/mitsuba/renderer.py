@@ -212,13 +212,14 @@ class MitsubaRenderer:
         bsdf = si.bsdf(mi.RayDifferential3f(ray))
         normal = si.sh_frame.n
         normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
+        is_narrow = self._lobes.is_narrow(si, bsdf)
         surfaces = Surfaces(
             is_hit=is_hit,
             distance=distance / length,
             normal=Array3f(normal),
             albedo=Array3f(self._lobes.albedo(si, bsdf, is_hit)),
             shape_index=self._shapes.index(si),
-            surface=surface_class(bsdf.flags(), si.shape.is_emitter(), is_hit),
+            surface=surface_class(bsdf.flags(), is_narrow, si.shape.is_emitter(), is_hit),
         )
         return surfaces, si
 

@@ -114,12 +114,12 @@ def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any
     return kind(table)
 
 
-def surface_class(flags: Any, is_emitter: Any, is_hit: Any) -> Any:
-    """``records.SurfaceClass`` of a BSDF with these flags; UInt."""
+def surface_class(flags: Any, is_narrow: Any, is_emitter: Any, is_hit: Any) -> Any:
+    """``records.SurfaceClass`` of a BSDF with these flags, whose lobes may all show images; UInt."""
     refracts = has_lobe(flags, "DeltaTransmission", "GlossyTransmission")
-    mirrors = has_lobe(flags, "DeltaReflection")
-    is_glossy = has_lobe(flags, "GlossyReflection")
-    is_broad = is_glossy | has_lobe(flags, "DiffuseReflection", "DiffuseTransmission")
+    mirrors = has_lobe(flags, "DeltaReflection") | is_narrow
+    is_glossy = has_lobe(flags, "GlossyReflection") & ~is_narrow
+    is_broad = is_glossy | (has_lobe(flags, "DiffuseReflection", "DiffuseTransmission") & ~is_narrow)
     is_thin_glass = has_lobe(flags, "Null") & mirrors & ~is_broad
 
     surface = UInt(SurfaceClass.DIFFUSE)

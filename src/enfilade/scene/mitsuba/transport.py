@@ -123,6 +123,7 @@ class LightTransport:
             direct=Array3f(direct),
             is_alive=Bool(active & (pdf > 0.0)),
             is_split=Bool(False),
+            is_image=Bool(False),
             is_passed=Bool(False),
         )
 
@@ -160,6 +161,7 @@ class LightTransport:
             direct=Array3f(direct),
             is_alive=Bool(point.has_specular & (pdf > 0.0)),
             is_split=Bool(point.has_specular & is_split & (branch is not None)),
+            is_image=Bool(is_delta | self._lobes.is_narrow(si, bsdf)),
             is_passed=is_passed,
         )
 
