@@ -1,12 +1,13 @@
 """Atomic file writes: files are written under a temporary name, flushed to the disk and renamed.
 
 A killed process leaves the older file or none under the final name, and possibly a temporary file
-``.NAME.writing-HOST-PID-RANDOM.SUFFIX``, which :func:`sweep` removes.
+``.NAME.writing-HOST-PID-RANDOM.SUFFIX``, which :func:`sweep` and :func:`sweep_beside` remove.
 """
 
 from __future__ import annotations
 
 import errno
+import glob
 import json
 import os
 import re
@@ -14,6 +15,7 @@ import secrets
 import shutil
 import socket
 import stat
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -97,6 +99,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
             folder.rename(old)
         temporary.rename(folder)
         flush(folder.parent)
+        sweep_beside(folder)  # not earlier: a process killed between the renames left the older folder there
     except OSError as error:
         raise unwritable(folder, error) from error
     finally:
@@ -104,6 +107,30 @@ def whole_folder(folder: Path) -> Iterator[Path]:
             old.rename(folder)
         for place in (temporary, old):
             shutil.rmtree(place, ignore_errors=True)
+
+
+@contextmanager
+def scratch_folder(name: str) -> Iterator[Path]:
+    """A folder for temporary files, removed when the block ends, with those that killed processes have left.
+
+    Parameters
+    ----------
+    name
+        Of what it is for; in the system's folder of temporary files.
+
+    Yields
+    ------
+    Path
+        An empty folder that other users can't read.
+    """
+    place = Path(tempfile.gettempdir(), name)
+    sweep_beside(place)
+    folder = _beside(place)
+    try:
+        folder.mkdir(mode=0o700)
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _beside(final: Path) -> Path:
@@ -124,6 +151,14 @@ def sweep(folder: Path) -> list[Path]:
                 shutil.rmtree(file) if file.is_dir() else file.unlink()
                 removed.append(file)
     return removed
+
+
+def sweep_beside(final: Path) -> None:
+    """Remove abandoned temporary folders of one final name, as far as they can be removed."""
+    for folder in final.parent.glob(f".{glob.escape(final.stem)}{MARK}*"):
+        with suppress(OSError):  # another process removes it, too, or the folder is not this user's
+            if folder.is_dir() and _is_abandoned(folder):
+                shutil.rmtree(folder)
 
 
 def _is_abandoned(file: Path) -> bool:

@@ -2,6 +2,9 @@
 
 import json
 import os
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ import enfilade
 from enfilade.images import write_exr
 from enfilade.settings import VideoSettings, ViewingSettings
 from support.fake_blender import NOTE, RESULT
+from support.toys import environment, wait_for
 
 QUICK = ("--method", "reference", "--spp", "2", "--device", "cpu", "--quiet")
 
@@ -228,3 +232,19 @@ def test_settings_of_blender_have_no_effect_on_xml(run, scene, camera_path, tmp_
     result = run("render", scene, *flags)
     assert result.exit_code == 2
     assert "which Blender does not import" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["import", "render"])
+def test_a_terminated_import_leaves_nothing(shot, tmp_path, tmp_path_factory, command):
+    source, out, scratch = shot(do="hang"), tmp_path / "out", tmp_path_factory.mktemp("scratch")
+    calls = source.with_suffix(".calls")
+    line = [sys.executable, "-m", "enfilade", command, str(source), "--out", str(out), "--quiet"]
+    variables = {**environment(), "TMPDIR": str(scratch)}
+    with subprocess.Popen(line, env=variables, stderr=subprocess.DEVNULL) as process:  # noqa: S603
+        try:
+            wait_for(lambda: calls.exists() and calls.read_text().endswith("\n"))
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(60) == 143
+        finally:
+            process.kill()
+    assert [*scratch.iterdir(), *tmp_path.rglob("*.writing-*")] == []

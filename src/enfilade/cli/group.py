@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib
 import keyword
 import shlex
-from collections.abc import Mapping
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -17,6 +19,7 @@ COMMANDS = ("render", "import", "work", "farm", "encode", "plan", "compare", "re
 FAILURE = 1
 WRONG_INPUT = 2
 INTERRUPTED = 130
+TERMINATED = 143
 
 _ARGUMENTS = "enfilade.arguments"
 _DEBUG = "enfilade.debug"
@@ -91,6 +94,21 @@ def _module(name: str) -> str:
 def mark_resumable(ctx: click.Context) -> None:
     """Mark the running command as resumable: typed again, it continues where it stopped."""
     ctx.meta[_RESUMABLE] = True
+
+
+@contextmanager
+def ending_on_sigterm() -> Iterator[None]:
+    """End the command by SystemExit on SIGTERM, so that temporary files are removed, as on ^C."""
+
+    def end(number: int, _frame: object) -> None:
+        signal.signal(number, signal.SIG_IGN)  # a second one, as `timeout` sends, would end the clean-up
+        raise SystemExit(TERMINATED)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _message(error: Exception) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from enfilade.cli.group import debug_option
+from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.options import (
     IMPORT_FLAGS,
     Size,
@@ -95,7 +95,7 @@ def command(
     from enfilade.scene.blender.source import Source
 
     choices = choices_of(blender, size, None if frames is None else _span(frames))
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         imported = import_file(
             source, folder, choices, settings[LimitSettings], monitor,
             program=blender.program, is_strict=blender.strict, is_replaced=is_replaced,
@@ -138,7 +138,7 @@ def _checked(
     activate("auto")
     numbers = None if check_frames is None else parse_frames(check_frames)
     blender, limits = find_blender(settings[BlenderSettings].program), settings[LimitSettings]
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         made = check_import(
             imported, source, blender, choices, limits, monitor, numbers=numbers, spp=check_spp
         )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from enfilade.cli.group import ending_on_sigterm
 from enfilade.cli.options import COMMON, assigned, tables_of
 from enfilade.errors import SettingsError
 from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Section, Settings
@@ -89,7 +90,7 @@ def _imported(
     from enfilade.cli.progress import watch
     from enfilade.runs.source import imported_into
 
-    with watch(quiet=quiet) as monitor:
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         blender, limits = settings[BlenderSettings], settings[LimitSettings]
         return imported_into(run, source, blender, limits, monitor, size=size, frames=frames)
 

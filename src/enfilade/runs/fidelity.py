@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,7 +12,7 @@ import numpy as np
 
 from enfilade.camera import CameraPath, load_path
 from enfilade.errors import SceneError
-from enfilade.files import read_json
+from enfilade.files import read_json, scratch_folder
 from enfilade.images import read_exr
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
@@ -164,10 +163,10 @@ def _cycles(
     blender: Blender, job: dict[str, object], seed: int, limits: LimitSettings, monitor: Monitor
 ) -> list[F32]:
     """Frames by Cycles, in the order of the job."""
-    with tempfile.TemporaryDirectory(prefix="enfilade-cycles-") as folder:
-        run_job(blender, {**job, "out": folder, "seed": seed, "unbiased": True}, limits, monitor)
-        listed = [line["frame"] for line in read_json(Path(folder) / CYCLES_FILE)["frames"]]
-        images = [read_exr(Path(folder) / f"cycles-{number:04d}.exr").get("RGB") for number in listed]
+    with scratch_folder("enfilade-cycles") as folder:
+        run_job(blender, {**job, "out": str(folder), "seed": seed, "unbiased": True}, limits, monitor)
+        listed = [line["frame"] for line in read_json(folder / CYCLES_FILE)["frames"]]
+        images = [read_exr(folder / f"cycles-{number:04d}.exr").get("RGB") for number in listed]
     found = [image.astype(np.float32) for image in images if image is not None]
     if listed != job["frame_list"] or len(found) != len(listed):
         raise SceneError(f"{job['source']}: Cycles did not render the frames {job['frame_list']}")

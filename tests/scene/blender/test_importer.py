@@ -2,9 +2,11 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -307,9 +309,11 @@ import_file(Path(source), Path(out), Choices(), LimitSettings(), Silence(), prog
 
 
 @pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_blender_ends_with_the_command(shot, program, tmp_path, way):
+def test_blender_ends_with_the_command(load, shot, program, tmp_path, tmp_path_factory, monkeypatch, way):
     source = shot(do="hang")
-    calls = source.with_suffix(".calls")
+    calls, scratch = source.with_suffix(".calls"), tmp_path_factory.mktemp("scratch")
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    monkeypatch.setattr(tempfile, "tempdir", None)  # which it keeps
     line = [sys.executable, "-c", IMPORT, str(source), str(tmp_path / "scene"), str(program)]
     with subprocess.Popen(line, stderr=subprocess.DEVNULL) as command:  # noqa: S603
         try:
@@ -320,5 +324,10 @@ def test_blender_ends_with_the_command(shot, program, tmp_path, way):
         finally:
             command.kill()
     wait_for(lambda: not is_alive(int(calls.read_text())))
-    if way == signal.SIGINT:
-        assert left(tmp_path) == ["blender", "shot.blend"]
+    if way != signal.SIGINT:
+        assert len(left(tmp_path)) == 3
+        assert len(left(scratch)) == 1
+        load(shot(), tmp_path / "scene")  # removes both
+        shutil.rmtree(tmp_path / "scene")
+    assert left(tmp_path) == ["blender", "shot.blend"]
+    assert left(scratch) == []

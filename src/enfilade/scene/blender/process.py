@@ -10,7 +10,6 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections import deque
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from enfilade.errors import SceneError
+from enfilade.files import scratch_folder
 from enfilade.monitor import Monitor
 from enfilade.scene.blender.find import SCRIPT, Blender
 from enfilade.settings import LimitSettings
@@ -43,8 +43,8 @@ def run_job(
 ) -> None:
     """Run a job of the importer; its result is in the job's folder ``out``.
 
-    The process ends with this one. It has a home folder of its own, which is removed, and no variables of the
-    environment but the search paths and the language.
+    The process ends with this one. It has a home folder of its own, which is removed (after SIGKILL, by the
+    next job), and no variables of the environment but the search paths and the language.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ def run_job(
     out, about = Path(job["out"]), f"{job['source']} by Blender {blender.version}"
     name, result = TASKS[job["task"]]
     answers = (out / result, out / ERROR_FILE)
-    with tempfile.TemporaryDirectory(prefix="enfilade-blender-") as home:
-        job_file = Path(home) / "job.json"
+    with scratch_folder("enfilade-blender") as home:
+        job_file = home / "job.json"
         job_file.write_text(json.dumps(job), encoding="utf-8")
         own = [sys.executable, "-P", "-m", "enfilade.scene.blender.launcher"]
-        line = [*own, str(os.getpid()), str(limits.import_mb), home, *blender.command(script, job_file)]
+        line = [*own, str(os.getpid()), str(limits.import_mb), str(home), *blender.command(script, job_file)]
         # No `with`: at its end it closes the pipe, which waits for the reader while another process holds it.
         process = subprocess.Popen(  # noqa: S603
             line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
