@@ -221,6 +221,7 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("ViewLayer", "Override"),
         ("Second", ""),
         ("metal", "Metallic BSDF"),
+        ("hole", "Emission"),
         ("coated", "Principled BSDF: Coat Tint"),
         ("coated", "Principled BSDF: Coat Normal"),
     }

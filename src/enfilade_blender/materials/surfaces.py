@@ -89,7 +89,7 @@ class Surface:
             return None
         (radiance,) = self.emitted
         if isinstance(radiance.colour, Constant):
-            r, g, b = (c * radiance.strength for c in radiance.colour.colour)
+            r, g, b = (max(c * radiance.strength, 0.0) for c in radiance.colour.colour)
             return (r, g, b) if max(r, g, b) > 0.0 else None
         is_as_is = abs(radiance.strength - 1.0) < 1e-3
         if is_as_is and isinstance(radiance.colour, AttributeValue):
@@ -252,6 +252,9 @@ def _joined(emitted: list[Radiance], shader: Mix | Add, context: Context) -> tup
 
 
 def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radiance, ...]:
+    if _takes_light(colour, strength):
+        what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
+        context.notes.add("not-carried", context.owner, "Emission", what, effect)
     if is_zero_exactly(strength) or is_zero_exactly(colour):
         return ()
     if isinstance(strength, Constant):
@@ -263,6 +266,12 @@ def _radiance(colour: Value, strength: Value, context: Context) -> tuple[Radianc
         "approximated", context.owner, "Emission", "a textured strength is taken as its mean", effect
     )
     return (Radiance(colour, Constant(context.textures.mean(strength)).number),)
+
+
+def _takes_light(colour: Value, strength: Value) -> bool:
+    """Whether an emission is negative by its constants."""
+    first, second = (value if isinstance(value, Constant) else WHITE for value in (colour, strength))
+    return min(a * b for a, b in zip(first.colour, second.colour, strict=True)) < 0.0
 
 
 def is_zero_exactly(value: Value) -> bool:

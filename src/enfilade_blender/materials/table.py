@@ -173,7 +173,7 @@ LIGHTS = (
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, negative power, light and shadow linking, patterns of nodes of lights",
+        "Spread, negative power and emission, light and shadow linking, patterns of nodes of lights",
         "not carried",
         "light is distributed as without them",
     ),

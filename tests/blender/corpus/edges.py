@@ -198,6 +198,11 @@ def left_out(folder):
     lamp = light("AREA", "No gloss", (0.0, 2.0, 3.0), 10.0)
     lamp.visible_glossy, lamp.data.cycles.max_bounces = False, 0
     light("POINT", "Dimmer", (2.0, 2.0, 3.0), -5.0)
+    hole, tree, emission = shader("hole", "Emission")
+    value = node_of(tree, "Value")
+    value.outputs[0].default_value = -2.0  # a strength that is not linked is 0 at least
+    fill(tree, emission, {"Strength": value})
+    plane("Hole", (0.0, 4.0, 0.0), 1.0, hole)
     scene.render.use_border = scene.render.use_multiview = scene.cycles.use_fast_gi = True
     scene.view_layers.new("Second")
     scene.view_layers[0].material_override = principled("clay")
