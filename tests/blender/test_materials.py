@@ -180,10 +180,11 @@ def test_missing_images_are_grey_wherever_cycles_looks_them_up(blender):
     assert code == 0, result
     sky = np.array(mi.Bitmap(str(out / "textures" / "environment.exr")))
     assert sky.reshape(-1, 3).mean(axis=0) == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
-    colour = ET.parse(out / "scene.xml").find(".//bsdf[@type='diffuse']/rgb").get("value")
-    assert [float(number) for number in colour.split()] == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
+    colours = [e.get("value") for e in ET.parse(out / "scene.xml").findall(".//bsdf[@type='diffuse']/rgb")]
+    assert [float(number) for number in " ".join(colours).split()] == pytest.approx([0.5] * 3, abs=1e-3)
     noted = [note["object"] for note in result["notes"] if "missing" in note["what"]]
-    assert noted == ["corrected", "World"]
+    assert noted == ["corrected", "late", "World"]
+    assert [file.name for file in (out / "textures").glob("shown*")]
 
 
 def test_pictures_that_mitsuba_reads_wrongly_are_written_anew(blender):

@@ -107,7 +107,8 @@ class Bakery:
     def _over_mesh(self, value: Any, material: Any, canvas: Any, placed: Placed, size: int) -> Any:
         if isinstance(value, Constant | AttributeValue | Texture):
             return value
-        if isinstance(value, ImageValue) and self._textures.is_missing(value):
+        is_lost = isinstance(value, ImageValue) and self._textures.is_missing(value)
+        if is_lost or (isinstance(value, Procedural) and _is_missing(value.output.node)):
             return Constant((0.5, 0.5, 0.5))
         is_normal = isinstance(value, ProceduralNormal)
         pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
@@ -191,8 +192,10 @@ def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
 def _lost(found: Output, mesh: Mesh, copies: int) -> str:
     """What is approximated of an output that depends on the object; empty for others."""
     node, name = found.node, found.socket.name
-    if node.type in IMAGES and is_missing(node.image):
-        return "its image is missing, and is taken as a mid grey"
+    if _is_missing(node):
+        is_sequence = node.image is not None and node.image.source == "SEQUENCE"
+        what = "the first frame of its image sequence" if is_sequence else "its image"
+        return f"{what} is missing, and is taken as a mid grey"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
     if node.type == "OBJECT_INFO" and name == "Location" and copies > 1:
@@ -204,6 +207,11 @@ def _lost(found: Output, mesh: Mesh, copies: int) -> str:
     if layer and layer not in mesh.uvs and layer not in mesh.colours:
         return f"the mesh has no attribute {layer} of vertices, corners or faces; it is taken as 0"
     return OBJECT_DATA.get(node.type, "")
+
+
+def _is_missing(node: Any) -> bool:
+    """Whether a node is an image without pixels."""
+    return node.type in IMAGES and is_missing(node.image, node.image_user)
 
 
 def _with_room(mesh: Mesh, shader: Shader) -> Mesh:

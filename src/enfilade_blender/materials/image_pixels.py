@@ -15,13 +15,31 @@ FRAMES = ("SEQUENCE", "MOVIE")  # sources whose pixels Blender has for a node al
 OPAQUE_DEPTHS = (8, 24)  # bits of a pixel without alpha
 
 
-def is_missing(image: Any) -> bool:
-    """Whether an image has no pixels: there is none, or no file of it."""
+def is_missing(image: Any, user: Any = None) -> bool:
+    """Whether an image has no pixels: there is none, or no file of it, or of the frame that a node shows.
+
+    Parameters
+    ----------
+    image
+    user
+        The node's image user, which chooses the frame of a sequence.
+    """
     if image is not None and image.source in FRAMES and image.filepath:
         import bpy  # tests import this module without it
 
+        if image.source == "SEQUENCE" and user is not None:
+            user.frame_current = _number(user, bpy.context.scene.frame_current)
+            return not Path(image.filepath_from_user(image_user=user)).is_file()
         return not Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
     return image is None or not (image.has_data or (image.size[0] > 0 and len(image.pixels) > 0))  # loads it
+
+
+def _number(user: Any, frame: int) -> int:
+    """Number of the file that an image user shows of a sequence, as Blender finds it."""
+    place = frame - user.frame_start + 1
+    if user.use_cyclic:
+        place = (place - 1) % max(user.frame_duration, 1) + 1
+    return min(max(place, 0), user.frame_duration) + int(user.frame_offset)
 
 
 def image_colours(node: Any) -> F32:

@@ -20,7 +20,7 @@ def put_stand_ins(tree: Any) -> list[Any]:
             missing += put_stand_ins(node.node_tree)
         elif node.type == "LIGHT_PATH":
             _replace(tree, node, BLACK)
-        elif node.type in IMAGES and is_missing(node.image):
+        elif node.type in IMAGES and is_missing(node.image, node.image_user):
             _replace(tree, node, GREY)
             missing.append(node)
     return missing

@@ -148,7 +148,7 @@ INPUTS = (
         "approximated",
         "the other shader, for all rays",
     ),
-    ("Missing image", "approximated", "a mid grey"),
+    ("Missing image, or first frame of an image sequence", "approximated", "a mid grey"),
 )
 LIGHTS = (
     ("Point", "mapped", "`sphere` of its radius, not seen by the camera; `point` for radius 0"),

@@ -67,8 +67,8 @@ def kinds_of_rays(folder):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
-def missing_images(_folder):
-    """Images without a file: of the world, in a group, and below a colour correction."""
+def missing_images(folder):
+    """Images without a file: of the world, in a group, below a colour correction, of a sequence's frame."""
     new_file()
     lost = bpy.data.images.new("lost", 4, 4)
     lost.source, lost.filepath = "FILE", "//gone/lost.png"
@@ -84,6 +84,15 @@ def missing_images(_folder):
     corrected, tree, node = shader("corrected", "BsdfDiffuse")
     fill(tree, node, {"Color": node_of(tree, "Invert", Color=lost)})
     plane("Corrected", (0.0, 0.0, 0.0), 1.5, corrected)
+    reel = image("reel", tiles, 16)
+    reel.filepath_raw, reel.file_format = str(folder / "reel0002.png"), "PNG"
+    reel.save()
+    reel.source = "SEQUENCE"
+    for number, (name, offset) in enumerate({"late": 0, "shown": 1}.items()):
+        material, tree, node = shader(name, "BsdfDiffuse")
+        fill(tree, node, {"Color": reel})
+        tree.nodes["Image Texture"].image_user.frame_offset = offset
+        plane(name, (2.0 + 2.0 * number, 0.0, 0.0), 1.5, material)
 
 
 def picture_files(folder):
