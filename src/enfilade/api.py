@@ -259,21 +259,14 @@ def _job(
     from enfilade.errors import CameraPathError
     from enfilade.methods.opener import name_of, open_method
     from enfilade.runs.job import Job
-    from enfilade.runs.source import imported_into
-    from enfilade.scene.blender.imported import ImportedScene
-    from enfilade.scene.blender.source import is_importable
+    from enfilade.runs.source import imported_scene
     from enfilade.scene.opener import Scene
-    from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Settings
+    from enfilade.settings import SECTIONS, Settings
 
     name = name_of(method)
     kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
     chosen = settings if isinstance(settings, Settings) else Settings.from_tables(settings or {}, kinds)
-    imported = None
-    if not isinstance(scene, Scene) and Path(scene).is_dir():
-        imported = ImportedScene.read(Path(scene))
-    elif not isinstance(scene, Scene) and is_importable(Path(scene)):
-        blender, limits = chosen[BlenderSettings], chosen[LimitSettings]
-        imported = imported_into(run, Path(scene), blender, limits, monitor)
+    imported = None if isinstance(scene, Scene) else imported_scene(Path(scene), run, chosen, monitor)
     if imported is not None:
         scene, path = imported.scene_file, path or imported.checked_path()
         if not isinstance(settings, Settings):

@@ -234,6 +234,13 @@ def test_settings_of_blender_have_no_effect_on_xml(run, scene, camera_path, tmp_
     assert "which Blender does not import" in result.stderr
 
 
+def test_settings_of_blender_have_no_effect_on_a_folder_of_any_name(run, shot, tmp_path):
+    run("import", shot(), "--out", tmp_path / "scene.blend")
+    result = run("render", tmp_path / "scene.blend", "--out", tmp_path / "run", "--set", "blender.camera=B")
+    assert result.exit_code == 2
+    assert "which is imported already" in result.stderr
+
+
 @pytest.mark.parametrize("command", ["import", "render"])
 def test_a_terminated_import_leaves_nothing(shot, tmp_path, tmp_path_factory, command):
     source, out, scratch = shot(do="hang"), tmp_path / "out", tmp_path_factory.mktemp("scratch")

@@ -10,12 +10,11 @@ import click
 from enfilade.cli.group import ending_on_sigterm
 from enfilade.cli.options import COMMON, assigned, tables_of
 from enfilade.errors import SettingsError
-from enfilade.settings import SECTIONS, BlenderSettings, LimitSettings, Section, Settings
+from enfilade.settings import SECTIONS, BlenderSettings, Section, Settings
 
 if TYPE_CHECKING:
     from enfilade.methods.base import Method
     from enfilade.runs.job import Job
-    from enfilade.scene.blender.imported import ImportedScene
 
 
 def job_of(
@@ -49,26 +48,22 @@ def job_of(
         imported.
     """
     from enfilade.camera import load_path, parse_frames
+    from enfilade.cli.progress import watch
     from enfilade.methods.opener import open_method
     from enfilade.runs.job import Job
-    from enfilade.scene.blender.imported import ImportedScene
-    from enfilade.scene.blender.source import is_importable
+    from enfilade.runs.source import imported_scene
     from enfilade.scene.opener import Scene
 
     opened = open_method(method)
     kinds = tuple(dict.fromkeys([*SECTIONS, *opened.settings]))
     tables = tables_of(ctx, kinds)
     settings = Settings.from_tables(tables, kinds)
-    is_imported = run is not None and is_importable(scene)
-    _check_effect(ctx, opened, scene, is_imported=is_imported)
+    _check_effect(ctx, opened, scene)
     selected = None if frames is None else parse_frames(frames)
     path = None if path_file is None else load_path(path_file, size=size, frames=selected, fps=fps)
-    imported = None
-    if scene.is_dir():
-        imported = ImportedScene.read(scene)
-    elif run is not None and is_imported:
-        span = (selected[0], selected[-1]) if selected and path is None else None
-        imported = _imported(run, scene, settings, size, span, quiet=quiet)
+    span = (selected[0], selected[-1]) if selected and path is None else None
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
+        imported = imported_scene(scene, run, settings, monitor, size=size, frames=span)
     if imported is not None:
         scene, settings = imported.scene_file, Settings.from_tables(imported.tables_under(tables), kinds)
         path = path or load_path(imported.checked_path(), size=size, frames=selected, fps=fps)
@@ -77,31 +72,15 @@ def job_of(
     return Job(scene=Scene(scene), path=path, settings=settings, method=method)
 
 
-def _imported(
-    run: Path,
-    source: Path,
-    settings: Settings,
-    size: tuple[int, int] | None,
-    frames: tuple[int, int] | None,
-    *,
-    quiet: bool,
-) -> ImportedScene:
-    """Import a file into the run folder, unless it is there."""
-    from enfilade.cli.progress import watch
-    from enfilade.runs.source import imported_into
-
-    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
-        blender, limits = settings[BlenderSettings], settings[LimitSettings]
-        return imported_into(run, source, blender, limits, monitor, size=size, frames=frames)
-
-
-def _check_effect(ctx: click.Context, method: Method, scene: Path, *, is_imported: bool) -> None:
+def _check_effect(ctx: click.Context, method: Method, scene: Path) -> None:
     """Refuse flags and assignments for sections that nothing reads; a file may have them."""
+    from enfilade.scene.blender.source import is_importable
+
     own = BlenderSettings.table
     kinds: tuple[type[Section], ...] = (*COMMON, *method.settings)
     read = {kind.table for kind in kinds}
     for flag, table in assigned(ctx).items():
-        if table == own and not is_imported:
+        if table == own and (scene.is_dir() or not is_importable(scene)):
             why = "which Blender does not import; leave it out"
             if scene.is_dir():
                 why = "which is imported already; import the file again, with this flag"

@@ -13,8 +13,8 @@ from enfilade.runs.lock import Lock
 from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.importer import check_strict, import_file
 from enfilade.scene.blender.notes import NoteKind, grouped
-from enfilade.scene.blender.source import SOURCE_FILE, Choices, Source, check_source
-from enfilade.settings import BlenderSettings, LimitSettings
+from enfilade.scene.blender.source import SOURCE_FILE, Choices, Source, check_source, is_importable
+from enfilade.settings import BlenderSettings, LimitSettings, Settings
 
 
 def choices_of(
@@ -32,6 +32,34 @@ def choices_of(
         settings.bake_px,
         settings.bake_samples,
     )
+
+
+def imported_scene(
+    scene: Path,
+    run: Path | None,
+    settings: Settings,
+    monitor: Monitor,
+    *,
+    size: tuple[int, int] | None = None,
+    frames: tuple[int, int] | None = None,
+) -> ImportedScene | None:
+    """The imported scene that a path names: that of a folder, or of a file, see :func:`imported_into`.
+
+    None for all other paths, which name scenes of the renderer; without a run folder no file is imported.
+
+    Raises
+    ------
+    SceneError
+        The folder holds no imported scene, or the file can't be imported.
+    RunFolderError, NoSpaceError
+        As of :func:`imported_into`.
+    """
+    if scene.is_dir():
+        return ImportedScene.read(scene)
+    if run is None or not is_importable(scene):
+        return None
+    blender, limits = settings[BlenderSettings], settings[LimitSettings]
+    return imported_into(run, scene, blender, limits, monitor, size=size, frames=frames)
 
 
 def imported_into(
