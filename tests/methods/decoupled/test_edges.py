@@ -1,6 +1,8 @@
 """Outlines of shapes, and small emitters."""
 
 import numpy as np
+import pytest
+import scipy.ndimage
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.methods.decoupled.edges import beside, dilated, is_outline, small_emitter_pixels
@@ -53,6 +55,13 @@ def test_outlines_are_pixels_beside_another_shape():
     index[5, 7] = 2
     rows, columns = np.nonzero(is_outline(geometry_of(index)))
     assert set(zip(rows, columns, strict=True)) == {(5, 7), (4, 7), (6, 7), (5, 6), (5, 8)}
+
+
+@pytest.mark.parametrize("pixels", [1, 2, 4])
+def test_a_mask_grows_as_by_scipy_to_the_border(pixels):
+    mask = np.random.default_rng(pixels).random((H, W)) < 0.05
+    expected = scipy.ndimage.binary_dilation(mask, np.ones((3, 3), bool), iterations=pixels)
+    np.testing.assert_array_equal(dilated(mask, pixels), expected)
 
 
 def test_pixels_are_beside_others_but_not_beside_themselves():

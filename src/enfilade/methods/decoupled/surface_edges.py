@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import drjit as dr
-import numpy as np
-import scipy.ndimage
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaque, pixel_grid
+from enfilade.methods.decoupled.edges import dilated
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, points_of
 from enfilade.records import Geometry, Mask
 
@@ -85,8 +84,6 @@ def narrow_surfaces(is_edge: Mask, where: Mask) -> Mask:
     -------
     (H, W) bool
     """
-    square = np.ones((3, 3), np.bool_)
-    near = scipy.ndimage.binary_dilation(is_edge, square, iterations=MARGIN)
-    wide = scipy.ndimage.binary_dilation(where & ~near, square, iterations=MARGIN + 2)
-    narrow: Mask = where & near & ~wide
-    return narrow
+    near = dilated(is_edge, MARGIN)
+    wide = dilated(where & ~near, MARGIN + 2)
+    return where & near & ~wide
