@@ -52,6 +52,19 @@ def test_one_outlier_does_not_tint_the_surface():
     assert around.mean() < 0.1
 
 
+def test_a_highlight_does_not_brighten_the_dark_surface_around_it():
+    light = noisy(2)
+    share = np.full(WHERE.shape, 0.01, np.float32)
+    share[50:70, 75:85] = 100.0
+    light.color[:] *= share[..., None]
+    light.variance[:] *= np.square(share)
+    found = denoised(light)
+    is_far = share < 1.0
+    is_far[40:80, 65:95] = False
+    assert found[is_far].mean() == pytest.approx(0.01, rel=0.1)
+    assert found[50:70, 75:85].mean() == pytest.approx(light.color[50:70, 75:85].mean(), rel=0.03)
+
+
 def test_pixels_without_irradiance_stay_black():
     where = WHERE.copy()
     where[:, :80] = False

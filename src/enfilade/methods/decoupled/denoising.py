@@ -6,7 +6,7 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, image, lanes
+from enfilade.arrays import Array3f, Array4f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.irradiance_cache import guide_of
 from enfilade.methods.decoupled.records import IrradianceImage
@@ -51,7 +51,8 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
 
     The denoiser loses some percent of the light where samples are skewed, and adds a third to regions two
     pixels wide. The difference from its input, smoothed along surfaces over a range that leaves little noise,
-    is added to its result, as far as it exceeds its own standard error. Outliers are limited, so that no
+    is added to its result, as far as it exceeds its own standard error, in proportion to the luminance: what
+    is lost of a highlight does not brighten the dark surface around it. Outliers are limited, so that no
     single path tints a surface. The denoiser takes no negative light: specular lobes that are a difference
     have it, and it is denoised apart.
 
@@ -78,17 +79,25 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     if light.color.min() < 0.0:
         below = _denoised(np.maximum(-light.color, np.float32(0)), geometry, where, quality)
 
-    # Smooth the difference.
+    # Smooth the difference, and the luminance.
     clean, lowest = above - below, -np.float32(outlier) * below
     limited = np.clip(light.color, lowest, np.float32(outlier) * above)
     guide = guide_of(geometry, np.where(where, geometry.shape_index, np.uint32(0)))
-    difference, variance = smooth(
-        lanes(limited - clean), lanes(light.variance), guide, levels=LEVELS, deviations=None
+    weights = Array3f(*REC709_LUMINANCE)
+    luminance = dr.dot(lanes(above + below), weights)
+    smoothed, variance = smooth(
+        Array4f(*lanes(limited - clean), luminance),
+        lanes(light.variance),
+        guide,
+        levels=LEVELS,
+        deviations=None,
     )
 
-    # Add it as far as it is significant.
-    squared = dr.square(dr.dot(difference, Array3f(*REC709_LUMINANCE)))
-    correction = difference * squared / dr.maximum(squared + variance, 1e-20)
+    # Add it as far as it is significant, in proportion to the luminance.
+    difference = smoothed.xyz
+    squared = dr.square(dr.dot(difference, weights))
+    share = luminance / dr.maximum(smoothed.w, 1e-20)
+    correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
     corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
     bounded: F32 = np.maximum(corrected, lowest)
     return bounded

@@ -56,6 +56,7 @@ def smooth(
     Parameters
     ----------
     color : Array3f
+        Any number of channels where no difference counts.
     variance : Float
         Of the luminance.
     guide
@@ -67,7 +68,8 @@ def smooth(
 
     Returns
     -------
-    color : Array3f
+    color
+        As the input.
     variance : Float
         Of the result.
     """
@@ -91,7 +93,7 @@ def _filter_level(
     # Blur the variance, and compute the luminance.
     blurred = _blurred(variance, column, row, width, height) if deviations else Float(0)
     dr.eval(blurred)
-    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
+    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE)) if deviations else Float(0)
 
     # Prepare the distance of taps from this pixel's tangent plane.
     normal = dr.gather(Array3f, guide.normals, lane)
@@ -101,7 +103,8 @@ def _filter_level(
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
     nearness = dr.rcp(guide.plane_tolerance * depth + TINY)
 
-    total, total_variance, squares = Array3f(0), Float(0), Float(0)
+    Color = type(color)
+    total, total_variance, squares = Color(0), Float(0), Float(0)
     weight, taken = Float(0), Float(0)
     for down, weight_y in zip(range(-2, 3), SPLINE, strict=True):
         for across, weight_x in zip(range(-2, 3), SPLINE, strict=True):
@@ -121,7 +124,7 @@ def _filter_level(
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
             # Weight it by the difference of luminance in units of the noise of both pixels.
-            other, of_tap = dr.gather(Array3f, color, tap), surface
+            other, of_tap = dr.gather(Color, color, tap), surface
             if deviations:
                 deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
                 difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance)
