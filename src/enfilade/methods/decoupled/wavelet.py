@@ -103,8 +103,8 @@ def _filter_level(
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
     nearness = dr.rcp(guide.plane_tolerance * depth + TINY)
 
-    Color = type(color)
-    total, total_variance, squares = Color(0), Float(0), Float(0)
+    vector = type(color)
+    total, total_variance, squares = vector(0), Float(0), Float(0)
     weight, taken = Float(0), Float(0)
     for down, weight_y in zip(range(-2, 3), SPLINE, strict=True):
         for across, weight_x in zip(range(-2, 3), SPLINE, strict=True):
@@ -124,7 +124,7 @@ def _filter_level(
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
             # Weight it by the difference of luminance in units of the noise of both pixels.
-            other, of_tap = dr.gather(Color, color, tap), surface
+            other, of_tap = dr.gather(vector, color, tap), surface
             if deviations:
                 deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
                 difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance)
