@@ -5,10 +5,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f, Float, UInt, rows
+from enfilade.arrays import Array3f, Bool, Float, UInt, rows
 from enfilade.device import active
 from enfilade.kernels.random import one_sequence
 from enfilade.scene.mitsuba.resampling import resample
+from enfilade.scene.mitsuba.shadow_rays import Target
 
 COUNT = 1 << 16
 
@@ -25,12 +26,13 @@ def drawn(values, count):
     def candidate(place):
         number = dr.minimum(UInt(place.x * len(values)), len(values) - 1)
         value = dr.gather(Float, table, number)
-        return mi.Point3f(Float(number), 0.0, 0.0), (Array3f(value, 2.0 * value, 0.5 * value),)
+        target = Target(mi.Point3f(Float(number), 0.0, 0.0), Bool(False))
+        return target, (Array3f(value, 2.0 * value, 0.5 * value),)
 
     sampler = one_sequence(COUNT)
     target, (found,) = resample(candidate, count, sampler)
-    dr.eval(target, found, sampler.dimension)
-    return rows(found), np.array(target.x), int(sampler.dimension[0])
+    dr.eval(target.point, found, sampler.dimension)
+    return rows(found), np.array(target.point.x), int(sampler.dimension[0])
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 8])

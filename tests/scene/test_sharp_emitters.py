@@ -76,11 +76,15 @@ VEILS = """<shape type="rectangle"><transform name="to_world"><scale x="0.8" y="
 <emitter type="area"><rgb name="radiance" value="0.7"/></emitter></shape>"""
 
 
-@pytest.mark.parametrize("veils", ["", VEILS], ids=["plain", "veiled"])
+@pytest.mark.parametrize(
+    ("veils", "integrator"),
+    [("", "path"), (VEILS, "path"), (VEILS, "volpath")],
+    ids=["plain", "veiled", "volpath"],
+)
 @pytest.mark.parametrize("name", SKIES)
-def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils):
-    """Behind a cut-out and the shape of a lamp, too, by a path tracer whose shadow rays pass these."""
-    renderer = opened(tmp_path, SKIES[name] + veils, "volpath" if veils else "path")
+def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils, integrator):
+    """Behind a cut-out and the shape of a lamp, too."""
+    renderer = opened(tmp_path, SKIES[name] + veils, integrator)
     assert renderer.has_sharp_light == (name in SHARP)
 
     def both(rays, sampler):
@@ -148,9 +152,11 @@ def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
     assert abs(standard_errors(ours, reference)) < 4.0
 
 
+@pytest.mark.parametrize("integrator", ["path", "volpath"])
 @pytest.mark.parametrize("name", SKIES)
-def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name):
-    renderer = opened(tmp_path, SKIES[name] + VEILS, "volpath")
+def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name, integrator):
+    """With `path`, no light of points, spots and directional emitters passes."""
+    renderer = opened(tmp_path, SKIES[name] + VEILS, integrator)
 
     def radiance(rays, sampler):
         point = renderer.intersect(rays)
@@ -168,7 +174,10 @@ def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name):
     error = (ours.color - theirs.color) @ [0.2126, 0.7152, 0.0722]
     deviation = np.sqrt(ours.variance + theirs.variance) + 1e-4 * theirs.color.max()
     assert np.mean(np.abs(error) > 4.0 * deviation) < 0.02
-    assert ours.color.mean() == pytest.approx(theirs.color.mean(), rel=0.02)
+    # `path` finds the sun behind a cut-out by chance.
+    spread = np.sqrt((ours.variance + theirs.variance).mean() / len(pixels))
+    bound = 0.02 * theirs.color.mean() + 3.0 * spread
+    assert ours.color.mean() == pytest.approx(theirs.color.mean(), abs=float(bound))
 
 
 def test_a_directional_emitter_has_no_noise_but_its_shadow(tmp_path):

@@ -37,7 +37,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 27
+    revision = 28
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (

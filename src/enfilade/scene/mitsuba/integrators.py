@@ -62,17 +62,16 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     max_depth, _ = _depths(integrator)
     if max_depth <= MAX_PATH_DEPTH:
         return f"its paths end at depth {max_depth}; {MAX_PATH_DEPTH + 1} is the least"
-    is_volumetric = PATH_TRACERS[integrator.class_name()] != "path"
-    if is_volumetric and any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy):
+    if is_volumetric(integrator) and any(
+        isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy
+    ):
         return "it has participating media"
     return ""
 
 
-def shadow_rays_pass_null(scene: Any, integrator: Any) -> bool:
-    """Whether shadow rays pass null interactions: those of volumetric path tracers, where there are any."""
-    nodes = mi.traverse(scene).hierarchy
-    has_null = any(isinstance(n, mi.BSDF) and mi.has_flag(n.flags(), mi.BSDFFlags.Null) for n in nodes)
-    return has_null and PATH_TRACERS.get(integrator.class_name(), "path") != "path"
+def is_volumetric(integrator: Any) -> bool:
+    """Whether an integrator is a volumetric path tracer: its shadow rays pass null interactions."""
+    return PATH_TRACERS.get(integrator.class_name(), "path") != "path"
 
 
 def _depths(integrator: Any) -> tuple[int, int]:

@@ -35,15 +35,15 @@ from enfilade.renderer import (
 )
 from enfilade.scene.mitsuba.emitters import find_emitters
 from enfilade.scene.mitsuba.integrators import (
+    is_volumetric,
     scene_integrator,
-    shadow_rays_pass_null,
     shortened,
     why_inseparable,
 )
 from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.merge import merge_meshes
-from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS
+from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
 from enfilade.scene.mitsuba.shapes import Shapes, has_lobe, surface_class
 from enfilade.scene.mitsuba.transport import LightTransport
 
@@ -81,8 +81,8 @@ class MitsubaRenderer:
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
-        pass_null = shadow_rays_pass_null(scene, self._integrator)
-        self._transport = LightTransport(scene, self._lobes, self._continued_radiance, pass_null=pass_null)
+        shadow_rays = ShadowRays(scene, pass_to_all=is_volumetric(self._integrator))
+        self._transport = LightTransport(scene, self._lobes, self._continued_radiance, shadow_rays)
         self._shapes = Shapes(self._merged)
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
         # Mitsuba builds the sampling table of an emitting mesh when it is first used. That must not happen
@@ -245,22 +245,30 @@ class MitsubaRenderer:
         )
         return si, distance, ray
 
-    def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> Any:
-        """Radiance along rays that continue paths of a depth."""
-        return self._radiance(rays, sampler, self._continued[path_depth - 1], active)
-
-    def _radiance(self, rays: Rays, sampler: Any, integrator: Any = None, active: Any = True) -> Any:
-        ray = mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
-        if integrator is None and self._shapes.has_lamps:
+    def _radiance(self, rays: Rays, sampler: Any) -> Any:
+        """Radiance along camera rays."""
+        ray = _ray(rays)
+        if self._shapes.has_lamps:
             *_, ray = self._intersect_beyond(ray, Bool(True), NULL_PATH)
+        return self._sampled(self._integrator, ray, sampler)[0]
+
+    def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> tuple[Any, Any]:
+        """Radiance along rays that continue paths of a depth; whether Mitsuba takes it as valid."""
+        return self._sampled(self._continued[path_depth - 1], _ray(rays), sampler, active)
+
+    def _sampled(self, integrator: Any, ray: Any, sampler: Any, active: Any = True) -> tuple[Any, Any]:
         self._sampler.sampler = sampler
-        integrator = integrator or self._integrator
-        radiance, _, _ = integrator.sample(
+        radiance, is_valid, _ = integrator.sample(
             self._scene, self._sampler, mi.RayDifferential3f(ray), self._medium, active
         )
         # Keep nothing that holds NumPy's memory: it can't be freed while a kernel is recorded.
         self._sampler.sampler = None
-        return radiance
+        return radiance, is_valid
+
+
+def _ray(rays: Rays) -> Any:
+    """Rays of unit direction; mitsuba.Ray3f."""
+    return mi.Ray3f(mi.Point3f(rays.origin), dr.normalize(mi.Vector3f(rays.direction)))
 
 
 def _lane_sampler() -> Any:

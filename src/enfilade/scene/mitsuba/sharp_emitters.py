@@ -13,7 +13,7 @@ import numpy as np
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import BELOW_ONE, Discrete, one_sequence
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
-from enfilade.scene.mitsuba.shadow_rays import ShadowRays
+from enfilade.scene.mitsuba.shadow_rays import ShadowRays, Target
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
@@ -117,7 +117,7 @@ class SharpEmitters:
         found = [Array3f(0)] * len(factors)
         for group in range(groups):
 
-            def candidate(place: Any, group: int = group) -> tuple[Any, Contributions]:
+            def candidate(place: Any, group: int = group) -> tuple[Target, Contributions]:
                 at = (group + place.x) * size
                 number = dr.minimum(UInt(at), self._sharp_count - 1)
                 within = mi.Point2f(dr.minimum(at - Float(number), BELOW_ONE), place.y)
@@ -125,13 +125,15 @@ class SharpEmitters:
                 emitter = dr.gather(mi.EmitterPtr, self._scene.emitters_dr(), index)
                 sample, radiance = emitter.sample_direction(si, within, active)
                 pdf = dr.select(sample.delta, dr.inf, sample.pdf / size)
-                return sample.p, _weighted(evaluate(sample.d), radiance * size, pdf)
+                target = Target(sample.p, sample.delta)
+                return target, _weighted(evaluate(sample.d), radiance * size, pdf)
 
             target, chosen = resample(candidate, min(math.ceil(size), MOST_CANDIDATES), sampler, factors)
             found = _added(found, self._shadow_rays.unoccluded(si, target, chosen, active))
         if self._sun is not None:
             direction, radiance, pdf = self._sun.sample(sampler)
-            target = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
+            point = si.p + direction * (2.0 * dr.norm(self._scene.bbox().extents()))
+            target = Target(point, Bool(False))
             contributions = _weighted(evaluate(direction), radiance, pdf)
             found = _added(found, self._shadow_rays.unoccluded(si, target, contributions, active))
         return found

@@ -13,10 +13,10 @@ from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
-from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays
+from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays, Target
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
-Radiance = Callable[[Rays, Any, int, Any], Any]
+Radiance = Callable[[Rays, Any, int, Any], tuple[Any, Any]]
 
 
 class LightTransport:
@@ -28,18 +28,17 @@ class LightTransport:
     lobes
         Of its BSDFs.
     radiance
-        The path tracer: radiance along rays, from the rays, their samplers, the path depth at
-        which they begin, and which of them are traced.
-    pass_null
-        Whether its shadow rays pass null interactions.
+        The path tracer: radiance along rays and whether it is valid, from the rays, their samplers, the path
+        depth at which they begin, and which of them are traced.
+    shadow_rays
     """
 
-    def __init__(self, scene: Any, lobes: Lobes, radiance: Radiance, *, pass_null: bool) -> None:
+    def __init__(self, scene: Any, lobes: Lobes, radiance: Radiance, shadow_rays: ShadowRays) -> None:
         self._scene = scene
         self._lobes = lobes
         self._radiance = radiance
-        self._shadow_rays = ShadowRays(scene, pass_null=pass_null)
-        self.sharp_emitters = SharpEmitters(scene, self._shadow_rays)
+        self._shadow_rays = shadow_rays
+        self.sharp_emitters = SharpEmitters(scene, shadow_rays)
 
     def emission(self, si: Any, bounce: Bounce | None, active: Any = True) -> Any:
         """Radiance emitted along the ray by a hit, or by the environment; weighted if the ray was sampled."""
@@ -57,11 +56,12 @@ class LightTransport:
 
     def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
-        found = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
+        found, is_valid = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
         unweighted, weighted = self._emission_along(sample)
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
-        indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
+        # It leaves out the emission of paths that meet null interactions alone and leave the scene.
+        indirect = dr.select(sample.is_alive & is_valid, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
     def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any]:
@@ -180,7 +180,7 @@ class LightTransport:
         The point is chosen among one candidate for each of the emitters, or :data:`MOST_CANDIDATES`.
         """
 
-        def candidate(place: Any) -> tuple[Any, Contributions]:
+        def candidate(place: Any) -> tuple[Target, Contributions]:
             if soft_only:
                 emitter, radiance = self.sharp_emitters.sample_soft(si, place, active)
             else:
@@ -190,7 +190,9 @@ class LightTransport:
             if albedo is not None:
                 value = _divided(value, albedo)
             weight = dr.select(emitter.delta, 1.0, mis_weight(emitter.pdf, pdf))
-            return emitter.p, (Array3f(dr.select(is_lit, value * radiance * weight, 0.0)),)
+            return Target(emitter.p, emitter.delta), (
+                Array3f(dr.select(is_lit, value * radiance * weight, 0.0)),
+            )
 
         emitters = self.sharp_emitters.soft_count if soft_only else self.sharp_emitters.count
         target, light = resample(candidate, min(max(emitters, 1), MOST_CANDIDATES), sampler)

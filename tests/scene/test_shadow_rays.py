@@ -1,0 +1,69 @@
+"""Shadow rays through thin glass and cut-outs: with Mitsuba's `path`, too, to emitters that paths can hit."""
+
+import drjit as dr
+import pytest
+
+from enfilade.arrays import Array3f, rows
+from enfilade.kernels.random import one_sequence
+from enfilade.renderer import Rays
+from support.mitsuba_scene import DIFFUSE, opened, placed, rgb, veil, write
+
+COUNT = 1 << 14
+INTEGRATOR = '<scene version="3.0.0"><integrator type="{}"/>'
+GLASS = '<bsdf type="thindielectric"><float name="int_ior" value="1.5"/></bsdf>'
+PASSED = {"thin glass": (GLASS, 0.923), "cut-out": (veil(0.3), 0.7)}  # share along the normal
+LAMP = placed(
+    "rectangle", "lamp", (0, 0, -4), f'<emitter type="area">{rgb("radiance", 5, 5, 5)}</emitter>', 0.2
+)
+SPOT = (
+    f'<emitter type="point"><point name="position" x="0" y="0" z="-4"/>{rgb("intensity", 1, 1, 1)}</emitter>'
+)
+FLOOR = (
+    '<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/></transform>'
+    f"{DIFFUSE}</shape>"
+)
+
+
+def pane(bsdf, *, is_instance):
+    shape = placed("rectangle", "pane", (0, 0, -2), bsdf, 1.0)
+    if not is_instance:
+        return shape
+    group = f'<shape type="shapegroup" id="group">{shape}</shape>'
+    return f'{group}<shape type="instance"><ref id="group"/></shape>'
+
+
+def direct(folder, *shapes, integrator="path"):
+    """Light of next-event estimation at the middle of a floor that faces a lamp."""
+    scene = write(folder, FLOOR, *shapes, head=INTEGRATOR.format(integrator), sky="")
+    renderer = opened(scene)
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))))
+    point, sampler = renderer.intersect(rays), one_sequence(COUNT)
+    found = renderer.sample_diffuse(point, sampler, soft_only=renderer.has_sharp_light).direct
+    if renderer.has_sharp_light:
+        found = found + renderer.sharp_light(point, sampler)[0]
+    return rows(found).mean(dtype=float)
+
+
+@pytest.mark.parametrize("is_instance", [False, True])
+@pytest.mark.parametrize("name", PASSED)
+@pytest.mark.parametrize("integrator", ["path", "volpath"])
+def test_light_passes(tmp_path, integrator, name, is_instance):
+    bsdf, share = PASSED[name]
+    bare = direct(tmp_path, LAMP, integrator=integrator)
+    found = direct(tmp_path, LAMP, pane(bsdf, is_instance=is_instance), integrator=integrator)
+    assert found == pytest.approx(share * bare, rel=0.01)
+
+
+@pytest.mark.parametrize("is_instance", [False, True])
+def test_opaque_surfaces_block_it(tmp_path, is_instance):
+    glass = placed("rectangle", "glass", (0, 0, -3), GLASS, 1.0)
+    assert direct(tmp_path, LAMP, glass) > 0.0
+    assert direct(tmp_path, LAMP, glass, pane(DIFFUSE, is_instance=is_instance)) == 0.0
+
+
+@pytest.mark.parametrize(("integrator", "share"), [("path", 0.0), ("volpath", 0.923)])
+def test_light_that_no_path_can_hit_passes_as_in_mitsuba(tmp_path, integrator, share):
+    bare = direct(tmp_path, SPOT, integrator=integrator)
+    found = direct(tmp_path, SPOT, pane(GLASS, is_instance=False), integrator=integrator)
+    assert bare > 0.0
+    assert found == pytest.approx(share * bare, rel=0.01)
