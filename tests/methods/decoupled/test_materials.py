@@ -8,6 +8,7 @@ from PIL import Image
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Samples
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.records import Shading
 from support.integrated import (
     EMPTY,
     LUMINANCE,
@@ -175,10 +176,16 @@ def test_final_gathering_converges_to_path_traced_irradiance(materials):
     filled = cache_of((find_geometry(renderer, camera), irradiance))
     for cached, bias in ((EMPTY, 0.0), (filled, 0.02)):
         found = gathered(renderer, cached, camera, 64)
-        for ours, reference in zip(found, (irradiance.direct, irradiance.indirect), strict=True):
-            error = standard_errors(ours, reference)
-            deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
-            assert abs(error) < 4.0 + bias * (reference.color @ LUMINANCE).sum() / deviation
+        wanted = irradiance.direct, irradiance.indirect
+        # Emission that a scattered path meets beyond a cut-out or thin glass is in the second layer.
+        assert found[0].color.mean() == pytest.approx(wanted[0].color.mean(), rel=0.03)
+        ours, reference = (
+            Shading(first.color + second.color, first.variance + second.variance)
+            for first, second in (found, wanted)
+        )
+        error = standard_errors(ours, reference)
+        deviation = np.sqrt((ours.variance + reference.variance.ravel()).sum())
+        assert abs(error) < 4.0 + bias * (reference.color @ LUMINANCE).sum() / deviation
 
 
 def test_only_clear_surfaces_have_a_transmission_aov(materials):
