@@ -2,7 +2,8 @@
 """Blender's lights as emitters of Mitsuba.
 
 Cycles' lamps do not block light, and the camera does not see them. enfilade's camera does not see emitters
-whose BSDF has the id of lamps, either; shadow rays of volumetric path tracers pass them.
+whose BSDF has the id of lamps, either; shadow rays pass them, those to suns, spots and points with
+volumetric path tracers alone.
 """
 
 from __future__ import annotations

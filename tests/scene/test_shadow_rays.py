@@ -1,6 +1,7 @@
 """Shadow rays through thin glass and cut-outs: with Mitsuba's `path`, too, to emitters that paths can hit."""
 
 import drjit as dr
+import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, rows
@@ -15,7 +16,7 @@ PASSED = {"thin glass": (GLASS, 0.923), "cut-out": (veil(0.3), 0.7)}  # share al
 LAMP = placed(
     "rectangle", "lamp", (0, 0, -4), f'<emitter type="area">{rgb("radiance", 5, 5, 5)}</emitter>', 0.2
 )
-SPOT = (
+POINT = (
     f'<emitter type="point"><point name="position" x="0" y="0" z="-4"/>{rgb("intensity", 1, 1, 1)}</emitter>'
 )
 FLOOR = (
@@ -36,7 +37,7 @@ def direct(folder, *shapes, integrator="path"):
     """Light of next-event estimation at the middle of a floor that faces a lamp."""
     scene = write(folder, FLOOR, *shapes, head=INTEGRATOR.format(integrator), sky="")
     renderer = opened(scene)
-    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))))
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
     point, sampler = renderer.intersect(rays), one_sequence(COUNT)
     found = renderer.sample_diffuse(point, sampler, soft_only=renderer.has_sharp_light).direct
     if renderer.has_sharp_light:
@@ -56,14 +57,37 @@ def test_light_passes(tmp_path, integrator, name, is_instance):
 
 @pytest.mark.parametrize("is_instance", [False, True])
 def test_opaque_surfaces_block_it(tmp_path, is_instance):
-    glass = placed("rectangle", "glass", (0, 0, -3), GLASS, 1.0)
+    glass = placed("rectangle", "glass", (0, 0, -1), GLASS, 1.0)
     assert direct(tmp_path, LAMP, glass) > 0.0
     assert direct(tmp_path, LAMP, glass, pane(DIFFUSE, is_instance=is_instance)) == 0.0
 
 
 @pytest.mark.parametrize(("integrator", "share"), [("path", 0.0), ("volpath", 0.923)])
 def test_light_that_no_path_can_hit_passes_as_in_mitsuba(tmp_path, integrator, share):
-    bare = direct(tmp_path, SPOT, integrator=integrator)
-    found = direct(tmp_path, SPOT, pane(GLASS, is_instance=False), integrator=integrator)
+    bare = direct(tmp_path, POINT, integrator=integrator)
+    found = direct(tmp_path, POINT, pane(GLASS, is_instance=False), integrator=integrator)
     assert bare > 0.0
     assert found == pytest.approx(share * bare, rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "is_passed"), [("thin glass", True), ("below a normal map", False)])
+def test_a_path_keeps_its_bounce_where_shadow_rays_pass(tmp_path, name, is_passed):
+    """Mitsuba's maps transmit no shadow rays: emission behind them counts in full."""
+    bsdf = GLASS if is_passed else f'<bsdf type="normalmap">{rgb("normalmap", 0.5, 0.5, 1)}{GLASS}</bsdf>'
+    scene = write(
+        tmp_path, FLOOR, LAMP, pane(bsdf, is_instance=False), head=INTEGRATOR.format("path"), sky=""
+    )
+    renderer = opened(scene)
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
+    point, sampler = renderer.intersect(rays), one_sequence(COUNT)
+    sample = renderer.sample_diffuse(point, sampler)
+    direct, throughput = sample.direct, dr.select(sample.is_alive, sample.throughput, 0.0)
+    ahead = renderer.intersect(sample.rays, sample.bounce, sample.is_alive)
+    beyond = renderer.sample_specular(ahead, sampler)
+    throughput = dr.select(beyond.is_alive, throughput * beyond.throughput, 0.0)
+    emission = renderer.intersect(beyond.rays, beyond.bounce, beyond.is_alive).emission
+    found = rows(direct + throughput * emission).mean(axis=0, dtype=float)
+    whole = rows(sum(renderer.estimate_diffuse(point, sampler))).mean(axis=0, dtype=float)
+    assert dr.any(beyond.is_passed) == is_passed
+    assert np.any(rows(direct)) == is_passed
+    assert found == pytest.approx(whole, rel=0.1)

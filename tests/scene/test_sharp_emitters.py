@@ -74,6 +74,9 @@ VEILS = """<shape type="rectangle"><transform name="to_world"><scale x="0.8" y="
 <shape type="rectangle"><transform name="to_world"><scale x="0.5" y="0.5"/><rotate x="1" angle="90"/>
 <translate x="0.9" y="0.6"/></transform><bsdf type="null"/>
 <emitter type="area"><rgb name="radiance" value="0.7"/></emitter></shape>"""
+LAMP_BEHIND = VEILS.replace(
+    'y="0.6"/></transform><bsdf type="null"/>', 'y="0.7"/></transform><bsdf type="null"/>'
+)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +147,9 @@ def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
     ball = """<shape type="sphere"><float name="radius" value="0.4"/>
 <point name="center" value="0.9, 0.4, 0.6"/>
 <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>"""
-    renderer, cache = opened(tmp_path, BULBS + ball), IrradianceCache(is_soft=True)
+    pane = """<shape type="rectangle"><transform name="to_world"><translate z="-1"/></transform>
+<bsdf type="thindielectric"/></shape>"""
+    renderer, cache = opened(tmp_path, BULBS + ball + pane), IrradianceCache(is_soft=True)
     camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 48, 36)
     few = shaded(renderer, cache, camera, 4, pixels=300)
     ours, reference = shaded(renderer, cache, camera, 64), traced(renderer, camera, 64)
@@ -153,10 +158,10 @@ def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
 
 
 @pytest.mark.parametrize("integrator", ["path", "volpath"])
-@pytest.mark.parametrize("name", SKIES)
-def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name, integrator):
+@pytest.mark.parametrize(("name", "veils"), [*((name, VEILS) for name in SKIES), ("lamps", LAMP_BEHIND)])
+def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name, veils, integrator):
     """With `path`, no light of points, spots and directional emitters passes."""
-    renderer = opened(tmp_path, SKIES[name] + VEILS, integrator)
+    renderer = opened(tmp_path, SKIES[name] + veils, integrator)
 
     def radiance(rays, sampler):
         point = renderer.intersect(rays)

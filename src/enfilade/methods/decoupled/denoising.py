@@ -50,11 +50,12 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
     The denoiser loses some percent of the light where samples are skewed, and adds a third to regions two
-    pixels wide. The difference from its input, smoothed along surfaces over a range that leaves little noise,
-    is added to its result, as far as it exceeds its own standard error, in proportion to the luminance: what
-    is lost of a highlight does not brighten the dark surface around it. Outliers are limited, so that no
-    single path tints a surface. The denoiser takes no negative light: specular lobes that are a difference
-    have it, and it is denoised apart.
+    pixels wide. The difference from its input, smoothed along surfaces, is added to its result, as far as it
+    exceeds its own standard error, in proportion to the denoised luminance: what is lost of a highlight does
+    not brighten the dark surface around it. A highlight of a few pixels thus keeps some of its noise.
+    Outliers are limited, so that no single path tints a surface. The denoiser takes no negative light, which
+    is denoised apart: specular lobes that are a difference have it, and so has indirect light behind
+    cut-outs and thin glass, where the expectation of what paths find by chance is subtracted.
 
     Parameters
     ----------

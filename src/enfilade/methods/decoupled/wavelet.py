@@ -56,7 +56,7 @@ def smooth(
     Parameters
     ----------
     color : Array3f
-        Any number of channels where no difference counts.
+        With `deviations` None, a vector of any size.
     variance : Float
         Of the luminance.
     guide
@@ -90,10 +90,9 @@ def _filter_level(
     width, height = opaque(guide.width, Int), opaque(guide.height, Int)
     column, row = Int(column), Int(row)
 
-    # Blur the variance, and compute the luminance.
+    # Blur the variance.
     blurred = _blurred(variance, column, row, width, height) if deviations else Float(0)
     dr.eval(blurred)
-    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE)) if deviations else Float(0)
 
     # Prepare the distance of taps from this pixel's tangent plane.
     normal = dr.gather(Array3f, guide.normals, lane)
@@ -127,7 +126,7 @@ def _filter_level(
             other, of_tap = dr.gather(vector, color, tap), surface
             if deviations:
                 deviation = deviations * dr.sqrt(blurred + dr.gather(Float, blurred, tap)) + TINY
-                difference = dr.abs(dr.dot(other, Array3f(*REC709_LUMINANCE)) - luminance)
+                difference = dr.abs(dr.dot(other - color, Array3f(*REC709_LUMINANCE)))
                 of_tap = surface * dr.exp(-difference / deviation)
 
             # Accumulate.

@@ -81,7 +81,8 @@ class MitsubaRenderer:
         self._medium = next((sensor.get_medium() for sensor in scene.sensors()), None)
         self._sampler = _lane_sampler()
         self._lobes = Lobes(scene)
-        shadow_rays = ShadowRays(scene, pass_to_all=is_volumetric(self._integrator))
+        self._is_volumetric = is_volumetric(self._integrator)
+        shadow_rays = ShadowRays(scene, pass_to_all=self._is_volumetric)
         self._transport = LightTransport(scene, self._lobes, self._continued_radiance, shadow_rays)
         self._shapes = Shapes(self._merged)
         self._surfaces = recorded(lambda rays: self._intersect(rays)[0], lambda: self.state)
@@ -253,8 +254,9 @@ class MitsubaRenderer:
         return self._sampled(self._integrator, ray, sampler)[0]
 
     def _continued_radiance(self, rays: Rays, sampler: Any, path_depth: int, active: Any) -> tuple[Any, Any]:
-        """Radiance along rays that continue paths of a depth; whether Mitsuba takes it as valid."""
-        return self._sampled(self._continued[path_depth - 1], _ray(rays), sampler, active)
+        """Radiance along rays that continue paths of a depth; whether emission that is passed is in it."""
+        radiance, is_valid = self._sampled(self._continued[path_depth - 1], _ray(rays), sampler, active)
+        return radiance, is_valid | self._is_volumetric
 
     def _sampled(self, integrator: Any, ray: Any, sampler: Any, active: Any = True) -> tuple[Any, Any]:
         self._sampler.sampler = sampler

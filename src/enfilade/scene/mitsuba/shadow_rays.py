@@ -43,17 +43,24 @@ class ShadowRays:
 
     Attributes
     ----------
-    pass_null : bool
+    has_null : bool
         Whether the scene has null interactions.
     """
 
     def __init__(self, scene: Any, *, pass_to_all: bool) -> None:
         self._scene = scene
         self._pass_to_all = pass_to_all
-        self.pass_null = any(
+        self.has_null = any(
             isinstance(node, mi.BSDF) and mi.has_flag(node.flags(), mi.BSDFFlags.Null)
             for node in mi.traverse(scene).hierarchy
         )
+
+    def is_passed(self, si: Any, bsdf: Any, is_null: Any) -> Any:
+        """Whether they pass null interactions of surfaces: not those below bump and normal maps; Bool."""
+        if not self.has_null:
+            return Bool(False)
+        passed = mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, is_null))
+        return Bool(is_null & (dr.max(passed) > 0.0))
 
     def unoccluded(
         self, si: Any, target: Target, contributions: tuple[Any, ...], active: Any
@@ -67,10 +74,10 @@ class ShadowRays:
     def _transmittance(self, si: Any, to: Target, active: Any) -> Any:
         """Share of light that reaches a surface from a point; Color3f."""
         ray = si.spawn_ray_to(to.point)
-        if not self.pass_null:
+        if not self.has_null:
             return mi.Color3f(dr.select(self._scene.ray_test(ray, active), 0.0, 1.0))
         nearest = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        is_blocked = nearest.is_valid()
+        is_blocked = active & nearest.is_valid()
         is_instance = dr.reinterpret_array(UInt, nearest.instance) != 0  # its BSDF is known in the loop
         is_null = is_blocked & (is_instance | has_lobe(nearest.shape.bsdf().flags(), "Null"))
         if not self._pass_to_all:

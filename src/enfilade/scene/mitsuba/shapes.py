@@ -30,7 +30,7 @@ class Shapes:
     names : tuple of str
         Of shapes 1, 2, ...
     may_be_null : bool
-        Whether any BSDF has null interactions.
+        Whether any BSDF has null interactions, thin glass apart.
     has_lamps : bool
         Whether there are lamps. Camera rays pass them, but for scenes with participating media.
     """

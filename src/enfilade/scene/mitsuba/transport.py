@@ -28,8 +28,8 @@ class LightTransport:
     lobes
         Of its BSDFs.
     radiance
-        The path tracer: radiance along rays and whether it is valid, from the rays, their samplers, the path
-        depth at which they begin, and which of them are traced.
+        The path tracer: radiance along rays, and whether emission that is passed is in it; from the rays,
+        their samplers, the path depth at which they begin, and which of them are traced.
     shadow_rays
     """
 
@@ -58,38 +58,45 @@ class LightTransport:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
         found, is_valid = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
-        unweighted, weighted = self._emission_along(sample)
+        met, unweighted, weighted = self._emission_along(sample)
+        # Mitsuba's `path` returns nothing for paths that meet null interactions alone and leave the scene.
+        found = dr.select(is_valid, found, met)
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
-        # It leaves out the emission of paths that meet null interactions alone and leave the scene.
-        indirect = dr.select(sample.is_alive & is_valid, sample.throughput * (found - unweighted), 0.0)
+        indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
-    def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any]:
-        """Emission of the first hit, and of those before it that shadow rays pass: as it is, and weighted."""
+    def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any, Any]:
+        """Emission of the first hit, and of null interactions before it.
+
+        As a path meets it that passes all of them by chance; its expectation; and that weighted.
+        """
         ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
-        if not self._shadow_rays.pass_null:
+        if not self._shadow_rays.has_null:
             si = self._scene.ray_intersect(ray, sample.is_alive)
-            return self.emission(si, None, sample.is_alive), self.emission(si, sample.bounce, sample.is_alive)
+            met = self.emission(si, None, sample.is_alive)
+            return met, met, self.emission(si, sample.bounce, sample.is_alive)
 
         def add_hit(
-            ray: Any, share: Any, unweighted: Any, weighted: Any, active: Any, layer: Any
+            ray: Any, share: Any, met: Any, unweighted: Any, weighted: Any, active: Any, layer: Any
         ) -> tuple[Any, ...]:
             si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
-            unweighted += dr.select(active, share * self.emission(si, None, active), 0.0)
+            emitted = dr.select(active, self.emission(si, None, active), 0.0)
+            met += emitted
+            unweighted += share * emitted
             weighted += dr.select(active, share * self.emission(si, sample.bounce, active), 0.0)
             active = active & si.is_valid()
             passed = mi.unpolarized_spectrum(si.bsdf().eval_null_transmission(si, active))
             share = dr.select(active, share * Array3f(passed), share)
             active &= dr.max(share) > 0.0
-            return si.spawn_ray(ray.d), share, unweighted, weighted, active, layer + 1
+            return si.spawn_ray(ray.d), share, met, unweighted, weighted, active, layer + 1
 
-        _, _, unweighted, weighted, _, _ = dr.while_loop(
-            (ray, Array3f(1), Array3f(0), Array3f(0), Bool(sample.is_alive), UInt(0)),
-            lambda *state: state[4] & (state[5] < NULL_LAYERS),
+        _, _, met, unweighted, weighted, _, _ = dr.while_loop(
+            (ray, Array3f(1), Array3f(0), Array3f(0), Array3f(0), Bool(sample.is_alive), UInt(0)),
+            lambda *state: state[5] & (state[6] < NULL_LAYERS),
             add_hit,
-            labels=("ray", "share", "unweighted", "weighted", "active", "layer"),
+            labels=("ray", "share", "met", "unweighted", "weighted", "active", "layer"),
         )
-        return unweighted, weighted
+        return met, unweighted, weighted
 
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
@@ -153,7 +160,7 @@ class LightTransport:
         )
         ray = si.spawn_ray(si.to_world(wo))
         bounce = Bounce(Array3f(si.p), pdf, Bool(is_delta), Bool(soft_only))
-        is_passed = Bool(is_null & self._shadow_rays.pass_null)
+        is_passed = self._shadow_rays.is_passed(si, bsdf, is_null)
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
             bounce=dr.select(is_passed, point.bounce, bounce) if point.bounce else bounce,
