@@ -91,3 +91,18 @@ def test_a_path_keeps_its_bounce_where_shadow_rays_pass(tmp_path, name, is_passe
     assert dr.any(beyond.is_passed) == is_passed
     assert np.any(rows(direct)) == is_passed
     assert found == pytest.approx(whole, rel=0.1)
+
+
+@pytest.mark.parametrize("integrator", ["path", "volpath"])
+def test_a_lamp_behind_glass_counts_once(tmp_path, integrator):
+    """Its light is direct, also where a path meets nothing else; behind tinted glass with `volpath`."""
+    tint = rgb("specular_transmittance", 1, 0.5, 0.1) if integrator == "volpath" else ""
+    glass = f'<bsdf type="thindielectric">{tint}{rgb("specular_reflectance", 0, 0, 0)}</bsdf>'
+    shape = LAMP.replace("<emitter", '<bsdf type="null"/><emitter')
+    head = INTEGRATOR.format(integrator)
+    renderer = opened(write(tmp_path, FLOOR, shape, pane(glass, is_instance=False), head=head, sky=""))
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, COUNT) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
+    direct, indirect = renderer.estimate_diffuse(renderer.intersect(rays), one_sequence(COUNT))
+    direct, indirect = (rows(of).mean(axis=0, dtype=float) for of in (direct, indirect))
+    assert np.all(direct > 0.0)
+    assert np.abs(indirect) == pytest.approx(0.0, abs=0.1 * direct.max())
