@@ -1,11 +1,15 @@
 """Merged meshes: the same surfaces, under the same names, in fewer shapes."""
 
+from operator import attrgetter
+
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.scene.mitsuba import merge
 from enfilade.scene.mitsuba import renderer as module
 from enfilade.scene.mitsuba.load import load_scene
 from enfilade.scene.mitsuba.merge import MergedScene, merge_meshes
@@ -88,12 +92,102 @@ def test_path_traced_images_agree(tmp_path, unmerged):
     assert np.abs(difference / deviation).mean() < 1.2  # 0.8 for a normal distribution
 
 
-def test_a_scene_with_instances_stays_as_it_is(tmp_path):
-    group = """<shape type="shapegroup" id="group"><shape type="cube"/></shape>
-<shape type="instance" id="copy"><ref id="group"/>
-  <transform name="to_world"><translate z="-4"/></transform></shape>
-</scene>"""
-    renderer = opened(tmp_path, SCENE.replace("</scene>", group))
-    assert renderer.describe().shapes == ("a", "b", "c", "d", "e", "ball", "lamp", "copy")
-    merged = merge_meshes(load_scene(tmp_path / "boxes.xml"))
-    assert [source.tolist() for source in merged.sources] == [[i] for i in range(1, 9)]
+GROUPS = """<shape type="shapegroup" id="table">
+  <shape type="cube"><transform name="to_world"><scale x="0.5" y="0.1" z="0.5"/></transform>
+    <ref id="blue"/></shape>
+  <shape type="ply"><string name="filename" value="bowl.ply"/><ref id="tinted"/></shape></shape>
+<shape type="shapegroup" id="single"><shape type="cube"><ref id="red"/></shape></shape>
+<shape type="shapegroup" id="round"><shape type="sphere"/></shape>
+<bsdf type="diffuse" id="tinted"><texture type="mesh_attribute" name="reflectance">
+  <string name="name" value="vertex_color"/></texture></bsdf>"""
+
+
+def instance(name, group, x, y, *, scale="0.4, 0.4, 0.4", angle=0):
+    return f"""<shape type="instance" id="{name}"><ref id="{group}"/><transform name="to_world">
+<scale value="{scale}"/><rotate x="0.6" z="0.8" angle="{angle}"/><translate x="{x}" y="{y}"/></transform>
+</shape>"""
+
+
+INSTANCES = [
+    instance("plain", "table", -2.0, 1.5),
+    instance("turned", "table", -1.0, 2.0, angle=70),
+    instance("lone", "single", 0.2, 2.2, angle=-50),
+    instance("stretched", "table", 1.2, 2.0, scale="0.3, 0.9, 0.5", angle=-50),
+    instance("mirrored", "table", 2.2, 2.0, scale="-0.5, 0.6, 0.5", angle=-50),
+    instance("round one", "round", -1.7, -1.0, scale="0.3, 0.3, 0.3"),
+]
+
+
+def direction(u, v):
+    return np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], axis=-1)
+
+
+@pytest.fixture
+def with_instances(tmp_path):
+    """A file of instances, some of a bowl whose vertices have normals, texture coordinates and colours."""
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 17), np.linspace(0.5, 2.5, 9))
+    first = np.array([17 * row + column for row in range(8) for column in range(16)])[:, None]
+    faces = np.concatenate([first + corners for corners in ((0, 17, 1), (1, 17, 18))])
+    bowl = mi.Mesh("bowl", u.size, len(faces), has_vertex_normals=True, has_vertex_texcoords=True)
+    parameters = mi.traverse(bowl)
+    parameters["faces"] = mi.UInt32(faces.astype(np.uint32).ravel())
+    parameters["vertex_positions"] = floats(0.4 * direction(u, v) + [0.0, 0.5, 0.0])
+    parameters["vertex_normals"] = floats(direction(u, v))
+    parameters["vertex_texcoords"] = floats(np.stack([u, v], axis=-1))
+    parameters.update()
+    bowl.add_attribute("vertex_color", 3, floats(0.5 + 0.4 * direction(u, v)))
+    bowl.write_ply(str(tmp_path / "bowl.ply"))
+    file = tmp_path / "instances.xml"
+    file.write_text(SCENE.replace("</scene>", GROUPS + "".join(INSTANCES) + "</scene>"))
+    return file
+
+
+def floats(values):
+    return mi.Float(values.astype(np.float32).ravel())
+
+
+def members(merged):
+    return sorted(sorted(set(source.tolist())) for source in merged.sources)
+
+
+def test_instances_of_meshes_become_meshes(with_instances):
+    merged = merge_meshes(load_scene(with_instances))
+    names = ("plain", "turned", "lone", "stretched", "mirrored", "round one")
+    assert merged.names == ("a", "b", "c", "d", "e", "ball", "lamp", *names)
+    tables = [8, 9, 11, 12]
+    assert members(merged) == [[1, 3, 4, 10], [2, 5, *tables], [6], [7], tables, [13]]
+    assert [s.class_name() for s in merged.scene.shapes()].count("Instance") == 1  # of a sphere
+
+
+def test_instances_of_few_triangles_are_expanded_first(with_instances, monkeypatch):
+    monkeypatch.setattr(merge, "EXPANDED_TRIANGLES", 4 * (12 + 256))  # those of the tables alone
+    merged = merge_meshes(load_scene(with_instances))
+    assert members(merged) == [[1, 3, 4, 10], [2, 5], [6], [7], [8], [9], [11], [12], [13]]
+
+
+def test_expanded_instances_are_as_mitsuba_shows_them(with_instances):
+    scenes = [load_scene(with_instances), merge_meshes(load_scene(with_instances)).scene]
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-3.0, 3.0, 300), np.linspace(-2.0, 3.0, 250)))
+    rays = mi.Ray3f(mi.Point3f(mi.Float(x), mi.Float(y), 5.0), mi.Vector3f(0.05, 0.02, -1.0))
+    wanted, found = (scene.ray_intersect(rays) for scene in scenes)
+    is_hit = np.array(wanted.is_valid())
+    assert is_hit.sum() > 10_000
+    np.testing.assert_array_equal(found.is_valid(), is_hit)
+    for value in ("t", "n", "uv", "sh_frame.n"):
+        a, b = (np.array(attrgetter(value)(si)).reshape(-1, len(x))[:, is_hit] for si in (found, wanted))
+        np.testing.assert_allclose(a, b, atol=3e-4, err_msg=value)
+
+    # Mitsuba itself reads the colours of an instance's vertices at wrong places.
+    colour = np.array(found.shape.eval_attribute("vertex_color", found, found.is_valid()))
+    is_bowl = (colour > 0.0).any(axis=0)
+    assert is_bowl.sum() > 500
+    expected = 0.5 + 0.4 * direction(*np.array(found.uv)[:, is_bowl])
+    np.testing.assert_allclose(colour[:, is_bowl], expected.T, atol=0.02)
+
+
+def test_textures_of_a_shape_stay_its_own(tmp_path):
+    tinted = """<shape type="cube" id="{}"><texture type="checkerboard" name="vertex_tint"/>
+<ref id="red"/></shape>"""
+    file = tmp_path / "boxes.xml"
+    file.write_text(SCENE.replace("</scene>", tinted.format("f") + tinted.format("g") + "</scene>"))
+    assert members(merge_meshes(load_scene(file))) == [[1, 3, 4], [2, 5], [6], [7], [8], [9]]

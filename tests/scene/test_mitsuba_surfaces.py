@@ -105,7 +105,7 @@ def screens(tmp_path_factory):
     folder = tmp_path_factory.mktemp("screens")
     write_holes(folder)
     group = f"""<shape type="shapegroup" id="group">
-{placed("rectangle", "leaf", (0, 0, 0), veil(0.2))}</shape>
+{placed("disk", "leaf", (0, 0, 0), veil(0.2))}</shape>
 <shape type="instance" id="tree"><ref id="group"/>
 <transform name="to_world"><translate x="1.2" y="0" z="1"/></transform></shape>"""
     file = write(

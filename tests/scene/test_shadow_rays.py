@@ -26,10 +26,10 @@ FLOOR = (
 
 
 def pane(bsdf, *, is_instance):
-    shape = placed("rectangle", "pane", (0, 0, -2), bsdf, 1.0)
     if not is_instance:
-        return shape
-    group = f'<shape type="shapegroup" id="group">{shape}</shape>'
+        return placed("rectangle", "pane", (0, 0, -2), bsdf, 1.0)
+    disk = placed("disk", "pane", (0, 0, -2), bsdf, 1.0)  # instances of meshes are expanded
+    group = f'<shape type="shapegroup" id="group">{disk}</shape>'
     return f'{group}<shape type="instance"><ref id="group"/></shape>'
 
 

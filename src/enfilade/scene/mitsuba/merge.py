@@ -1,8 +1,9 @@
 """Meshes of one material merged into one shape, in the order of the file.
 
 Every launch of a kernel goes through all arrays of all shapes: a scene of 774 shapes costs 30 ms a launch.
-Mitsuba's own merging (``optimize``) does not tell which shape of the file a triangle comes from, and its
-order may vary.
+Instances cost more: the time that Mitsuba takes to record an intersection grows with the square of their
+number, to 10 s for 1000 of them. Mitsuba's own merging (``optimize``) leaves instances as they are, does not
+tell which shape of the file a triangle comes from, and its order may vary.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from enfilade.records import U32
+from enfilade.records import F32, U32
+
+EXPANDED_TRIANGLES = 50_000_000  # of all instances that become meshes; 5 to 9 GB
+SMALLEST = np.finfo(np.float32).tiny
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +29,7 @@ class MergedScene:
     ----------
     scene : mitsuba.Scene
     names : tuple of str
-        Of the shapes of the file, 1, 2, ...
+        Of the shapes of the file, 1, 2, ... An instance is a shape.
     sources : tuple of (N,) uint32
         For each shape of the scene the index of the file's shape, from 1: of each triangle of a merged mesh,
         or a single one.
@@ -36,73 +40,205 @@ class MergedScene:
     sources: tuple[U32, ...]
 
 
-def merge_meshes(scene: Any) -> MergedScene:
-    """Merge the meshes of a scene that share a material.
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A shape at one place or more.
 
-    Emitters, meshes with attributes of their own and boundaries of media stay as they are. A scene with
-    instances is returned as it is: Mitsuba can't build one again from its objects.
+    Attributes
+    ----------
+    shape : mitsuba.Shape
+    indices : tuple of int
+        Of the file's shape, or of the instances.
+    matrices : (N, 4, 4) float32 or None
+        Transforms of the instances.
     """
-    names = tuple(s.id() or f"{s.class_name()} {i}" for i, s in enumerate(scene.shapes(), start=1))
-    groups: dict[Any, list[tuple[int, Any]]] = {}
-    for index, shape in enumerate(scene.shapes(), start=1):
-        groups.setdefault(_key(index, shape), []).append((index, shape))
-    has_instances = any(shape.class_name() == "Instance" for shape in scene.shapes())
-    if has_instances or len(groups) == len(names):
+
+    shape: Any
+    indices: tuple[int, ...]
+    matrices: F32 | None = None
+
+
+def merge_meshes(scene: Any) -> MergedScene:
+    """Merge the meshes of a scene that share a material, and those of its instances.
+
+    Emitters and boundaries of media stay as they are. So do instances of what can't be merged, and those that
+    would have more than :data:`EXPANDED_TRIANGLES`.
+    """
+    shapes = scene.shapes()
+    names = tuple(s.id() or f"{s.class_name()} {i}" for i, s in enumerate(shapes, start=1))
+    placed, groups = _expanded(shapes, _shape_groups(scene))
+    merged: dict[Any, list[_Placed]] = {}
+    for item in placed:
+        merged.setdefault(_key(item), []).append(item)
+    if len(merged) == len(names) and all(item.matrices is None for item in placed):
         return MergedScene(scene, names, tuple(np.array([i], np.uint32) for i in range(1, len(names) + 1)))
 
-    # Replace each group by one shape, in the order of their first members.
+    # Replace each set by one shape, in the order of their first members.
     content: dict[str, Any] = {"type": "scene"}
     if scene.integrator() is not None:
         content["integrator"] = scene.integrator()
     content |= {f"sensor {i}": sensor for i, sensor in enumerate(scene.sensors())}
     content |= {f"emitter {i}": e for i, e in enumerate(scene.emitters()) if e.get_shape() is None}
+    content |= {f"group {i}": group for i, group in enumerate(groups)}
     sources = []
-    for number, members in enumerate(groups.values()):
-        shapes = [shape for _, shape in members]
-        content[f"shape {number}"] = shapes[0] if len(shapes) == 1 else _merged(f"merged {number}", shapes)
-        counts = [1] if len(shapes) == 1 else [shape.face_count() for shape in shapes]
-        sources.append(np.repeat(np.array([index for index, _ in members], np.uint32), counts))
+    for number, items in enumerate(merged.values()):
+        if len(items) == 1 and items[0].matrices is None:
+            content[f"shape {number}"] = items[0].shape
+            sources.append(np.array(items[0].indices, np.uint32))
+        else:
+            content[f"shape {number}"] = _merged(f"merged {number}", items)
+            counts = [item.shape.face_count() for item in items for _ in item.indices]
+            indices = np.array([index for item in items for index in item.indices], np.uint32)
+            sources.append(np.repeat(indices, counts))
     return MergedScene(mi.load_dict(content, optimize=False), names, tuple(sources))
 
 
-def _key(index: int, shape: Any) -> Any:
+def _shape_groups(scene: Any) -> dict[str, tuple[Any, list[Any]]]:
+    """Groups of shapes that instances refer to, and their shapes, by identifier."""
+    groups: dict[str, tuple[Any, list[Any]]] = {}
+    for node, (parent, _) in mi.traverse(scene).hierarchy.items():
+        if node.class_name() == "ShapeGroupPlugin":
+            groups[node.id()] = node, []
+        elif isinstance(node, mi.Shape) and parent.class_name() == "ShapeGroupPlugin":
+            groups[parent.id()][1].append(node)
+    return groups
+
+
+def _expanded(
+    shapes: Sequence[Any], groups: dict[str, tuple[Any, list[Any]]]
+) -> tuple[list[_Placed], list[Any]]:
+    """Shapes, with those of a group in place of its instances; and the groups that keep theirs.
+
+    Groups of few triangles are expanded first, so that few instances remain.
+    """
+    instances: dict[str, list[int]] = {name: [] for name in groups}
+    group_of = {i: _group_of(s) for i, s in enumerate(shapes, start=1) if s.class_name() == "Instance"}
+    for index, name in group_of.items():
+        instances[name].append(index)
+
+    # Choose the groups to expand.
+    left = EXPANDED_TRIANGLES
+    kept = set(groups)
+    triangles = {name: sum(s.primitive_count() for s in members) for name, (_, members) in groups.items()}
+    for name in sorted(groups, key=triangles.__getitem__):
+        total = triangles[name] * len(instances[name])
+        if total <= left and all(_is_mergeable(shape) for shape in groups[name][1]):
+            left -= total
+            kept.remove(name)
+
+    # Put their shapes where their first instance is.
+    placed = []
+    for index, shape in enumerate(shapes, start=1):
+        group = group_of.get(index)
+        if group is None or group in kept:
+            placed.append(_Placed(shape, (index,)))
+        elif index == instances[group][0]:
+            matrices = np.stack([_to_world(shapes[i - 1]) for i in instances[group]])
+            placed += [_Placed(member, tuple(instances[group]), matrices) for member in groups[group][1]]
+    return placed, [groups[name][0] for name in groups if name in kept]
+
+
+def _group_of(instance: Any) -> str:
+    """Identifier of an instance's group, which Mitsuba tells in its description alone."""
+    return str(instance).partition('name = "')[2].partition('"')[0]
+
+
+def _to_world(instance: Any) -> F32:
+    return np.array(mi.traverse(instance)["to_world"].matrix, np.float32)[..., 0]
+
+
+def _is_mergeable(shape: Any) -> bool:
+    """Whether a shape is a mesh without a role of its own, or textures that its material looks up."""
+    has_role = shape.is_emitter() or shape.is_sensor() or shape.is_medium_transition()
+    return shape.is_mesh() and not (has_role or any("." in name for name in _attributes(shape)))
+
+
+def _key(item: _Placed) -> Any:
     """Equal for meshes that can be merged."""
-    is_mergeable = (
-        shape.is_mesh()
-        and not (shape.is_emitter() or shape.is_sensor() or shape.is_medium_transition())
-        and not shape.has_mesh_attributes()
-    )
-    if not is_mergeable:
-        return index
-    features = shape.has_vertex_normals(), shape.has_vertex_texcoords()
-    return shape.bsdf().ptr, *features, shape.has_face_normals(), shape.has_flipped_normals()
+    shape = item.shape
+    if not _is_mergeable(shape):
+        return item.indices
+    widths = tuple((name, width) for name, (_, width) in _buffers(shape).items())
+    return shape.bsdf().ptr, widths, shape.has_face_normals(), shape.has_flipped_normals()
 
 
-def _merged(name: str, shapes: Sequence[Any]) -> Any:
+def _attributes(shape: Any) -> dict[str, Any]:
+    """What the vertices and triangles of a shape have, as far as it can be set."""
+    parameters = mi.traverse(shape).items()
+    return {name: value for name, value in parameters if name.startswith(("vertex_", "face_"))}
+
+
+def _buffers(mesh: Any) -> dict[str, tuple[Any, int]]:
+    """What the vertices and triangles of a mesh have, and its number of values for each of them."""
+    arrays = {
+        "vertex_positions": mesh.vertex_positions_buffer(),
+        "vertex_normals": mesh.vertex_normals_buffer(),
+        "vertex_texcoords": mesh.vertex_texcoords_buffer(),
+    }
+    arrays |= dict(sorted(_attributes(mesh).items()))
+    counts = {True: mesh.vertex_count(), False: mesh.face_count()}
+    widths = {name: len(array) // counts[name.startswith("vertex_")] for name, array in arrays.items()}
+    return {name: (array, widths[name]) for name, array in arrays.items() if widths[name]}
+
+
+def _merged(name: str, items: Sequence[_Placed]) -> Any:
     """One mesh of several, with the material of the first."""
-    first = shapes[0]
+    first = items[0].shape
     properties = mi.Properties()
     properties["bsdf"] = first.bsdf()
     properties["face_normals"] = first.has_face_normals()
     properties["flip_normals"] = first.has_flipped_normals()
     mesh = mi.Mesh(
         name,
-        vertex_count=sum(shape.vertex_count() for shape in shapes),
-        face_count=sum(shape.face_count() for shape in shapes),
+        vertex_count=sum(item.shape.vertex_count() * len(item.indices) for item in items),
+        face_count=sum(item.shape.face_count() * len(item.indices) for item in items),
         has_vertex_normals=first.has_vertex_normals(),
         has_vertex_texcoords=first.has_vertex_texcoords(),
         props=properties,
     )
-    bases = np.cumsum([0, *(shape.vertex_count() for shape in shapes[:-1])]).astype(np.uint32)
-    faces = [np.array(shape.faces_buffer()) + base for shape, base in zip(shapes, bases, strict=True)]
+    counts = [item.shape.vertex_count() for item in items for _ in item.indices]
+    bases = np.cumsum([0, *counts[:-1]]).astype(np.uint32)
     parameters = mi.traverse(mesh)
-    parameters["faces"] = mi.UInt32(np.concatenate(faces))
-    buffers = {"vertex_positions": "vertex_positions_buffer"}
-    if first.has_vertex_normals():
-        buffers["vertex_normals"] = "vertex_normals_buffer"
-    if first.has_vertex_texcoords():
-        buffers["vertex_texcoords"] = "vertex_texcoords_buffer"
-    for key, buffer in buffers.items():
-        parameters[key] = mi.Float(np.concatenate([np.array(getattr(shape, buffer)()) for shape in shapes]))
+    for key, (_, width) in _buffers(first).items():
+        values: Any = mi.Float(np.concatenate([_values(item, key).ravel() for item in items]))
+        if key in parameters:
+            parameters[key] = values
+        else:
+            mesh.add_attribute(key, width, values)
+    ends = np.cumsum([len(item.indices) for item in items])[:-1]
+    faces = zip(items, np.split(bases, ends), strict=True)
+    parameters["faces"] = mi.UInt32(
+        np.concatenate([(_faces(item) + b[:, None, None]).ravel() for item, b in faces])
+    )
     parameters.update()
     return mesh
+
+
+def _faces(item: _Placed) -> U32:
+    """Vertices of the triangles of all copies; (N, T, 3)."""
+    faces = np.array(item.shape.faces_buffer()).reshape(1, -1, 3)
+    if item.matrices is None:
+        return faces
+    is_mirrored = np.linalg.det(item.matrices[:, :3, :3]) < 0.0
+    return np.where(is_mirrored[:, None, None], faces[:, :, ::-1], faces)
+
+
+def _values(item: _Placed, name: str) -> F32:
+    """What the vertices or triangles of all copies have; (N, V, width)."""
+    buffer, width = _buffers(item.shape)[name]
+    values = np.array(buffer, np.float32).reshape(1, -1, width)
+    if item.matrices is None:
+        return values
+    linear = item.matrices[:, :3, :3]
+    if name == "vertex_positions":
+        positions: F32 = values @ linear.transpose(0, 2, 1) + item.matrices[:, None, :3, 3]
+        return positions
+    if name == "vertex_normals":
+        # By the cofactors, which are the inverse transpose times the determinant. Mitsuba normalizes what it
+        # interpolates.
+        a, b, c = linear.transpose(1, 0, 2)
+        cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
+        scale = np.sign(np.linalg.det(linear)) / np.maximum(np.abs(cofactors).max(axis=(1, 2)), SMALLEST)
+        normals: F32 = values @ (cofactors * scale[:, None, None])
+        return normals
+    return np.tile(values, (len(linear), 1, 1))
