@@ -106,3 +106,20 @@ def test_a_lamp_behind_glass_counts_once(tmp_path, integrator):
     direct, indirect = (rows(of).mean(axis=0, dtype=float) for of in (direct, indirect))
     assert np.all(direct > 0.0)
     assert np.abs(indirect) == pytest.approx(0.0, abs=0.1 * direct.max())
+
+
+def test_a_small_lamp_behind_a_cut_out_leaves_no_noise_in_the_rest(tmp_path):
+    lamp = placed(
+        "rectangle",
+        "lamp",
+        (0, 0, -4),
+        f'<emitter type="area">{rgb("radiance", 1e5, 1e5, 1e5)}</emitter>',
+        0.02,
+    )
+    renderer = opened(write(tmp_path, FLOOR, lamp, pane(veil(0.5), is_instance=False), sky=""))
+    count = 1 << 18  # of which ten meet the lamp
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, count) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
+    direct, indirect = (
+        rows(of) for of in renderer.estimate_diffuse(renderer.intersect(rays), one_sequence(count))
+    )
+    assert np.abs(indirect).max() < 10.0 * direct.mean()

@@ -16,6 +16,8 @@ from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, re
 from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays, Target
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
+RARE_WEIGHT = 1e-4  # of MIS: next-event estimation samples a direction 100 times as often as the lobe
+
 Radiance = Callable[[Rays, Any, int, Any], tuple[Any, Any]]
 
 
@@ -62,7 +64,12 @@ class LightTransport:
         # Mitsuba's `path` returns nothing for paths that meet null interactions alone and leave the scene.
         found = dr.select(is_valid, found, met)
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
-        indirect = dr.select(sample.is_alive, sample.throughput * (found - unweighted), 0.0)
+        # Behind a cut-out that passes a part of it, emission leaves noise of its own size in the rest: leave
+        # out the few directions that next-event estimation samples much more often than the lobe.
+        is_partly_passed = dr.max(unweighted) < dr.max(met)
+        is_rare = dr.max(weighted) < RARE_WEIGHT * dr.max(unweighted)
+        is_rest = sample.is_alive & ~(is_partly_passed & is_rare)
+        indirect = dr.select(is_rest, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
     def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any, Any]:
