@@ -104,3 +104,30 @@ def test_narrow_surfaces_may_have_more_rays(tmp_path, monkeypatch):
     assert expected.sum() > 50
     assert found[expected].all()
     assert not found[~dilated(dilated(is_block))].any()
+
+
+@pytest.mark.parametrize("rods", [np.linspace(-1.1, 1.1, 12), [0.02]])
+def test_metal_thinner_than_a_pixel_reflects(tmp_path, rods):
+    """The centres of pixels meet some of many rods, and not the single one."""
+    shapes = "".join(
+        f'<shape type="cylinder"><point name="p0" x="{x}" y="-1" z="0"/>'
+        f'<point name="p1" x="{x}" y="1" z="0"/><float name="radius" value="0.006"/>{METAL}</shape>'
+        for x in rods
+    )
+    sky = '<emitter type="constant"><rgb name="radiance" value="0.7"/></emitter>'
+    wall = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="4"/><translate z="-1"/></transform>'
+        '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></shape>'
+    )
+    file = tmp_path / "scene.xml"
+    file.write_text(f'<scene version="3.0.0"><integrator type="path"/>{shapes}{wall}{sky}</scene>')
+    renderer = MitsubaRenderer(file)
+    walk = walk_of(PATH, renderer)
+    assert (walk.view(MIDDLE).geometry.shape_index <= len(rods)).any() == (len(rods) > 1)
+    found = run_passes(Decoupled(), walk).colors[MIDDLE]
+    key = RandomKey(1, MIDDLE, Purpose.REFERENCE)
+    pixels = np.arange(SIZE[0] * SIZE[1], dtype=np.uint32)
+    traced = renderer.trace(CAMERAS[MIDDLE], pixels, key, spp=256, pixel_filter=PixelFilter.GAUSSIAN)
+    columns, expected = (of.reshape(*SIZE[::-1], 3).mean(axis=(0, 2)) for of in (found, traced.color))
+    assert found.mean() == pytest.approx(traced.color.mean(), rel=0.15)
+    assert np.abs(columns - expected).max() < 0.25 * expected.max()

@@ -52,13 +52,14 @@ class Frames:
         # Trace camera rays, then specular rays where they meet specular lobes.
         cache = shot.shading_cache(frame)
         diffuse, refined = _shade_diffuse(shot, frame, cache)
-        where = dilated(diffuse.is_marked.reshape(geometry.shape_index.shape))
+        seen = diffuse.is_marked.reshape(geometry.shape_index.shape)
+        where = dilated(seen)
         camera_rays = diffuse.shading.to_image(np.ones_like(where))
         is_marked, paths = diffuse.is_marked, diffuse.paths
         del diffuse  # its sums take 200 bytes a pixel
         color = camera_rays.color
         virtual = self._virtual_geometry(shot, frame) if where.any() else []
-        specular = shade_specular(shot, frame, cache, where, virtual, luminance(color))
+        specular = shade_specular(shot, frame, cache, seen, virtual, luminance(color))
 
         # Store the AOVs with the deviation of refined pixels, and count the rays.
         variance = camera_rays.variance + specular.variance

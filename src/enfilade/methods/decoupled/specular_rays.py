@@ -31,7 +31,7 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import filter_spatially, upload_aovs, with_edges
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.records import F32, Geometry, Mask
+from enfilade.records import F32, SPECULAR, Geometry, Mask
 from enfilade.renderer import PixelFilter, Purpose, Rays
 from enfilade.settings import LimitSettings
 
@@ -40,7 +40,7 @@ def shade_specular(
     shot: ShotContext,
     frame: int,
     cache: IrradianceCache,
-    where: Mask,
+    seen: Mask,
     virtual: Sequence[Geometry],
     beneath: F32,
 ) -> SpecularShading:
@@ -52,16 +52,19 @@ def shade_specular(
     frame
     cache
         Of the frame.
-    where : (H, W) bool
-        Pixels with specular lobes.
+    seen : (H, W) bool
+        Pixels whose camera rays meet specular lobes.
     virtual
         G-buffers of the frame with the virtual images of its AOVs; empty where no pixel has specular lobes.
     beneath : (H, W) float32
         Luminance of what camera rays see, which is displayed together with the AOVs.
     """
+    # The denoiser would blur surfaces thinner than a pixel, which the centres of no pixels around meet.
+    near, is_specular = dilated(seen), dilated(np.isin(shot.walk.view(frame).geometry.surface, SPECULAR))
+    where, is_missed = near & is_specular, near & ~is_specular
     nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
     black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
-    if not where.any():
+    if not near.any():
         return SpecularShading([black], nowhere, no_variance, 0, 0)
     frame_rays = _FrameRays(shot, frame, cache)
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
@@ -87,11 +90,11 @@ def shade_specular(
     is_denoised = shot.settings.denoiser != "none"
     aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
 
-    # Choose the edges: those in mirrors and panes, and those between surfaces where the AOVs differ visibly.
-    # Aliasing is more visible than noise: their tolerance is a third of that of noise.
+    # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
+    # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that.
     matters = AdaptiveSampling.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
-    edges = in_mirrors | (where & (is_edge | is_thin) & matters(shown))
+    edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & matters(shown))
     if not edges.any():
         return SpecularShading(aovs, nowhere, no_variance, paths, dropped)
 
