@@ -131,6 +131,8 @@ class ShadingPoint:
         Whether the BSDF has lobes other than the diffuse one.
     may_pass : Bool
         Whether one of these is a null interaction: a cut-out, opaque in part or not at all.
+    is_coated : Bool
+        Whether the only one is a smooth coat over the diffuse lobe.
     specular_albedo : Float
         Rough estimate of the share of light that these scatter towards the ray's origin: it sets the
         probability of survival in Russian roulette, and changes no mean.
@@ -145,6 +147,7 @@ class ShadingPoint:
     emission: Any
     has_specular: Any
     may_pass: Any
+    is_coated: Any
     specular_albedo: Any
     bounce: Bounce | None
     native: Any
@@ -379,6 +382,13 @@ class LobeRenderer(Renderer, Protocol):
             Radiance reflected by the diffuse lobe, divided by the albedo.
         specular : Array3f
             Radiance reflected by the specular lobes.
+        """
+        ...
+
+    def coat_emission(self, point: ShadingPoint) -> Any:
+        """Emission of the next surface, or of the environment, that smooth coats reflect; Array3f.
+
+        It has no noise. It is 0 where :attr:`ShadingPoint.is_coated` is false.
         """
         ...
 

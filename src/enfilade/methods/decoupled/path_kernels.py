@@ -125,11 +125,12 @@ class PathKernels:
         albedo = point.surfaces.albedo
         is_diffuse = point.surfaces.is_hit & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         sharp: tuple[Any, ...] = ()
-        direct = Array3f(0)
+        is_seen = path.bounce is None
+        direct = self._renderer.coat_emission(point) if is_seen else Array3f(0)
         if cache.is_soft:  # the camera sees the highlights of sharp emitters, too
-            sampler, is_seen = path.sampler.fork(SHARP_SALT), path.bounce is None
-            reflected_sharp, direct = self._renderer.sharp_light(point, sampler, specular=is_seen)
-            sharp = (reflected_sharp,)
+            sampler = path.sampler.fork(SHARP_SALT)
+            reflected_sharp, highlights = self._renderer.sharp_light(point, sampler, specular=is_seen)
+            sharp, direct = (reflected_sharp,), direct + highlights
         query = CacheQuery(
             position=point.position,
             normal=point.surfaces.normal,
@@ -179,6 +180,8 @@ class PathKernels:
 
         # Query the cache at the next vertex.
         emitted, vertex = self._intersect(cache, extended)
+        if path.bounce is None:  # the camera sees it in coats
+            emitted = dr.select(point.is_coated, 0.0, emitted)
         vertex = replace(vertex, radiance=emitted + vertex.radiance)
         is_split = sample.is_split & path.is_active & (path.branch == int(Branch.REFLECTED))
         is_end = extended.bounces >= MAX_BOUNCES

@@ -32,6 +32,7 @@ WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the B
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
+COATED = {"SmoothPlastic", "TwoSidedBRDF"}
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24
@@ -76,6 +77,8 @@ class Lobes:
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._rough_ior = bsdf_table(scene, _rough_ior, Float)
         self._narrow = bsdf_table(scene, _is_narrow)
+        self._coated = bsdf_table(scene, lambda bsdf: _classes(bsdf) <= COATED)
+        self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
         self._has_own_albedo = bool(dr.any(self._own_albedo))
         self._specular_albedo = self._mean_specular_albedo(scene)
@@ -84,7 +87,7 @@ class Lobes:
     def state(self) -> Any:
         """Arrays that the methods read."""
         albedos = self._own_albedo, self._bases, self._turned, self._masked, self._specular_albedo
-        interfaces = self._clear, self._rough_ior, self._narrow
+        interfaces = self._clear, self._rough_ior, self._narrow, self._coated
         return self._whole, self._lambertian, self._sides, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
@@ -177,6 +180,15 @@ class Lobes:
     def is_narrow(self, si: Any, bsdf: Any) -> Any:
         """Whether all lobes of a BSDF are narrow enough to show images, as those of a mirror do."""
         return _of(self._narrow, si, bsdf)
+
+    def is_coated(self, si: Any, bsdf: Any) -> Any:
+        """Whether a BSDF is a diffuse one below a smooth coat."""
+        return _of(self._coated, si, bsdf)
+
+    def coat_reflection(self, si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
+        """Direction into which a smooth coat reflects, and the weight of the light from there."""
+        sample, weight = bsdf.sample(self._specular, si, Float(0), mi.Point2f(0), active)
+        return sample.wo, weight
 
     def sample_specular(
         self, si: Any, bsdf: Any, sampler: Any, choice: Any = None, branch: Any = None

@@ -162,6 +162,7 @@ class MitsubaRenderer:
             emission=self._transport.emission(si, bounce),
             has_specular=self._lobes.has_specular(si, bsdf),
             may_pass=has_lobe(bsdf.flags(), "Null"),
+            is_coated=self._lobes.is_coated(si, bsdf),
             specular_albedo=self._lobes.specular_albedo(si, bsdf),
             bounce=bounce,
             native=si,
@@ -178,6 +179,10 @@ class MitsubaRenderer:
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
         return self._transport.sharp_light(point, sampler, specular=specular)
+
+    def coat_emission(self, point: ShadingPoint) -> Any:
+        """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
+        return self._transport.coat_emission(point)
 
     def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""

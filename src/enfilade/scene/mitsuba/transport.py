@@ -122,6 +122,16 @@ class LightTransport:
         found = self.sharp_emitters.estimate(si, sampler, evaluate, factors, active)
         return found[0], found[1] if specular else Array3f(0)
 
+    def coat_emission(self, point: ShadingPoint) -> Any:
+        """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
+        if not self._lobes.has_coats:
+            return Array3f(0)
+        si = point.native
+        wo, weight = self._lobes.coat_reflection(si, si.bsdf(), point.is_coated)
+        hit = self._scene.ray_intersect(si.spawn_ray(si.to_world(wo)), point.is_coated)
+        emitted = weight * self.emission(hit, None, point.is_coated)
+        return Array3f(dr.select(point.is_coated, emitted, 0.0))
+
     def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         si, albedo = point.native, point.surfaces.albedo
