@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mitsuba as mi
@@ -56,6 +57,20 @@ class _Placed:
     shape: Any
     indices: tuple[int, ...]
     matrices: F32 | None = None
+
+    @cached_property
+    def buffers(self) -> dict[str, tuple[Any, int]]:
+        """What the vertices and triangles of a mesh have: values, and their number for each; by name."""
+        mesh = self.shape
+        arrays = {
+            "vertex_positions": mesh.vertex_positions_buffer(),
+            "vertex_normals": mesh.vertex_normals_buffer(),
+            "vertex_texcoords": mesh.vertex_texcoords_buffer(),
+        }
+        arrays |= dict(sorted(_attributes(mesh).items()))
+        counts = {True: mesh.vertex_count(), False: mesh.face_count()}
+        widths = {name: len(array) // counts[name.startswith("vertex_")] for name, array in arrays.items()}
+        return {name: (array, widths[name]) for name, array in arrays.items() if widths[name]}
 
 
 def merge_meshes(scene: Any) -> MergedScene:
@@ -158,7 +173,7 @@ def _key(item: _Placed) -> Any:
     shape = item.shape
     if not _is_mergeable(shape):
         return item.indices
-    widths = tuple((name, width) for name, (_, width) in _buffers(shape).items())
+    widths = tuple((name, width) for name, (_, width) in item.buffers.items())
     return shape.bsdf().ptr, widths, shape.has_face_normals(), shape.has_flipped_normals()
 
 
@@ -166,19 +181,6 @@ def _attributes(shape: Any) -> dict[str, Any]:
     """What the vertices and triangles of a shape have, as far as it can be set."""
     parameters = mi.traverse(shape).items()
     return {name: value for name, value in parameters if name.startswith(("vertex_", "face_"))}
-
-
-def _buffers(mesh: Any) -> dict[str, tuple[Any, int]]:
-    """What the vertices and triangles of a mesh have, and its number of values for each of them."""
-    arrays = {
-        "vertex_positions": mesh.vertex_positions_buffer(),
-        "vertex_normals": mesh.vertex_normals_buffer(),
-        "vertex_texcoords": mesh.vertex_texcoords_buffer(),
-    }
-    arrays |= dict(sorted(_attributes(mesh).items()))
-    counts = {True: mesh.vertex_count(), False: mesh.face_count()}
-    widths = {name: len(array) // counts[name.startswith("vertex_")] for name, array in arrays.items()}
-    return {name: (array, widths[name]) for name, array in arrays.items() if widths[name]}
 
 
 def _merged(name: str, items: Sequence[_Placed]) -> Any:
@@ -199,7 +201,7 @@ def _merged(name: str, items: Sequence[_Placed]) -> Any:
     counts = [item.shape.vertex_count() for item in items for _ in item.indices]
     bases = np.cumsum([0, *counts[:-1]]).astype(np.uint32)
     parameters = mi.traverse(mesh)
-    for key, (_, width) in _buffers(first).items():
+    for key, (_, width) in items[0].buffers.items():
         values: Any = mi.Float(np.concatenate([_values(item, key).ravel() for item in items]))
         if key in parameters:
             parameters[key] = values
@@ -225,7 +227,7 @@ def _faces(item: _Placed) -> U32:
 
 def _values(item: _Placed, name: str) -> F32:
     """What the vertices or triangles of all copies have; (N, V, width)."""
-    buffer, width = _buffers(item.shape)[name]
+    buffer, width = item.buffers[name]
     values = np.array(buffer, np.float32).reshape(1, -1, width)
     if item.matrices is None:
         return values
