@@ -64,11 +64,11 @@ class LightTransport:
         # Mitsuba's `path` returns nothing for paths that meet null interactions alone and leave the scene.
         found = dr.select(is_valid, found, met)
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
-        # Behind a cut-out that passes a part of it, emission leaves noise of its own size in the rest: leave
-        # out the few directions that next-event estimation samples much more often than the lobe.
-        is_partly_passed = dr.max(unweighted) < dr.max(met)
-        is_rare = dr.max(weighted) < RARE_WEIGHT * dr.max(unweighted)
-        is_rest = sample.is_alive & ~(is_partly_passed & is_rare)
+        is_rest = sample.is_alive
+        if self._shadow_rays.has_null:
+            # Null interactions that are passed by chance, or ended by Russian roulette, leave noise of the size
+            # of the emission: leave out the few directions that next-event estimation samples more often.
+            is_rest &= dr.max(weighted) >= RARE_WEIGHT * dr.max(unweighted)
         indirect = dr.select(is_rest, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
