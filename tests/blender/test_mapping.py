@@ -9,6 +9,7 @@ import pytest
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import AttributeValue, Constant, Output
@@ -85,6 +86,16 @@ def test_file_names_lack_the_characters_that_mitsuba_reads():
 def test_the_number_of_a_colour_is_its_luminance():
     numbers = [Constant(value).number for value in ((0.3,), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0))]
     assert numbers == pytest.approx([0.3, 1.0, 0.7152], abs=1e-4)
+
+
+@pytest.mark.parametrize(("kind", "number"), [("VECTOR", 0.6), ("RGBA", 0.2563)])
+def test_the_number_of_a_group_s_default_is_that_of_its_kind(kind, number):
+    default = SimpleNamespace(identifier="in", type=kind, is_linked=False, default_value=(0.9, 0.0, 0.9))
+    inside = SimpleNamespace(node=SimpleNamespace(type="GROUP_INPUT", mute=False), identifier="in")
+    link = SimpleNamespace(is_valid=True, is_muted=False, from_socket=inside)
+    socket = SimpleNamespace(type="VALUE", is_linked=True, links=[link])
+    value = Graph("wall", Notes()).value(socket, (SimpleNamespace(inputs=[default]),))
+    assert value.number == pytest.approx(number, abs=1e-3)
 
 
 def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_path):

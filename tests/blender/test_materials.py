@@ -240,3 +240,12 @@ def test_numbers_and_vectors_of_meshes_are_colours(blender):
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f([0.0, 2.0, 4.0], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0)))
     found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
     assert found == pytest.approx(np.array([[0.25] * 3, [0.2, 0.4, 0.6], [0.3] * 3]), abs=2e-3)
+
+
+def test_the_number_of_a_colour_is_its_luminance_and_that_of_a_vector_its_mean(blender):
+    code, out, result = blender.job(blender.make("numbers")[0], "numbers")
+    assert code == 0, result
+    weights = ET.parse(out / "scene.xml").findall(".//bsdf[@type='blendbsdf']/float[@name='weight']")
+    # Cycles' weights of red and green: 0.2127 and 0.7152.
+    wanted = [0.9 * 0.2127 + 0.3 * 0.7152, 0.6, 0.5]
+    assert [float(weight.get("value")) for weight in weights] == pytest.approx(wanted, abs=2e-3)

@@ -15,7 +15,7 @@ import numpy as np
 
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
-from enfilade_blender.materials.bake_scene import BakeScene
+from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
 from enfilade_blender.materials.graph import upstream
 from enfilade_blender.materials.image_pixels import is_missing
 from enfilade_blender.materials.stand_ins import IMAGES
@@ -95,12 +95,13 @@ class Bakery:
     def _over_uv(self, value: Any, material: Any) -> Any:
         if not isinstance(value, Procedural) or value.uv_map is None:
             return value
-        key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
+        groups = tuple(group.as_pointer() for group in value.output.groups)
+        key = value.output.socket.as_pointer(), groups, value.is_number
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
             with self._stage().square(value.uv_map) as canvas:
-                pixels, _ = canvas.bake(value.output, material, size)
+                pixels, _ = canvas.bake(value.output, material, size, _kind(value))
             self._of_uv[key] = self._stored(pixels, None, value, material.name, value.uv_map)
         return self._of_uv[key]
 
@@ -110,9 +111,8 @@ class Bakery:
         is_lost = isinstance(value, ImageValue) and self._textures.is_missing(value)
         if is_lost or (isinstance(value, Procedural) and _is_missing(value.output.node)):
             return Constant((0.5, 0.5, 0.5))
-        is_normal = isinstance(value, ProceduralNormal)
-        pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
-        if is_normal:
+        pixels, covered = canvas.bake(value.output, material, size, _kind(value))
+        if isinstance(value, ProceduralNormal):
             pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
             file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
             self._note(value.output, f"{material.name}, {placed.name}", size)
@@ -179,6 +179,13 @@ class Bakery:
         wanted = nearest * PER_PIXEL if self._views else float(self._job.bake_px)
         power = 2 ** int(np.ceil(np.log2(max(wanted, SMALLEST))))
         return int(min(power, self._job.bake_px))
+
+
+def _kind(value: Any) -> BakeKind:
+    """What is baked of a value."""
+    if isinstance(value, ProceduralNormal):
+        return "normal"
+    return "number" if isinstance(value, Procedural) and value.is_number else "colour"
 
 
 def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:

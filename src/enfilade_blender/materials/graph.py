@@ -96,26 +96,28 @@ class Graph:
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
         """Value of an input."""
-        found = follow(socket, groups)
+        found, is_number = follow(socket, groups), socket.type == "VALUE"
         if not isinstance(found, Output):
-            return Constant(_numbers(found))
+            numbers = _numbers(found)
+            return Constant((sum(numbers) / 3.0,) if is_number and found.type == "VECTOR" else numbers)
         node = found.node
         if node.type in ("RGB", "VALUE"):
             return Constant(_numbers(found.socket))
         if node.type == "LIGHT_PATH":
             self._note_light_path(found)
             return Constant((0.0,))
-        if node.type == "VERTEX_COLOR" and found.socket.name == "Color":
-            return AttributeValue(found, node.layer_name)
-        if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and found.socket.name == "Color":
-            return AttributeValue(found, node.attribute_name)
+        if found.socket.name == "Color" and not is_number:
+            if node.type == "VERTEX_COLOR":
+                return AttributeValue(found, node.layer_name)
+            if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY":
+                return AttributeValue(found, node.attribute_name)
         if node.type == "TEX_IMAGE" and node.image is None:
             effect = "a mid grey is in its place"
             self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
             return Constant((0.5, 0.5, 0.5))
         if node.type == "TEX_IMAGE" and (coordinates := image_coordinates(node, found.groups)):
             return ImageValue(found, *coordinates)
-        return Procedural(found, *_dependence(found))
+        return Procedural(found, *_dependence(found), is_number)
 
     def normal(self, socket: Any, groups: tuple[Any, ...]) -> Normal:
         """Normal of an input; None for the mesh's."""

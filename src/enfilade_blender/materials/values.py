@@ -95,11 +95,14 @@ class Procedural:
         all objects. None: it depends on more.
     is_of_view : bool
         It depends on the direction of view or the kind of ray, which a texture does not.
+    is_number : bool
+        A number is made of it, as Cycles does: the luminance of a colour, the mean of a vector.
     """
 
     output: Output
     uv_map: str | None = None
     is_of_view: bool = False
+    is_number: bool = False
 
 
 @dataclass(frozen=True, eq=False)

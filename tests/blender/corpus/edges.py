@@ -201,6 +201,29 @@ def attributes(_folder):
             setattr(item, "vector" if kind == "FLOAT_VECTOR" else "value", value)
 
 
+def numbers(_folder):
+    """Factors of a colour attribute, of a vector, and of a vector out of a group."""
+    new_file()
+    group = bpy.data.node_groups.new("vector", "ShaderNodeTree")
+    group.interface.new_socket("Vector", in_out="OUTPUT", socket_type="NodeSocketVector")
+    fill(group, group.nodes.new("NodeGroupOutput"), {0: node_of(group, "CombineXYZ", X=0.9, Z=0.6)})
+    for number, (name, kind, inputs) in enumerate(
+        (
+            ("colour", "VertexColor", {}),
+            ("vector", "CombineXYZ", {"X": 0.9, "Z": 0.9}),
+            ("grouped", "Group", {}),
+        )
+    ):
+        material, tree, mix = shader(name, "MixShader")
+        factor = node_of(tree, kind, **inputs)
+        if kind == "Group":
+            factor.node_tree = group
+        fill(tree, mix, {0: factor, 1: node_of(tree, "BsdfDiffuse"), 2: node_of(tree, "BsdfTranslucent")})
+        data = plane(name, (2.0 * number, 0.0, 0.0), 1.5, material).data
+        for corner in data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER").data:
+            corner.color = (0.9, 0.3, 0.0, 1.0)
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
