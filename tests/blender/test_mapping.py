@@ -2,13 +2,14 @@
 
 import math
 from types import SimpleNamespace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.bsdfs import Context, plastic_bsdf
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
 from enfilade_blender.materials.textures import Textures, file_stem
@@ -86,6 +87,14 @@ def test_file_names_lack_the_characters_that_mitsuba_reads():
 def test_the_number_of_a_colour_is_its_luminance():
     numbers = [Constant(value).number for value in ((0.3,), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0))]
     assert numbers == pytest.approx([0.3, 1.0, 0.7152], abs=1e-4)
+
+
+@pytest.mark.parametrize(("given", "taken"), [(-0.3, 0.0), (3.0, 1.0)])
+def test_a_plastic_s_roughness_is_between_0_and_1(tmp_path, given, taken):
+    notes = Notes()
+    context, grey = Context("wall", Textures(tmp_path, notes), notes), Constant((0.5,))
+    found, wanted = (plastic_bsdf(grey, Constant((r,)), 1.5, context) for r in (given, taken))
+    assert ET.tostring(found) == ET.tostring(wanted)
 
 
 @pytest.mark.parametrize(("kind", "number"), [("VECTOR", 0.6), ("RGBA", 0.2563)])

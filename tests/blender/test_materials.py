@@ -249,3 +249,24 @@ def test_the_number_of_a_colour_is_its_luminance_and_that_of_a_vector_its_mean(b
     # Cycles' weights of red and green: 0.2127 and 0.7152.
     wanted = [0.9 * 0.2127 + 0.3 * 0.7152, 0.6, 0.5]
     assert [float(weight.get("value")) for weight in weights] == pytest.approx(wanted, abs=2e-3)
+
+
+def test_heights_and_normals_have_all_digits(blender):
+    code, out, result = blender.job(blender.make("heights")[0], "heights")
+    assert code == 0, result
+    bsdfs = {e.get("id"): e for e in ET.parse(out / "scene.xml").getroot().findall("bsdf")}
+
+    def found(name, of):
+        (texture,) = bsdfs[f"material {name}"].iterfind(f".//{of}")
+        file = texture.find("string[@name='filename']").get("value")
+        return np.array(mi.Bitmap(str(out / file)), np.float32)[..., 0]
+
+    values = {name: found(name, "bsdf[@type='bumpmap']/texture") for name in ("below 0", "low", "as it is")}
+    assert (values["below 0"].min(), values["below 0"].max()) == pytest.approx((-0.49, 0.49), abs=0.01)
+    assert values["low"].max() == pytest.approx(0.004, abs=1e-4)
+    assert np.diff(values["as it is"][32]) == pytest.approx(1.0 / 64.0, abs=1e-5)
+    # Baked beside noise, between the image's pixels.
+    name = "beside noise: beside noise"
+    assert len(np.unique(found(name, "bsdf[@type='bumpmap']/texture"))) > 64
+    assert len(np.unique(found("normals: normals", "texture[@name='normalmap']"))) > 256
+    assert found("rough", "texture[@name='alpha']").max() == 1.0

@@ -24,6 +24,7 @@ from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     Add,
     AttributeValue,
+    Bump,
     Constant,
     ImageValue,
     Lobe,
@@ -47,6 +48,7 @@ BAKED_UV = "enfilade"
 SMALLEST = 64  # pixels
 PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
 UNIFORM = 2e-3  # standard deviation below which a texture is a constant
+UNIFORM_EXACT = 1e-6  # the same of heights: 0.001 of them may be a steep millimetre
 CONSTANT_PX = 8
 FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
 UV_MAPS = 8  # that a mesh of Blender can have
@@ -96,7 +98,7 @@ class Bakery:
         if not isinstance(value, Procedural) or value.uv_map is None:
             return value
         groups = tuple(group.as_pointer() for group in value.output.groups)
-        key = value.output.socket.as_pointer(), groups, value.is_number
+        key = value.output.socket.as_pointer(), groups, value.is_number, value.is_exact
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
@@ -114,20 +116,31 @@ class Bakery:
         pixels, covered = canvas.bake(value.output, material, size, _kind(value))
         if isinstance(value, ProceduralNormal):
             pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
-            file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
+            file = self._textures.write(
+                f"{placed.name} normal", pixels.astype(np.float32), raw=True, is_exact=True
+            )
             self._note(value.output, f"{material.name}, {placed.name}", size)
             return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
         return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV)
 
     def _with_baked_normals(self, shader: Shader) -> Shader:
-        """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map."""
+        """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map.
+
+        Heights of images are interpolated by the bake, and stored with all digits.
+        """
         if isinstance(shader, Mix | Add):
             first, second = (self._with_baked_normals(part) for part in (shader.first, shader.second))
             return replace(shader, first=first, second=second)
-        if isinstance(shader, Principled | Lobe) and isinstance(shader.normal, NormalMap):
-            image = shader.normal.image
-            if not (isinstance(image, ImageValue) and self._textures.is_missing(image)):
-                return replace(shader, normal=ProceduralNormal(shader.normal.output))
+        if not isinstance(shader, Principled | Lobe) or not isinstance(shader.normal, NormalMap | Bump):
+            return shader
+        normal, image = shader.normal, shader.normal.image
+        if isinstance(image, ImageValue) and self._textures.is_missing(image):
+            return shader
+        if isinstance(normal, NormalMap):
+            return replace(shader, normal=ProceduralNormal(normal.output))
+        if isinstance(image, ImageValue):
+            heights = Procedural(image.output, is_number=True, is_exact=True)
+            return replace(shader, normal=replace(normal, image=heights))
         return shader
 
     def _note_lost(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> None:
@@ -146,18 +159,20 @@ class Bakery:
     ) -> Value:
         """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
         output = value.output
+        is_exact = value.is_exact if isinstance(value, Procedural) else value.image.is_float
         if isinstance(value, Procedural) and value.is_of_view:
             effect = "as seen along the normal from all directions"
             self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
         inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
         mean = inside.mean(axis=0)
         colour = (float(mean[0]), float(mean[1]), float(mean[2]))
-        if inside.std(axis=0).max() <= UNIFORM * max(1.0, float(mean.max())):
+        if inside.std(axis=0).max() <= (UNIFORM_EXACT if is_exact else UNIFORM) * max(1.0, float(mean.max())):
             return Constant(colour)
         if covered is not None:
             pixels = np.where(covered[..., None], pixels, mean)
         is_data = output.socket.type != "RGBA" or bool(pixels.max() > 1.0)
-        file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
+        pixels = pixels if is_exact else np.maximum(pixels, 0.0)
+        file = self._textures.write(f"{name} {output.node.name}", pixels, raw=is_data, is_exact=is_exact)
         self._note(output, name, len(pixels))
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
 

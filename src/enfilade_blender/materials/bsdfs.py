@@ -91,6 +91,7 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
 
 
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
+    roughness = clipped(roughness)
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
     if roughness >= MATT:
         reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
@@ -110,7 +111,7 @@ def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, 
     """Two roughnesses, and the share of the second; alpha is linear in between."""
     if not context.textures.has_pixels(roughness):
         return 0.5, 0.5, 0.5
-    pixels = context.textures.numbers(roughness)
+    pixels = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
     low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
     if high - low < 1e-2:
         return low, high, 0.5
@@ -195,17 +196,19 @@ def _microfacets(
 def _alpha(roughness: Value, context: Context) -> float | Element:
     """GGX alpha: the roughness squared, also of a texture."""
     if isinstance(roughness, Constant):
-        alpha = min(max(roughness.number, 0.0), 1.0) ** 2
+        alpha = clipped(roughness.number) ** 2
         return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
     if context.textures.has_pixels(roughness):
-        squared = np.maximum(context.textures.numbers(roughness) ** 2, ALPHA_MIN)
-        return context.textures.rewritten(roughness, squared, "alpha")
+        inside = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
+        return context.textures.rewritten(roughness, np.maximum(inside**2, ALPHA_MIN), "alpha")
     return 0.25
 
 
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:
     """An alpha; that of the mean roughness of a texture."""
-    return alpha if isinstance(alpha, float) else Constant(context.textures.mean(roughness)).number ** 2
+    if isinstance(alpha, float):
+        return alpha
+    return clipped(Constant(context.textures.mean(roughness)).number) ** 2
 
 
 def layered(
@@ -271,6 +274,11 @@ def blend(
     if is_one(weight):
         return second()
     return plugin("bsdf", "blendbsdf", first(), second(), weight=context.textures.number(weight))
+
+
+def clipped(roughness: float) -> float:
+    """Roughness as Blender takes it."""
+    return min(max(roughness, 0.0), 1.0)
 
 
 def _unbounded(values: np.ndarray) -> tuple[float, float, float]:

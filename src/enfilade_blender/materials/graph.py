@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from enfilade_blender.materials import mapping, table
@@ -128,14 +129,12 @@ class Graph:
         if node.type == "NORMAL_MAP" and not node.inputs["Color"].is_linked:
             return None  # as the importer of FBX files leaves it: its colour is the flat one
         if node.type == "NORMAL_MAP" and node.space == "TANGENT":
-            image, strength = (
-                self.value(node.inputs["Color"], inner),
-                self.value(node.inputs["Strength"], inner),
-            )
+            image = _exact(self.value(node.inputs["Color"], inner))
+            strength = self.value(node.inputs["Strength"], inner)
             if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
                 return NormalMap(image, strength.number, found)
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
-            height = self.value(node.inputs["Height"], inner)
+            height = _exact(self.value(node.inputs["Height"], inner))
             strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))
             if isinstance(height, Constant):
                 return None
@@ -320,6 +319,11 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
 
 def _is_of_uv(value: Value) -> bool:
     return isinstance(value, Procedural) and value.uv_map is not None
+
+
+def _exact(value: Value) -> Value:
+    """The value with all digits, where it is baked."""
+    return replace(value, is_exact=True) if isinstance(value, Procedural) else value
 
 
 def _by_identifier(sockets: Any, like: Any) -> Any:

@@ -123,9 +123,10 @@ INPUTS = (
     (
         "Attribute of vertices, corners or faces",
         "mapped",
-        "`mesh_attribute`; baked: its alpha, several in one material, and what nodes compute of it",
+        "`mesh_attribute`; baked: its alpha, its number, several in one material, what nodes compute of it",
     ),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
+    ("Baked heights and normals", "baked", "OpenEXR files of 32 bits"),
     (
         "Everything else: noise, ramps, Object and Generated coordinates",
         "baked",

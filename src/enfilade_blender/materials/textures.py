@@ -160,12 +160,12 @@ class Textures:
         self._notes.add("approximated", name, value.output.node.name, what, "a mid grey is in its place")
         return True
 
-    def write(self, name: str, image: F32, *, raw: bool) -> str:
-        """Write an image as PNG, or as OpenEXR where it has values above 1; its name in the scene.
+    def write(self, name: str, image: F32, *, raw: bool, is_exact: bool = False) -> str:
+        """Write an image as PNG, or as OpenEXR if exact or with values above 1; its name in the scene.
 
         Without `raw` the values of a PNG are sRGB, as Mitsuba expects.
         """
-        if image.max(initial=0.0) > 1.0:
+        if is_exact or image.max(initial=0.0) > 1.0:
             file = f"textures/{self._names.unique(file_stem(name))}.exr"
             write_exr(self._folder / file, np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float32))
         else:
@@ -179,7 +179,9 @@ class Textures:
         key = *key, name
         if key not in self._files:
             stem = Path(key[0]).stem
-            self._files[key] = self.write(f"{stem} {name}", image.astype(np.float32), raw=raw)
+            is_exact = value.file.endswith(".exr") if isinstance(value, Texture) else value.image.is_float
+            image = image.astype(np.float32)
+            self._files[key] = self.write(f"{stem} {name}", image, raw=raw, is_exact=is_exact)
         raw = raw or self._files[key].endswith(".exr")
         return self._bitmap(value, self._files[key], raw=raw)
 
@@ -227,7 +229,8 @@ class Textures:
                 file = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
             else:
                 file = self._copied(image, name) if is_as_stored(value.output.node) else ""
-                file = file or self.write(name, image_colours(value.output.node), raw=raw)
+                colours = image_colours(value.output.node)
+                file = file or self.write(name, colours, raw=raw, is_exact=image.is_float)
             self._files[key] = file
         return self._files[key], raw
 

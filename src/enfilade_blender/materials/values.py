@@ -97,12 +97,15 @@ class Procedural:
         It depends on the direction of view or the kind of ray, which a texture does not.
     is_number : bool
         A number is made of it, as Cycles does: the luminance of a colour, the mean of a vector.
+    is_exact : bool
+        Its slopes count, as those of heights and normals: it is stored with all digits, below 0, too.
     """
 
     output: Output
     uv_map: str | None = None
     is_of_view: bool = False
     is_number: bool = False
+    is_exact: bool = False
 
 
 @dataclass(frozen=True, eq=False)
