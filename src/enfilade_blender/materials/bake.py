@@ -76,7 +76,8 @@ class Bakery:
         shader = replaced(shader, lambda value: _of_mesh(value, mesh, has_several=len(read) > 1))
         self._note_lost(shader, material, mesh, placed)
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-        uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
+        read_maps = [uv_map for value in values_of(shader) for uv_map in _uv_maps(value)]
+        uv_maps = {uv_map or mesh.active_uv for uv_map in [*read_maps, *_tangents(shader)]}
         if not wanted and len(uv_maps) <= 1:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
@@ -259,3 +260,11 @@ def _uv_maps(value: Any) -> list[str]:
         return [value.uv_map]
     is_of_uv = isinstance(value, Procedural) and value.uv_map is not None and _images(value.output)
     return [value.uv_map] if is_of_uv else []
+
+
+def _tangents(shader: Shader) -> list[str]:
+    """UV maps along which normal maps are turned; in Mitsuba they are those of the images."""
+    if isinstance(shader, Mix | Add):
+        return _tangents(shader.first) + _tangents(shader.second)
+    normal = shader.normal if isinstance(shader, Principled | Lobe) else None
+    return [normal.output.node.uv_map] if isinstance(normal, NormalMap) else []

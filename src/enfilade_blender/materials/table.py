@@ -99,6 +99,7 @@ PRINCIPLED = (
         "mapped",
         "`normalmap`, `bumpmap`; where the UV map is mirrored, a shape and a map of their own",
     ),
+    ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
     (
         "Coat",
         "mapped",

@@ -111,7 +111,10 @@ def mirrored_camera(_folder):
 
 
 def mirrored_normals(_folder):
-    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection."""
+    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection.
+
+    One more has the tangents of another UV map than its image's, on which v is along x.
+    """
     new_file()
     tilted = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
     material, tree, bsdf = shader("tilted", "BsdfAnisotropic", Roughness=0.0)
@@ -126,6 +129,13 @@ def mirrored_normals(_folder):
     for vertex in pair.data.vertices:
         vertex.co.x += 0.5
     pair.modifiers.new("Mirror", "MIRROR")
+    turned, tree, bsdf = shader("turned", "BsdfAnisotropic", Roughness=0.0)
+    normal = node_of(tree, "NormalMap", Color=tilted)
+    normal.uv_map = "Turned"
+    fill(tree, bsdf, {"Normal": normal})
+    maps = plane("turned", (-2.0, 0.0, 0.0), 1.0, turned).data.uv_layers
+    for loop, shown in zip(maps.new(name="Turned").uv, maps[0].uv, strict=True):
+        loop.vector = 1.0 - shown.vector[1], shown.vector[0]
 
 
 def lamp_nodes(_folder):
