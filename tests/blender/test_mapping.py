@@ -10,7 +10,7 @@ import pytest
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import Context, plastic_bsdf
-from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.graph import Graph, depends_on_place
 from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import AttributeValue, Constant, Output
@@ -87,6 +87,23 @@ def test_file_names_lack_the_characters_that_mitsuba_reads():
 def test_the_number_of_a_colour_is_its_luminance():
     numbers = [Constant(value).number for value in ((0.3,), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0))]
     assert numbers == pytest.approx([0.3, 1.0, 0.7152], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("socket", "node", "is_so"),
+    [
+        ("Normal", {"type": "NEW_GEOMETRY"}, True),
+        ("Pointiness", {"type": "NEW_GEOMETRY"}, False),
+        ("Object", {"type": "TEX_COORD", "object": "another"}, True),
+        ("Object", {"type": "TEX_COORD", "object": None}, False),
+        ("Vector", {"type": "VECT_TRANSFORM", "convert_from": "OBJECT", "convert_to": "WORLD"}, True),
+        ("Vector", {"type": "VECT_TRANSFORM", "convert_from": "WORLD", "convert_to": "WORLD"}, False),
+        ("Normal", {"type": "NORMAL_MAP", "space": "BLENDER_WORLD"}, True),
+        ("Normal", {"type": "NORMAL_MAP", "space": "OBJECT"}, False),
+    ],
+)
+def test_what_depends_on_the_place_in_the_world(socket, node, is_so):
+    assert depends_on_place(Output(SimpleNamespace(name=socket, node=SimpleNamespace(**node)))) == is_so
 
 
 @pytest.mark.parametrize(("given", "taken"), [(-0.3, 0.0), (3.0, 1.0)])

@@ -271,3 +271,15 @@ def test_heights_and_normals_have_all_digits(blender):
     assert len(np.unique(found(name, "bsdf[@type='bumpmap']/texture"))) > 64
     assert len(np.unique(found("normals: normals", "texture[@name='normalmap']"))) > 256
     assert found("rough", "texture[@name='alpha']").max() == 1.0
+
+
+def test_few_copies_are_baked_at_their_places_in_the_world(blender):
+    code, out, result = blender.job(blender.make("copies_in_the_world")[0], "copies")
+    assert code == 0, result
+    scene = mi.load_file(str(out / "scene.xml"))
+    ray = mi.Ray3f(mi.Point3f([0.2, 0.8], [0.2, 0.6], 1.0), mi.Vector3f(0.0, 0.0, -1.0))
+    si = scene.ray_intersect(ray)
+    found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
+    assert found == pytest.approx(np.array([[0.2, 0.2, 0.0], [0.8, 0.6, 0.0]]), abs=0.01)
+    notes = [note["what"] for note in result["notes"] if note["object"] == "place"]
+    assert notes == ["of 65 copies of many: many copied the first one's place in the world is taken"]

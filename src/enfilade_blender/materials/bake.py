@@ -16,7 +16,7 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
-from enfilade_blender.materials.graph import upstream
+from enfilade_blender.materials.graph import depends_on_place, upstream
 from enfilade_blender.materials.image_pixels import is_missing
 from enfilade_blender.materials.stand_ins import IMAGES
 from enfilade_blender.materials.table import OBJECT_DATA
@@ -150,7 +150,7 @@ class Bakery:
             if not isinstance(value, Procedural | ProceduralNormal | AttributeValue):
                 continue
             for found in upstream(value.output):
-                what = _lost(found, mesh, len(placed.matrices))
+                what = _lost(found, mesh, placed)
                 if what:
                     effect = "the surface differs where it depends on that"
                     self._notes.add("approximated", material.name, found.node.name, what, effect)
@@ -212,7 +212,7 @@ def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
     return Procedural(value.output) if is_uv or has_several else value
 
 
-def _lost(found: Output, mesh: Mesh, copies: int) -> str:
+def _lost(found: Output, mesh: Mesh, placed: Placed) -> str:
     """What is approximated of an output that depends on the object; empty for others."""
     node, name = found.node, found.socket.name
     if _is_missing(node):
@@ -221,8 +221,10 @@ def _lost(found: Output, mesh: Mesh, copies: int) -> str:
         return f"{what} is missing, and is taken as a mid grey"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
-    if node.type == "OBJECT_INFO" and name == "Location" and copies > 1:
-        return "its Location is that of the first copy"
+    if len(placed.matrices) > 1 and depends_on_place(found):
+        return (
+            f"of {len(placed.matrices)} copies of {placed.name} the first one's place in the world is taken"
+        )
     if node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY":
         return f"the property {node.attribute_name} is taken as 0"
     attribute = {"ATTRIBUTE": "attribute_name", "VERTEX_COLOR": "layer_name"}.get(node.type)

@@ -30,6 +30,7 @@ from enfilade_blender.materials.values import (
     ProceduralNormal,
     Shader,
     Value,
+    values_of,
 )
 from enfilade_blender.notes import Notes
 
@@ -295,6 +296,24 @@ def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:
             found = follow(socket, current.groups) if socket.enabled else socket
             if isinstance(found, Output):
                 waiting.append(found)
+
+
+def is_of_place(shader: Shader) -> bool:
+    """Whether a baked value or normal of a shader depends on where in the world a copy of its object is."""
+    baked = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
+    return any(depends_on_place(found) for value in baked for found in upstream(value.output))
+
+
+def depends_on_place(found: Output) -> bool:
+    """Whether an output is in the space of the world, or of another object."""
+    node, name = found.node, found.socket.name
+    if node.type == "TEX_COORD":
+        return name == "Object" and node.object is not None
+    if node.type == "VECT_TRANSFORM":
+        return "WORLD" in (node.convert_from, node.convert_to) and node.convert_from != node.convert_to
+    if node.type == "NORMAL_MAP":
+        return node.space in ("WORLD", "BLENDER_WORLD")
+    return name in table.PLACE_SOCKETS.get(node.type, ())
 
 
 def _dependence(output: Output) -> tuple[str | None, bool]:

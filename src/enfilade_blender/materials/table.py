@@ -63,6 +63,10 @@ COLOUR_NODES = {  # functions of their inputs alone
 }  # fmt: skip
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
 VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming", "Backfacing")}
+PLACE_SOCKETS = {  # in the space of the world
+    "NEW_GEOMETRY": ("Position", "Normal", "True Normal", "Tangent"),
+    "OBJECT_INFO": ("Location",),
+}
 OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate as Cycles does, and how it does
     "PARTICLE_INFO": "data of particles are taken as 0",
     "HAIR_INFO": "data of hairs are taken as 0",
@@ -143,6 +147,11 @@ INPUTS = (
         "Object Info: Random; properties; attributes of edges and instances; data of particles and hairs",
         "approximated",
         "another number, or 0",
+    ),
+    (
+        "Geometry: Position, Normal; coordinates of another object; Vector Transform of the world",
+        "baked",
+        "each copy of an object by itself; of more than 64 copies as at the first one's place",
     ),
     ("Light Path", "approximated", "0: all rays see one material"),
     (

@@ -256,6 +256,21 @@ def heights(_folder):
         plane(name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
+def copies_in_the_world(_folder):
+    """Copies of a plane that have their place in the world as colour: few, and many."""
+    new_file()
+    material, tree, bsdf = shader("place", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "NewGeometry").outputs["Position"]})
+    for name, places in (("few", [(0.2, 0.2, 0.0), (0.8, 0.6, 0.0)]), ("many", [(0.1, 0.1, -1.0)] * 65)):
+        data = bpy.data.meshes.new(name)
+        data.from_pydata(places, [], [])
+        points = add(name, data)
+        points.instance_type = "VERTS"
+        points.show_instancer_for_render = False
+        copied = plane(f"{name} copied", (0.0, 0.0, 0.0), 0.2, material)
+        copied.parent = points
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
