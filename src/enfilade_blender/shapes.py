@@ -217,8 +217,12 @@ class Shapes:
         name = f"material {material.name if material else 'no material'}"
         identifier = self.identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
+        kinds = {nested.get("type") or "" for nested in element.iter("bsdf")}
+        if "mask" in kinds and not getattr(material, "use_transparent_shadow", True):
+            what, effect = "that they are switched off is left out", "its shadow is lighter where it is clear"
+            self._notes.add("not-carried", material.name, "Transparent Shadows", what, effect)
         if not surface.is_invisible:
-            self.kinds |= {nested.get("type") or "" for nested in element.iter("bsdf")}
+            self.kinds |= kinds
         if of.is_own:
             self._baked.append(identifier)
         self._surfaces[key] = identifier, surface

@@ -114,6 +114,13 @@ def test_a_plastic_s_roughness_is_between_0_and_1(tmp_path, given, taken):
     assert ET.tostring(found) == ET.tostring(wanted)
 
 
+def test_a_reflectance_beyond_0_and_1_is_one_that_mitsuba_takes(tmp_path):
+    textures = Textures(tmp_path, Notes())
+    assert textures.colour(Constant((-1.0, 0.5, 1.0))) == (0.0, 0.5, 1.0)
+    vector = textures.colour(Constant((-1.0, 0.5, 2.0))).find("vector")
+    assert [vector.get(axis) for axis in "xyz"] == ["0", "0.5", "2"]
+
+
 @pytest.mark.parametrize(("kind", "number"), [("VECTOR", 0.6), ("RGBA", 0.2563)])
 def test_the_number_of_a_group_s_default_is_that_of_its_kind(kind, number):
     default = SimpleNamespace(identifier="in", type=kind, is_linked=False, default_value=(0.9, 0.0, 0.9))
@@ -127,10 +134,10 @@ def test_the_number_of_a_group_s_default_is_that_of_its_kind(kind, number):
 def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_path):
     notes = Notes()
     context = Context("wall", Textures(tmp_path, notes), notes)
-    value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "Paint")
+    value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "", "wall")
     as_it_is = Surface(None, emitted=(Radiance(value, 1.0),)).radiance(context)
     assert as_it_is.get("type") == "mesh_attribute"
     assert notes.to_list() == []
     assert inverted(value, context) == 0.5
     assert Surface(None, emitted=(Radiance(value, 3.0),)).radiance(context) == (1.5, 1.5, 1.5)
-    assert [(note["object"], note["node"]) for note in notes.to_list()] == [("Paint", "Paint node")]
+    assert [(note["object"], note["node"]) for note in notes.to_list()] == [("wall", "Paint node")]

@@ -162,7 +162,7 @@ class Bakery:
         output = value.output
         is_exact = value.is_exact if isinstance(value, Procedural) else value.image.is_float
         if isinstance(value, Procedural) and value.is_of_view:
-            effect = "as seen along the normal from all directions"
+            effect = "the surface looks the same from all directions"
             self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
         inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
         mean = inside.mean(axis=0)
@@ -221,6 +221,8 @@ def _lost(found: Output, mesh: Mesh, placed: Placed) -> str:
         return f"{what} is missing, and is taken as a mid grey"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
+    if node.type == "NEW_GEOMETRY" and name == "Random Per Island":
+        return "its Random Per Island are other numbers than in Cycles"
     if len(placed.matrices) > 1 and depends_on_place(found):
         return (
             f"of {len(placed.matrices)} copies of {placed.name} the first one's place in the world is taken"

@@ -110,9 +110,9 @@ class Graph:
             return Constant((0.0,))
         if found.socket.name == "Color" and not is_number:
             if node.type == "VERTEX_COLOR":
-                return AttributeValue(found, node.layer_name)
+                return AttributeValue(found, node.layer_name, self._owner)
             if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY":
-                return AttributeValue(found, node.attribute_name)
+                return AttributeValue(found, node.attribute_name, self._owner)
         if node.type == "TEX_IMAGE" and node.image is None:
             effect = "a mid grey is in its place"
             self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
@@ -330,6 +330,7 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
     is_of_uv &= len(uv_maps) <= 1
     is_of_view = any(
         found.node.type in table.VIEW_NODES
+        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
         or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
         for found in upstream(output)
     )

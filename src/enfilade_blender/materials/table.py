@@ -143,8 +143,9 @@ INPUTS = (
         "`plastic`, `thindielectric` or a layer",
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
+    ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),
     (
-        "Object Info: Random; properties; attributes of edges and instances; data of particles and hairs",
+        "Random of objects and islands; properties; attributes of edges, instances, particles and hairs",
         "approximated",
         "another number, or 0",
     ),
@@ -208,6 +209,7 @@ OBJECTS = (
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Triangles with a vertex that is NaN or infinite", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
+    ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
     (
         "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",

@@ -57,9 +57,9 @@ class Textures:
         return len(list((self._folder / "textures").iterdir()))
 
     def colour(self, value: Value) -> tuple[float, float, float] | Element:
-        """A colour or a texture."""
+        """A reflectance or a texture."""
         if isinstance(value, Constant):
-            return value.colour
+            return colour(value.colour)
         return self._texture(value)
 
     def scaled(self, value: Value, scale: float) -> tuple[float, float, float] | Element:
@@ -145,8 +145,8 @@ class Textures:
         """Whether numbers can be computed of a value's; that a mid grey is in their place is noted."""
         if isinstance(value, AttributeValue):
             what = "a colour attribute is taken as a mid grey, where numbers are computed of its own"
-            owner = value.name or "active colour attribute"
-            self._notes.add("approximated", owner, value.output.node.name, what, "its pattern is missing")
+            node = value.output.node.name
+            self._notes.add("approximated", value.material, node, what, "its pattern is missing")
         return isinstance(value, Texture) or (isinstance(value, ImageValue) and not self.is_missing(value))
 
     def is_missing(self, value: ImageValue) -> bool:

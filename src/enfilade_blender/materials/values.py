@@ -77,10 +77,11 @@ class ImageValue:
 
 @dataclass(frozen=True)
 class AttributeValue:
-    """A colour attribute of the mesh; an empty name is the active one."""
+    """A colour attribute of the mesh, of a material; an empty name is the active one."""
 
     output: Output
     name: str
+    material: str
 
 
 @dataclass(frozen=True)

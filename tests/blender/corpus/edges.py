@@ -292,6 +292,8 @@ def left_out(folder):
     fill(tree, tree.nodes["Principled BSDF"], normals)
     coated = plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
 
+    _seen_and_counted()
+
     # A camera that clips, and what follows the render.
     scene.camera.data.clip_start = 5.0
     bpy.data.collections.new("Seen in mirrors").objects.link(coated)
@@ -318,6 +320,22 @@ def left_out(folder):
     text.body, text.font = "a", bpy.data.fonts.load(lost)
     add("Text", text)
     return Path(lost).unlink
+
+
+def _seen_and_counted():
+    """A matcap, a colour of islands, glass of a colour attribute, and a solid shadow of a clear surface."""
+    matcap, tree, diffuse = shader("matcap", "BsdfDiffuse")
+    turned = node_of(tree, "VectorTransform", Vector=node_of(tree, "NewGeometry").outputs["Normal"])
+    turned.convert_from, turned.convert_to = "WORLD", "CAMERA"
+    fill(tree, diffuse, {"Color": turned})
+    islands, tree, diffuse = shader("islands", "BsdfDiffuse")
+    fill(tree, diffuse, {"Color": node_of(tree, "NewGeometry").outputs["Random Per Island"]})
+    stained, tree, glass = shader("stained", "BsdfPrincipled", Transmission_Weight=1.0)
+    fill(tree, glass, {"Base Color": node_of(tree, "VertexColor")})
+    solid = principled("solid shadow", Alpha=0.5)
+    solid.use_transparent_shadow = False
+    for number, material in enumerate((matcap, islands, stained, solid)):
+        plane(material.name, (-5.0, 2.0 * number, 0.0), 1.0, material)
 
 
 def _torn():
