@@ -67,7 +67,16 @@ def test_a_rewritten_image_is_looked_up_as_the_image(made):
     settings = {string.get("name"): string.get("value") for string in texture.iter("string")}
     assert "times" in settings["filename"]
     assert (settings["filter_type"], settings["wrap_mode"]) == ("nearest", "clamp")
-    assert "the extension Clip is taken as Extend" in notes["half"]
+    assert "half" not in notes
+
+
+def test_beyond_a_clipped_image_there_is_nothing(made):
+    scene = mi.load_file(str(made[0] / "scene.xml"), optimize=False)
+    decal = next(shape for shape in scene.shapes() if shape.id() == "decal")
+    x = np.array([-0.6, -0.15, 0.15, 0.6]) + decal.bbox().center().x
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(x, 0.1, 1.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    passed = np.array(si.bsdf().eval_null_transmission(si))[0]
+    assert passed == pytest.approx([1.0, 0.0, 0.5, 1.0], abs=0.02)
 
 
 def test_a_baked_colour_above_1_is_kept(made):

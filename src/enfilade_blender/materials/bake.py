@@ -51,6 +51,7 @@ UNIFORM = 2e-3  # standard deviation below which a texture is a constant
 UNIFORM_EXACT = 1e-6  # the same of heights: 0.001 of them may be a steep millimetre
 CONSTANT_PX = 8
 FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
+BORDER = 1e-4  # of an image, that coordinates may pass
 UV_MAPS = 8  # that a mesh of Blender can have
 
 
@@ -205,7 +206,15 @@ def _kind(value: Any) -> BakeKind:
 
 
 def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
-    """A value of a mesh: attributes that are UV maps rather than a colour, or several, are baked."""
+    """A value of a mesh: attributes that are UV maps rather than a colour, or several, are baked.
+
+    So are images of the extension Clip whose border lies on the mesh: Mitsuba has no such texture.
+    """
+    if isinstance(value, ImageValue) and value.output.node.extension == "CLIP":
+        uv, matrix = mesh.uvs.get(value.uv_map or mesh.active_uv, np.zeros(2)), np.array(value.matrix)
+        place = uv @ matrix[:2, :2].T + matrix[:2, 2]
+        is_beyond = np.abs(place - 0.5).max(initial=0.0) > 0.5 + BORDER
+        return Procedural(value.output) if is_beyond else value
     if not isinstance(value, AttributeValue):
         return value
     is_uv = value.name in mesh.uvs and value.name not in mesh.colours

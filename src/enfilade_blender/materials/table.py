@@ -130,6 +130,7 @@ INPUTS = (
         "mapped",
         "`mesh_attribute`; baked: its alpha, its number, several in one material, what nodes compute of it",
     ),
+    ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
     ("Baked heights and normals", "baked", "OpenEXR files of 32 bits"),
     (

@@ -209,11 +209,6 @@ class Textures:
         if isinstance(value, Texture):
             return bitmap(file, raw=raw, wrap="repeat", matrix=FLIP)
         node = value.output.node
-        if node.extension == "CLIP":
-            effect = "beyond its border the image's last pixels continue"
-            self._notes.add(
-                "approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect
-            )
         matrix = FLIP @ np.array(value.matrix)
         smooth = node.interpolation != "Closest"
         return bitmap(file, raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix, smooth=smooth)

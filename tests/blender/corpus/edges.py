@@ -28,7 +28,7 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright, _decal
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
@@ -483,4 +483,16 @@ def _pixelated(half):
     material = principled("pixelated", half, Roughness=0.5)
     texture = material.node_tree.nodes["Image Texture"]
     texture.interpolation, texture.extension = "Closest", "CLIP"
+    return material
+
+
+def _decal(half):
+    """An image over the middle quarter of the square, and nothing around it."""
+    material, tree, bsdf = shader("decal", "BsdfPrincipled")
+    over = node_of(tree, "TexCoord").outputs["UV"]
+    scaled = node_of(tree, "Mapping", Vector=over, Location=(-0.5, -0.5, 0.0), Scale=(2.0, 2.0, 1.0))
+    texture = picture(tree, half)
+    texture.extension = "CLIP"
+    fill(tree, texture, {"Vector": scaled})
+    fill(tree, bsdf, {"Base Color": texture, "Alpha": texture.outputs["Alpha"]})
     return material
