@@ -11,6 +11,7 @@ from PIL import Image
 from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
+from enfilade_blender.materials.ggx import metal_scale
 from support.imported import traced
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -280,6 +281,8 @@ def test_heights_and_normals_have_all_digits(blender):
     assert len(np.unique(found(name, "bsdf[@type='bumpmap']/texture"))) > 64
     assert len(np.unique(found("normals: normals", "texture[@name='normalmap']"))) > 256
     assert found("rough", "texture[@name='alpha']").max() == 1.0
+    gains = found("rough", "texture[@name='specular_reflectance']")
+    assert (gains.min(), gains.max()) == pytest.approx((1.0, metal_scale(0.8, 1.0)), abs=0.01)
 
 
 def test_few_copies_are_baked_at_their_places_in_the_world(blender):

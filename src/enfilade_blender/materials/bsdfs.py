@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
 SMOOTH = 1e-3  # alpha below which a surface is a mirror
 ALPHA_MIN = 0.01
+EVEN = 0.01  # difference of gains below which they are one number
+ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
 WHITE = (1.0, 1.0, 1.0)
@@ -147,20 +150,25 @@ def is_zero(value: Value) -> bool:
 def glass_bsdf(
     transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
 ) -> Element:
-    """Glass of two tints; of rough glass, energy that single scattering loses is restored."""
+    """Glass of two tints; of rough glass, constant ones restore the energy that single scattering loses."""
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
     alpha = _alpha(roughness, context)
-    scale = 1.0 if not isinstance(alpha, float) else 1.0 / ggx.kept_energy(round(alpha, 3))
     tints: dict[str, Property] = {}
-    for name, value in (("specular_transmittance", transmitted), ("specular_reflectance", reflected)):
+    values = {"specular_transmittance": transmitted, "specular_reflectance": reflected}
+    for number, (name, value) in enumerate(values.items()):
         tint: Property
         if isinstance(value, Constant):
-            tint = colour(value.colour, scale)
+            gain = partial(_glass_gain, ior, number)
+            tint = _gained(value.colour, gain, alpha, roughness, f"{name} {ior:.3g}", context)
         else:
             tint = value if isinstance(value, Element) else context.textures.colour(value)
         if tint != WHITE:
             tints[name] = tint
     return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
+
+
+def _glass_gain(ior: float, number: int, alpha: float) -> float:
+    return ggx.glass_gains(round(alpha, 3), round(ior, 3))[number]
 
 
 def conductor_bsdf(
@@ -169,16 +177,19 @@ def conductor_bsdf(
 ) -> Element:  # fmt: skip
     """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
     alpha = _alpha(roughness, context)
-    typical = _typical(alpha, roughness, context)
     optics: dict[str, Property] = {"material": "none"}
     if isinstance(reflectance, Constant):
         r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
-        gain = np.array([ggx.metal_scale(float(c), typical) for c in r])
+        tint = r
         if edge is not None:
             eta, k = mapping.conductor_ior(r, np.array(edge))
-            optics = {"eta": _unbounded(eta), "k": _unbounded(k), "specular_reflectance": colour(gain)}
-        else:
-            optics["specular_reflectance"] = colour(r * gain)
+            optics, tint = {"eta": _unbounded(eta), "k": _unbounded(k)}, np.ones(3)
+
+        def gain(alpha: float) -> np.ndarray:
+            return np.array([ggx.metal_scale(float(c), alpha) for c in r])
+
+        name = "metal" + "".join(f" {c:.3g}" for c in r)
+        optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)
     else:
         optics["specular_reflectance"] = context.textures.colour(reflectance)
     return _microfacets("conductor", alpha, extra, **optics)
@@ -202,6 +213,22 @@ def _alpha(roughness: Value, context: Context) -> float | Element:
         inside = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
         return context.textures.rewritten(roughness, np.maximum(inside**2, ALPHA_MIN), "alpha")
     return 0.25
+
+
+def _gained(
+    tint: tuple[float, float, float], gain: Callable[[float], float | np.ndarray], alpha: float | Element,
+    roughness: Value, name: str, context: Context,
+) -> Property:  # fmt: skip
+    """A reflectance times its gain at an alpha; a texture where the roughness is one."""
+    if isinstance(alpha, float) or not context.textures.has_pixels(roughness):
+        return colour(np.array(tint) * (gain(alpha) if isinstance(alpha, float) else 1.0))
+    gains = np.array([np.broadcast_to(gain(float(a)), 3) for a in ALPHAS])
+    alphas = np.clip(context.textures.numbers(roughness)[..., 0], 0.0, 1.0) ** 2
+    image = np.stack([tint[c] * np.interp(alphas, ALPHAS, gains[:, c]) for c in range(3)], axis=-1)
+    if np.ptp(image, axis=(0, 1)).max() < EVEN:
+        return colour(image.mean(axis=(0, 1)))
+    name = " ".join([name, *(f"{c:.3g}" for c in tint)])
+    return context.textures.rewritten(roughness, image, name)
 
 
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:

@@ -83,7 +83,11 @@ PRINCIPLED = (
     ("Base Color, Metallic 1", "mapped", "`conductor` or `roughconductor`, of a fitted index of refraction"),
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
-    ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
+    (
+        "Roughness",
+        "mapped",
+        "GGX, alpha its square; multiple scattering is added, but for metals and glass of textured colour",
+    ),
     (
         "Roughness of 0.8 and more without Metallic",
         "mapped",
