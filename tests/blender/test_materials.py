@@ -162,8 +162,8 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
-@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way"])
-def test_light_passes_cut_outs_and_lamps_as_in_cycles(blender, name):
+@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way", "tilted"])
+def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)
     code, out, result = blender.job(source, name)
     assert code == 0, result

@@ -42,6 +42,7 @@ TRANSMITTING = {
     "mask",
     "twosided",
 }
+DIFFUSE = {"diffuse", "plastic", "roughplastic", "blendbsdf"}  # plastics are so for the most part
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -261,16 +262,17 @@ def layered(
 
 
 def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
-    """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
+    """The BSDF inside a normal or bump map, with the shadowing that Cycles has for diffuse lobes alone."""
     if isinstance(normal, ProceduralNormal):
         raise TypeError("procedural normals are baked before they are written")
     if normal is None or _is_void(normal.image, context):
         return bsdf
+    is_diffuse = {element.get("type") for element in bsdf.iter("bsdf")} <= DIFFUSE
     if isinstance(normal, NormalMap):
         texture = _normal_texture(normal, context)
-        return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=False)
+        return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=is_diffuse)
     height = context.textures.number(normal.image)
-    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
+    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=is_diffuse)
 
 
 def _is_void(value: Value, context: Context) -> bool:

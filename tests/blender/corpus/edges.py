@@ -138,6 +138,16 @@ def mirrored_normals(_folder):
         loop.vector = 1.0 - shown.vector[1], shown.vector[0]
 
 
+def tilted(_folder):
+    """A white plane of tilted normals, in even light."""
+    new_file()
+    world((0.5, 0.5, 0.5))
+    tilt = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
+    material, tree, bsdf = shader("tilted", "BsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
+    fill(tree, bsdf, {"Normal": node_of(tree, "NormalMap", Color=tilt)})
+    plane("tilted", (0.0, 0.0, -1.0), 60.0, material)
+
+
 def lamp_nodes(_folder):
     """Lamps whose nodes are more than numbers."""
     new_file()
