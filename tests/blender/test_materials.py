@@ -283,6 +283,7 @@ def test_heights_and_normals_have_all_digits(blender):
     assert found("rough", "texture[@name='alpha']").max() == 1.0
     gains = found("rough", "texture[@name='specular_reflectance']")
     assert (gains.min(), gains.max()) == pytest.approx((1.0, metal_scale(0.8, 1.0)), abs=0.01)
+    assert bsdfs["material polished"].find(".//rgb[@name='specular_reflectance']").get("value") == "1 1 1"
 
 
 def test_few_copies_are_baked_at_their_places_in_the_world(blender):

@@ -225,11 +225,11 @@ def _gained(
         return colour(np.array(tint) * (gain(alpha) if isinstance(alpha, float) else 1.0))
     gains = np.array([np.broadcast_to(gain(float(a)), 3) for a in ALPHAS])
     alphas = np.clip(context.textures.numbers(roughness)[..., 0], 0.0, 1.0) ** 2
-    image = np.stack([tint[c] * np.interp(alphas, ALPHAS, gains[:, c]) for c in range(3)], axis=-1)
+    image = np.stack([np.interp(alphas, ALPHAS, gains[:, c]) for c in range(3)], axis=-1)
     if np.ptp(image, axis=(0, 1)).max() < EVEN:
-        return colour(image.mean(axis=(0, 1)))
+        return colour(np.array(tint) * image.mean(axis=(0, 1)).round(2))  # of objects that can share it
     name = " ".join([name, *(f"{c:.3g}" for c in tint)])
-    return context.textures.rewritten(roughness, image, name)
+    return context.textures.rewritten(roughness, image * np.array(tint), name)
 
 
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:

@@ -245,24 +245,25 @@ def numbers(_folder):
 
 
 def heights(_folder):
-    """Bumps and normals that 8 bits above 0 can't hold, and a roughness of three times an image."""
+    """Bumps and normals that 8 bits above 0 can't hold, and roughnesses: three times an image, and little."""
     new_file()
     coarse = image("coarse", _grey_ramp, 64, space="Non-Color")
     fine = image("fine", _grey_ramp, 64, space="Non-Color", is_float=True)
-    for number, name in enumerate(("below 0", "low", "as it is", "beside noise", "normals", "rough")):
+    names = "below 0", "low", "as it is", "beside noise", "normals", "rough", "polished"
+    for number, name in enumerate(names):
         material, tree, bsdf = shader(name, "BsdfPrincipled", Metallic=1.0, Roughness=0.5)
         height = picture(tree, fine if name == "as it is" else coarse)
-        if name in ("below 0", "low", "rough"):
+        if name in ("below 0", "low", "rough", "polished"):
             height, source = node_of(tree, "Math"), height
             height.operation = "SUBTRACT" if name == "below 0" else "MULTIPLY"
-            factor = {"below 0": 0.5, "low": 0.004, "rough": 3.0}[name]
+            factor = {"below 0": 0.5, "low": 0.004, "rough": 3.0, "polished": 0.2}[name]
             fill(tree, height, {0: source, 1: factor})
         if name == "beside noise":
             fill(tree, bsdf, {"Base Color": node_of(tree, "TexNoise")})
         if name == "normals":
             height = node_of(tree, "TexNoise", Scale=1.0)
         bumps = node_of(tree, "Bump", Height=height, Distance=0.3)
-        fill(tree, bsdf, {"Roughness": height} if name == "rough" else {"Normal": bumps})
+        fill(tree, bsdf, {"Roughness": height} if name in ("rough", "polished") else {"Normal": bumps})
         plane(name, (2.0 * number, 0.0, 0.0), 1.5, material)
 
 
