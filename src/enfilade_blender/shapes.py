@@ -12,7 +12,7 @@ from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context
-from enfilade_blender.materials.graph import Graph
+from enfilade_blender.materials.graph import Graph, is_of_place
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
@@ -32,6 +32,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, refe
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
+FEW_COPIES = 64  # of an object that are baked one by one
 BACK_OFFSET = 1e-4  # of the size of an open emitter: distance of its back
 
 
@@ -96,21 +97,26 @@ class Shapes:
     def write(self, placed: list[Placed]) -> list[Element]:
         """Write all meshes; elements of BSDFs and shapes."""
         shapes: list[Element] = []
+        total = sum(len(p.mesh) * len(p.matrices) for p in placed)
+        placed = [one for item in placed for one in self._apart(item, total)]
         self._middles = np.concatenate([np.zeros((0, 3)), *map(_middles, placed)])
         self._owners = np.repeat([id(item) for item in placed], [len(item.matrices) for item in placed])
-        total = sum(len(p.mesh) * len(p.matrices) for p in placed)
         for number, item in enumerate(placed):
             if number % 50 == 0:
                 report_progress(0.3 + 0.6 * number / len(placed), "materials")
-            copies = len(item.matrices)
-            is_instanced = (
-                total > FLAT_TRIANGLES and copies > 1 and len(item.mesh) * copies > INSTANCED_TRIANGLES
-            )
-            shapes += self._object(item, is_instanced=is_instanced)
+            shapes += self._object(item, is_instanced=_is_instanced(item, total))
         used = {element.get("id") for shape in shapes for element in shape.iter("ref")}
         self._bsdfs = [bsdf for bsdf in self._bsdfs if bsdf.get("id") in used]
         self._bsdfs = share_bsdfs(self._bsdfs, shapes, self._baked, self.textures, self._out)
         return [*self._bsdfs, *shapes]
+
+    def _apart(self, placed: Placed, total: int) -> list[Placed]:
+        """An object; its copies, if they are few, where a material depends on their place in the world."""
+        if not 1 < len(placed.matrices) <= FEW_COPIES or _is_instanced(placed, total):
+            return [placed]
+        if not any(is_of_place(self._shader(material)) for material in placed.slots):
+            return [placed]
+        return [replace(placed, matrices=[matrix]) for matrix in placed.matrices]
 
     def _object(self, placed: Placed, *, is_instanced: bool) -> list[Element]:
         parts = list(_parts(placed))
@@ -211,8 +217,12 @@ class Shapes:
         name = f"material {material.name if material else 'no material'}"
         identifier = self.identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
+        kinds = {nested.get("type") or "" for nested in element.iter("bsdf")}
+        if "mask" in kinds and not getattr(material, "use_transparent_shadow", True):
+            what, effect = "that they are switched off is left out", "its shadow is lighter where it is clear"
+            self._notes.add("not-carried", material.name, "Transparent Shadows", what, effect)
         if not surface.is_invisible:
-            self.kinds |= {nested.get("type") or "" for nested in element.iter("bsdf")}
+            self.kinds |= kinds
         if of.is_own:
             self._baked.append(identifier)
         self._surfaces[key] = identifier, surface
@@ -221,6 +231,12 @@ class Shapes:
     def _context(self, material: Any, *, is_mirrored: bool = False) -> Context:
         owner = material.name if material else "no material"
         return Context(owner, self.textures, self._notes, is_mirrored)
+
+
+def _is_instanced(placed: Placed, total: int) -> bool:
+    """Whether an object's copies become instances, in a scene of a total of triangles."""
+    copies = len(placed.matrices)
+    return total > FLAT_TRIANGLES and copies > 1 and len(placed.mesh) * copies > INSTANCED_TRIANGLES
 
 
 def _parts(placed: Placed) -> Any:

@@ -20,7 +20,7 @@ TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
 class Files:
-    """Textures of a folder, without Blender."""
+    """Textures of a folder, without Blender: PNG files by any name."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -35,15 +35,16 @@ class Files:
             values = np.asarray(image, np.float32) / 255.0
         return values if raw else srgb_decode(values)
 
-    def write(self, name, image, *, raw):
-        write_png(self.folder / f"textures/{name}.png", image if raw else srgb_from_linear(image))
-        return f"textures/{name}.png"
+    def write(self, name, image, *, raw, is_exact=False):
+        file = f"textures/{name}.{'exr' if is_exact else 'png'}"
+        write_png(self.folder / file, image if raw else srgb_from_linear(image))
+        return file
 
 
 class Tiles:
     """Unit squares in a row, each with a BSDF of its own, and a texture of random colours or a colour."""
 
-    def __init__(self, folder, kinds, *, raw=False):
+    def __init__(self, folder, kinds, *, raw=False, is_exact=False):
         self.folder, self.textures, self.bsdfs, self.shapes = folder, Files(folder), [], []
         rng = np.random.default_rng(3)
         normals = np.broadcast_to(np.array([0, 0, 1], np.float32), (2, 3, 3))
@@ -51,7 +52,7 @@ class Tiles:
             colour = kind
             if isinstance(kind, int):
                 image = rng.random((kind, kind, 3), np.float32)
-                file = self.textures.write(f"tile {number}", image, raw=raw)
+                file = self.textures.write(f"tile {number}", image, raw=raw, is_exact=is_exact)
                 colour = bitmap(file, raw=raw, wrap="repeat", matrix=FLIP)
             self.bsdfs.append(named(plugin("bsdf", "diffuse", reflectance=colour), f"tile {number}"))
             positions = UNIT + np.array([number, 0, 0], np.float32)
@@ -95,6 +96,11 @@ def test_borders_do_not_show_the_neighbour_in_the_atlas(tmp_path):
         tiles.textures.write(f"tile {number}", white * (number % 2), raw=False)
     after = tiles.reflectance(tiles.shared())
     assert np.array_equal(np.unique(after.round(5)), [0.0, 1.0])
+
+
+def test_an_atlas_of_exact_textures_is_exact(tmp_path):
+    (shared,) = Tiles(tmp_path, [8, 8], is_exact=True).shared()
+    assert shared.find(".//string[@name='filename']").get("value") == "textures/tile 0 atlas.exr"
 
 
 def test_equal_bsdfs_are_one_and_others_stay(tmp_path):

@@ -57,8 +57,8 @@ def test_a_normal_map_turns_with_its_uv_map(exported, shapes):
     points = np.array(parameters["vertex_positions"]).reshape(-1, 3)
     tangents = np.linalg.lstsq(np.c_[uv, np.ones(len(uv))], points, rcond=None)[0][:2]
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    pixels = np.array(mi.Bitmap(str(exported[0] / "textures" / "Tilted normal.png"))).reshape(-1, 3)
-    normal = np.median(pixels, axis=0) / 255.0 * 2.0 - 1.0
+    pixels = np.array(mi.Bitmap(str(exported[0] / "textures" / "Tilted normal.exr"))).reshape(-1, 3)
+    normal = np.median(pixels, axis=0) * 2.0 - 1.0
     world = normal[0] * tangents[0] + normal[1] * tangents[1] + normal[2] * np.array([0.0, 0.0, 1.0])
     assert world == pytest.approx([0.0, -0.6, 0.8], abs=0.01)  # u of the file is along -y
 

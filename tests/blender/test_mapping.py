@@ -2,13 +2,15 @@
 
 import math
 from types import SimpleNamespace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from enfilade_blender.lights import area_radiance, point_intensity, sphere_radiance
 from enfilade_blender.materials import mapping
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.bsdfs import Context, plastic_bsdf
+from enfilade_blender.materials.graph import Graph, depends_on_place
 from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import AttributeValue, Constant, Output
@@ -87,13 +89,55 @@ def test_the_number_of_a_colour_is_its_luminance():
     assert numbers == pytest.approx([0.3, 1.0, 0.7152], abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("socket", "node", "is_so"),
+    [
+        ("Normal", {"type": "NEW_GEOMETRY"}, True),
+        ("Pointiness", {"type": "NEW_GEOMETRY"}, False),
+        ("Object", {"type": "TEX_COORD", "object": "another"}, True),
+        ("Object", {"type": "TEX_COORD", "object": None}, False),
+        ("Vector", {"type": "VECT_TRANSFORM", "convert_from": "OBJECT", "convert_to": "WORLD"}, True),
+        ("Vector", {"type": "VECT_TRANSFORM", "convert_from": "WORLD", "convert_to": "WORLD"}, False),
+        ("Normal", {"type": "NORMAL_MAP", "space": "BLENDER_WORLD"}, True),
+        ("Normal", {"type": "NORMAL_MAP", "space": "OBJECT"}, False),
+    ],
+)
+def test_what_depends_on_the_place_in_the_world(socket, node, is_so):
+    assert depends_on_place(Output(SimpleNamespace(name=socket, node=SimpleNamespace(**node)))) == is_so
+
+
+@pytest.mark.parametrize(("given", "taken"), [(-0.3, 0.0), (3.0, 1.0)])
+def test_a_plastic_s_roughness_is_between_0_and_1(tmp_path, given, taken):
+    notes = Notes()
+    context, grey = Context("wall", Textures(tmp_path, notes), notes), Constant((0.5,))
+    found, wanted = (plastic_bsdf(grey, Constant((r,)), 1.5, context) for r in (given, taken))
+    assert ET.tostring(found) == ET.tostring(wanted)
+
+
+def test_a_reflectance_beyond_0_and_1_is_one_that_mitsuba_takes(tmp_path):
+    textures = Textures(tmp_path, Notes())
+    assert textures.colour(Constant((-1.0, 0.5, 1.0))) == (0.0, 0.5, 1.0)
+    vector = textures.colour(Constant((-1.0, 0.5, 2.0))).find("vector")
+    assert [vector.get(axis) for axis in "xyz"] == ["0", "0.5", "2"]
+
+
+@pytest.mark.parametrize(("kind", "number"), [("VECTOR", 0.6), ("RGBA", 0.2563)])
+def test_the_number_of_a_group_s_default_is_that_of_its_kind(kind, number):
+    default = SimpleNamespace(identifier="in", type=kind, is_linked=False, default_value=(0.9, 0.0, 0.9))
+    inside = SimpleNamespace(node=SimpleNamespace(type="GROUP_INPUT", mute=False), identifier="in")
+    link = SimpleNamespace(is_valid=True, is_muted=False, from_socket=inside)
+    socket = SimpleNamespace(type="VALUE", is_linked=True, links=[link])
+    value = Graph("wall", Notes()).value(socket, (SimpleNamespace(inputs=[default]),))
+    assert value.number == pytest.approx(number, abs=1e-3)
+
+
 def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_path):
     notes = Notes()
     context = Context("wall", Textures(tmp_path, notes), notes)
-    value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "Paint")
+    value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "", "wall")
     as_it_is = Surface(None, emitted=(Radiance(value, 1.0),)).radiance(context)
     assert as_it_is.get("type") == "mesh_attribute"
     assert notes.to_list() == []
     assert inverted(value, context) == 0.5
     assert Surface(None, emitted=(Radiance(value, 3.0),)).radiance(context) == (1.5, 1.5, 1.5)
-    assert [(note["object"], note["node"]) for note in notes.to_list()] == [("Paint", "Paint node")]
+    assert [(note["object"], note["node"]) for note in notes.to_list()] == [("wall", "Paint node")]

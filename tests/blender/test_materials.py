@@ -11,6 +11,7 @@ from PIL import Image
 from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
 from enfilade.settings import LimitSettings
+from enfilade_blender.materials.ggx import metal_scale
 from support.imported import traced
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
@@ -67,7 +68,16 @@ def test_a_rewritten_image_is_looked_up_as_the_image(made):
     settings = {string.get("name"): string.get("value") for string in texture.iter("string")}
     assert "times" in settings["filename"]
     assert (settings["filter_type"], settings["wrap_mode"]) == ("nearest", "clamp")
-    assert "the extension Clip is taken as Extend" in notes["half"]
+    assert "half" not in notes
+
+
+def test_beyond_a_clipped_image_there_is_nothing(made):
+    scene = mi.load_file(str(made[0] / "scene.xml"), optimize=False)
+    decal = next(shape for shape in scene.shapes() if shape.id() == "decal")
+    x = np.array([-0.6, -0.15, 0.15, 0.6]) + decal.bbox().center().x
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(x, 0.1, 1.0), mi.Vector3f(0.0, 0.0, -1.0)))
+    passed = np.array(si.bsdf().eval_null_transmission(si))[0]
+    assert passed == pytest.approx([1.0, 0.0, 0.5, 1.0], abs=0.02)
 
 
 def test_a_baked_colour_above_1_is_kept(made):
@@ -152,8 +162,8 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
-@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way"])
-def test_light_passes_cut_outs_and_lamps_as_in_cycles(blender, name):
+@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way", "tilted"])
+def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)
     code, out, result = blender.job(source, name)
     assert code == 0, result
@@ -210,15 +220,16 @@ def test_normal_maps_are_mirrored_with_their_uv_maps(blender):
     code, out, result = blender.job(blender.make("mirrored_normals")[0], "mirrored normals")
     assert code == 0, result
     scene = mi.load_file(str(out / "scene.xml"))
-    ray = mi.Ray3f(mi.Point3f([0.1, 2.1, 4.1, 6.1, 8.5, 7.5], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
+    ray = mi.Ray3f(mi.Point3f([0.1, 2.1, 4.1, 6.1, 8.5, 7.5, -1.9], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
     si = scene.ray_intersect(ray)
     sample, _ = si.bsdf().sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
     half = np.add(np.array(si.to_world(sample.wo)).T, [0.0, 0.0, 1.0])
     # Cycles' normals: a mirrored v turns the tilt round, a mirrored u and a reflection along it do not.
-    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0]) * 0.6
+    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 0.0]) * 0.6
     found = half / np.linalg.norm(half, axis=1, keepdims=True)
     assert found[:, 1] == pytest.approx(tilts, abs=0.01)
     assert found[:, 2] == pytest.approx(0.8, abs=0.01)
+    assert found[6, 0] == pytest.approx(0.6, abs=0.01)
 
 
 def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blender):
@@ -240,3 +251,48 @@ def test_numbers_and_vectors_of_meshes_are_colours(blender):
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f([0.0, 2.0, 4.0], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0)))
     found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
     assert found == pytest.approx(np.array([[0.25] * 3, [0.2, 0.4, 0.6], [0.3] * 3]), abs=2e-3)
+
+
+def test_the_number_of_a_colour_is_its_luminance_and_that_of_a_vector_its_mean(blender):
+    code, out, result = blender.job(blender.make("numbers")[0], "numbers")
+    assert code == 0, result
+    weights = ET.parse(out / "scene.xml").findall(".//bsdf[@type='blendbsdf']/float[@name='weight']")
+    # Cycles' weights of red and green: 0.2127 and 0.7152.
+    wanted = [0.9 * 0.2127 + 0.3 * 0.7152, 0.6, 0.5]
+    assert [float(weight.get("value")) for weight in weights] == pytest.approx(wanted, abs=2e-3)
+
+
+def test_heights_and_normals_have_all_digits(blender):
+    code, out, result = blender.job(blender.make("heights")[0], "heights")
+    assert code == 0, result
+    bsdfs = {e.get("id"): e for e in ET.parse(out / "scene.xml").getroot().findall("bsdf")}
+
+    def found(name, of):
+        (texture,) = bsdfs[f"material {name}"].iterfind(f".//{of}")
+        file = texture.find("string[@name='filename']").get("value")
+        return np.array(mi.Bitmap(str(out / file)), np.float32)[..., 0]
+
+    values = {name: found(name, "bsdf[@type='bumpmap']/texture") for name in ("below 0", "low", "as it is")}
+    assert (values["below 0"].min(), values["below 0"].max()) == pytest.approx((-0.49, 0.49), abs=0.01)
+    assert values["low"].max() == pytest.approx(0.004, abs=1e-4)
+    assert np.diff(values["as it is"][32]) == pytest.approx(1.0 / 64.0, abs=1e-5)
+    # Baked beside noise, between the image's pixels.
+    name = "beside noise: beside noise"
+    assert len(np.unique(found(name, "bsdf[@type='bumpmap']/texture"))) > 64
+    assert len(np.unique(found("normals: normals", "texture[@name='normalmap']"))) > 256
+    assert found("rough", "texture[@name='alpha']").max() == 1.0
+    gains = found("rough", "texture[@name='specular_reflectance']")
+    assert (gains.min(), gains.max()) == pytest.approx((1.0, metal_scale(0.8, 1.0)), abs=0.01)
+    assert bsdfs["material polished"].find(".//rgb[@name='specular_reflectance']").get("value") == "1 1 1"
+
+
+def test_few_copies_are_baked_at_their_places_in_the_world(blender):
+    code, out, result = blender.job(blender.make("copies_in_the_world")[0], "copies")
+    assert code == 0, result
+    scene = mi.load_file(str(out / "scene.xml"))
+    ray = mi.Ray3f(mi.Point3f([0.2, 0.8], [0.2, 0.6], 1.0), mi.Vector3f(0.0, 0.0, -1.0))
+    si = scene.ray_intersect(ray)
+    found = np.array(si.bsdf().eval_diffuse_reflectance(si)).T
+    assert found == pytest.approx(np.array([[0.2, 0.2, 0.0], [0.8, 0.6, 0.0]]), abs=0.01)
+    notes = [note["what"] for note in result["notes"] if note["object"] == "place"]
+    assert notes == ["of 65 copies of many: many copied the first one's place in the world is taken"]

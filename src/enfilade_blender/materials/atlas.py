@@ -104,7 +104,9 @@ def _packed(
             raw = _is_raw(sheet[0], files[0])
             images = [textures.stored(_name(file), raw=raw) for file in files]
             stem = Path(_name(files[0])).stem
-            files[0].set("value", textures.write(f"{stem} atlas", _atlas(images, corners, size), raw=raw))
+            is_exact = any(_name(file).endswith(".exr") for file in files)
+            atlas = _atlas(images, corners, size)
+            files[0].set("value", textures.write(f"{stem} atlas", atlas, raw=raw, is_exact=is_exact))
         for number, (row, column) in zip(numbers, corners, strict=True):
             side, (height, width) = sides[number], size
             scale = side / width, side / height

@@ -15,8 +15,8 @@ import numpy as np
 
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
-from enfilade_blender.materials.bake_scene import BakeScene
-from enfilade_blender.materials.graph import upstream
+from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
+from enfilade_blender.materials.graph import depends_on_place, upstream
 from enfilade_blender.materials.image_pixels import is_missing
 from enfilade_blender.materials.stand_ins import IMAGES
 from enfilade_blender.materials.table import OBJECT_DATA
@@ -24,6 +24,7 @@ from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     Add,
     AttributeValue,
+    Bump,
     Constant,
     ImageValue,
     Lobe,
@@ -47,8 +48,10 @@ BAKED_UV = "enfilade"
 SMALLEST = 64  # pixels
 PER_PIXEL = 2.0  # texels along an object for each pixel of its largest view
 UNIFORM = 2e-3  # standard deviation below which a texture is a constant
+UNIFORM_EXACT = 1e-6  # the same of heights: 0.001 of them may be a steep millimetre
 CONSTANT_PX = 8
 FLAT = (0.5, 0.5, 1.0)  # a texel of a normal map
+BORDER = 1e-4  # of an image, that coordinates may pass
 UV_MAPS = 8  # that a mesh of Blender can have
 
 
@@ -74,7 +77,8 @@ class Bakery:
         shader = replaced(shader, lambda value: _of_mesh(value, mesh, has_several=len(read) > 1))
         self._note_lost(shader, material, mesh, placed)
         wanted = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-        uv_maps = {uv_map or mesh.active_uv for value in values_of(shader) for uv_map in _uv_maps(value)}
+        read_maps = [uv_map for value in values_of(shader) for uv_map in _uv_maps(value)]
+        uv_maps = {uv_map or mesh.active_uv for uv_map in [*read_maps, *_tangents(shader)]}
         if not wanted and len(uv_maps) <= 1:
             return shader, mesh, False
         if len(uv_maps) <= 1 and all(isinstance(v, Procedural) and v.uv_map is not None for v in wanted):
@@ -95,12 +99,13 @@ class Bakery:
     def _over_uv(self, value: Any, material: Any) -> Any:
         if not isinstance(value, Procedural) or value.uv_map is None:
             return value
-        key = value.output.socket.as_pointer(), tuple(group.as_pointer() for group in value.output.groups)
+        groups = tuple(group.as_pointer() for group in value.output.groups)
+        key = value.output.socket.as_pointer(), groups, value.is_number, value.is_exact
         if key not in self._of_uv:
             sizes = [max(image.size) for image in _images(value.output)]
             size = int(min(max([CONSTANT_PX, *sizes]), self._job.bake_px))
             with self._stage().square(value.uv_map) as canvas:
-                pixels, _ = canvas.bake(value.output, material, size)
+                pixels, _ = canvas.bake(value.output, material, size, _kind(value))
             self._of_uv[key] = self._stored(pixels, None, value, material.name, value.uv_map)
         return self._of_uv[key]
 
@@ -110,24 +115,34 @@ class Bakery:
         is_lost = isinstance(value, ImageValue) and self._textures.is_missing(value)
         if is_lost or (isinstance(value, Procedural) and _is_missing(value.output.node)):
             return Constant((0.5, 0.5, 0.5))
-        is_normal = isinstance(value, ProceduralNormal)
-        pixels, covered = canvas.bake(value.output, material, size, is_normal=is_normal)
-        if is_normal:
+        pixels, covered = canvas.bake(value.output, material, size, _kind(value))
+        if isinstance(value, ProceduralNormal):
             pixels = np.where(covered[..., None], np.clip(pixels, 0.0, 1.0), FLAT)
-            file = self._textures.write(f"{placed.name} normal", pixels.astype(np.float32), raw=True)
+            file = self._textures.write(
+                f"{placed.name} normal", pixels.astype(np.float32), raw=True, is_exact=True
+            )
             self._note(value.output, f"{material.name}, {placed.name}", size)
             return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
         return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV)
 
     def _with_baked_normals(self, shader: Shader) -> Shader:
-        """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map."""
+        """The shader whose normal maps are to be baked: an image's tangents are those of its own UV map.
+
+        Heights of images are interpolated by the bake, and stored with all digits.
+        """
         if isinstance(shader, Mix | Add):
             first, second = (self._with_baked_normals(part) for part in (shader.first, shader.second))
             return replace(shader, first=first, second=second)
-        if isinstance(shader, Principled | Lobe) and isinstance(shader.normal, NormalMap):
-            image = shader.normal.image
-            if not (isinstance(image, ImageValue) and self._textures.is_missing(image)):
-                return replace(shader, normal=ProceduralNormal(shader.normal.output))
+        if not isinstance(shader, Principled | Lobe) or not isinstance(shader.normal, NormalMap | Bump):
+            return shader
+        normal, image = shader.normal, shader.normal.image
+        if isinstance(image, ImageValue) and self._textures.is_missing(image):
+            return shader
+        if isinstance(normal, NormalMap):
+            return replace(shader, normal=ProceduralNormal(normal.output))
+        if isinstance(image, ImageValue):
+            heights = Procedural(image.output, is_number=True, is_exact=True)
+            return replace(shader, normal=replace(normal, image=heights))
         return shader
 
     def _note_lost(self, shader: Shader, material: Any, mesh: Mesh, placed: Placed) -> None:
@@ -136,7 +151,7 @@ class Bakery:
             if not isinstance(value, Procedural | ProceduralNormal | AttributeValue):
                 continue
             for found in upstream(value.output):
-                what = _lost(found, mesh, len(placed.matrices))
+                what = _lost(found, mesh, placed)
                 if what:
                     effect = "the surface differs where it depends on that"
                     self._notes.add("approximated", material.name, found.node.name, what, effect)
@@ -146,18 +161,20 @@ class Bakery:
     ) -> Value:
         """A baked value: a constant where it is uniform, else a file; texels off the mesh are its mean."""
         output = value.output
+        is_exact = value.is_exact if isinstance(value, Procedural) else value.image.is_float
         if isinstance(value, Procedural) and value.is_of_view:
-            effect = "as seen along the normal from all directions"
+            effect = "the surface looks the same from all directions"
             self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
         inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
         mean = inside.mean(axis=0)
         colour = (float(mean[0]), float(mean[1]), float(mean[2]))
-        if inside.std(axis=0).max() <= UNIFORM * max(1.0, float(mean.max())):
+        if inside.std(axis=0).max() <= (UNIFORM_EXACT if is_exact else UNIFORM) * max(1.0, float(mean.max())):
             return Constant(colour)
         if covered is not None:
             pixels = np.where(covered[..., None], pixels, mean)
         is_data = output.socket.type != "RGBA" or bool(pixels.max() > 1.0)
-        file = self._textures.write(f"{name} {output.node.name}", np.maximum(pixels, 0.0), raw=is_data)
+        pixels = pixels if is_exact else np.maximum(pixels, 0.0)
+        file = self._textures.write(f"{name} {output.node.name}", pixels, raw=is_data, is_exact=is_exact)
         self._note(output, name, len(pixels))
         return Texture(file, uv_map, colour, raw=is_data or file.endswith(".exr"))
 
@@ -181,15 +198,30 @@ class Bakery:
         return int(min(power, self._job.bake_px))
 
 
+def _kind(value: Any) -> BakeKind:
+    """What is baked of a value."""
+    if isinstance(value, ProceduralNormal):
+        return "normal"
+    return "number" if isinstance(value, Procedural) and value.is_number else "colour"
+
+
 def _of_mesh(value: Any, mesh: Mesh, *, has_several: bool) -> Any:
-    """A value of a mesh: attributes that are UV maps rather than a colour, or several, are baked."""
+    """A value of a mesh: attributes that are UV maps rather than a colour, or several, are baked.
+
+    So are images of the extension Clip whose border lies on the mesh: Mitsuba has no such texture.
+    """
+    if isinstance(value, ImageValue) and value.output.node.extension == "CLIP":
+        uv, matrix = mesh.uvs.get(value.uv_map or mesh.active_uv, np.zeros(2)), np.array(value.matrix)
+        place = uv @ matrix[:2, :2].T + matrix[:2, 2]
+        is_beyond = np.abs(place - 0.5).max(initial=0.0) > 0.5 + BORDER
+        return Procedural(value.output) if is_beyond else value
     if not isinstance(value, AttributeValue):
         return value
     is_uv = value.name in mesh.uvs and value.name not in mesh.colours
     return Procedural(value.output) if is_uv or has_several else value
 
 
-def _lost(found: Output, mesh: Mesh, copies: int) -> str:
+def _lost(found: Output, mesh: Mesh, placed: Placed) -> str:
     """What is approximated of an output that depends on the object; empty for others."""
     node, name = found.node, found.socket.name
     if _is_missing(node):
@@ -198,8 +230,12 @@ def _lost(found: Output, mesh: Mesh, copies: int) -> str:
         return f"{what} is missing, and is taken as a mid grey"
     if node.type == "OBJECT_INFO" and name == "Random":
         return "its Random is another number than in Cycles, the same for all copies"
-    if node.type == "OBJECT_INFO" and name == "Location" and copies > 1:
-        return "its Location is that of the first copy"
+    if node.type == "NEW_GEOMETRY" and name == "Random Per Island":
+        return "its Random Per Island are other numbers than in Cycles"
+    if len(placed.matrices) > 1 and depends_on_place(found):
+        return (
+            f"of {len(placed.matrices)} copies of {placed.name} the first one's place in the world is taken"
+        )
     if node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY":
         return f"the property {node.attribute_name} is taken as 0"
     attribute = {"ATTRIBUTE": "attribute_name", "VERTEX_COLOR": "layer_name"}.get(node.type)
@@ -237,3 +273,11 @@ def _uv_maps(value: Any) -> list[str]:
         return [value.uv_map]
     is_of_uv = isinstance(value, Procedural) and value.uv_map is not None and _images(value.output)
     return [value.uv_map] if is_of_uv else []
+
+
+def _tangents(shader: Shader) -> list[str]:
+    """UV maps along which normal maps are turned; in Mitsuba they are those of the images."""
+    if isinstance(shader, Mix | Add):
+        return _tangents(shader.first) + _tangents(shader.second)
+    normal = shader.normal if isinstance(shader, Principled | Lobe) else None
+    return [normal.output.node.uv_map] if isinstance(normal, NormalMap) else []

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import bpy
 import numpy as np
@@ -18,6 +18,7 @@ from enfilade_blender.materials.values import Output
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Placed
 
+BakeKind = Literal["colour", "number", "normal"]
 MARGIN_PX = 8
 ISLAND_MARGIN = 0.01  # of the square
 SMART_ANGLE = 1.15  # radians, Blender's default of 66 degrees
@@ -144,7 +145,7 @@ class Canvas:
         return uv.reshape(-1, 3, 2)
 
     def bake(
-        self, output: Output, material: Any, size: int, *, is_normal: bool = False
+        self, output: Output, material: Any, size: int, kind: BakeKind = "colour"
     ) -> tuple[F32, np.ndarray]:
         """Values of an output (size, size, 3), the first row on top, and the texels that the mesh covers."""
         image = bpy.data.images.new(TARGET, size, size, alpha=True, float_buffer=True)
@@ -155,10 +156,10 @@ class Canvas:
         put_stand_ins(copy.node_tree)
         if GENERATED in self._object.data.attributes:
             _take_generated(copy.node_tree)
-        _wire(copy.node_tree, output, image, is_normal=is_normal)
+        _wire(copy.node_tree, output, image, kind)
         self._object.data.materials.clear()
         self._object.data.materials.append(copy)
-        bpy.ops.object.bake(type="NORMAL" if is_normal else "EMIT", use_clear=False)
+        bpy.ops.object.bake(type="NORMAL" if kind == "normal" else "EMIT", use_clear=False)
         rgba = linear_pixels(image)
         bpy.data.materials.remove(copy)
         bpy.data.batch_remove(set(bpy.data.node_groups) - groups)
@@ -221,10 +222,15 @@ def _is_generated(link: Any) -> bool:
     return link.from_node.type == "TEX_COORD" and link.from_socket.name == "Generated"
 
 
-def _wire(tree: Any, output: Output, image: Any, *, is_normal: bool) -> None:
+def _wire(tree: Any, output: Output, image: Any, kind: BakeKind) -> None:
     """Connect an output to the surface, which is baked into an image."""
     source = _exposed(tree, output.groups, output)
-    if is_normal:
+    if kind == "number":  # whose conversion is not that of a colour
+        number = tree.nodes.new("ShaderNodeMath")
+        number.inputs[1].default_value = 0.0
+        tree.links.new(source, number.inputs[0])
+        source = number.outputs[0]
+    if kind == "normal":
         shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
         tree.links.new(source, shader.inputs["Normal"])
     else:
@@ -254,7 +260,8 @@ def _exposed(tree: Any, groups: tuple[Any, ...], output: Output) -> Any:
     group = tree.nodes[groups[0].name]
     group.node_tree = group.node_tree.copy()
     inner = _exposed(group.node_tree, groups[1:], output)
-    item = group.node_tree.interface.new_socket("enfilade", in_out="OUTPUT", socket_type="NodeSocketColor")
+    kind = "NodeSocketVector" if output.socket.type == "VECTOR" else "NodeSocketColor"
+    item = group.node_tree.interface.new_socket("enfilade", in_out="OUTPUT", socket_type=kind)
     ends = [node for node in group.node_tree.nodes if node.type == "GROUP_OUTPUT"]
     end = next((node for node in ends if node.is_active_output), ends[0])
     group.node_tree.links.new(inner, next(s for s in end.inputs if s.identifier == item.identifier))

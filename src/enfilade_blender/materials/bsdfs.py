@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from enfilade_blender.scene_xml import Element, Property, colour, plugin
 
 SMOOTH = 1e-3  # alpha below which a surface is a mirror
 ALPHA_MIN = 0.01
+EVEN = 0.01  # difference of gains below which they are one number
+ALPHAS = np.linspace(0.0, 1.0, 17)  # at which gains of textured roughness are computed
 ROUGHEST_PLASTIC = 0.55  # rougher interfaces darken at grazing angles in Mitsuba, not in Blender
 MATT = 0.8  # roughness from which a plastic is Lambertian: its reflections can't be told from diffuse ones
 WHITE = (1.0, 1.0, 1.0)
@@ -39,6 +42,7 @@ TRANSMITTING = {
     "mask",
     "twosided",
 }
+DIFFUSE = {"diffuse", "plastic", "roughplastic", "blendbsdf"}  # plastics are so for the most part
 ALMOST = 0.995  # weights above are 1, below the rest 0
 
 
@@ -91,6 +95,7 @@ def plastic_bsdf(base: Value, roughness: Value, ior: float, context: Context) ->
 
 
 def _plastic_of(base: Value, roughness: float, ior: float, context: Context) -> Element:
+    roughness = clipped(roughness)
     alpha = min(roughness, ROUGHEST_PLASTIC) ** 2
     if roughness >= MATT:
         reflected = ggx.mean_reflectance(round(roughness**2, 3), round(ior, 3))
@@ -110,7 +115,7 @@ def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, 
     """Two roughnesses, and the share of the second; alpha is linear in between."""
     if not context.textures.has_pixels(roughness):
         return 0.5, 0.5, 0.5
-    pixels = context.textures.numbers(roughness)
+    pixels = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
     low, high = (float(x) for x in np.percentile(pixels, (1.0, 99.0)))
     if high - low < 1e-2:
         return low, high, 0.5
@@ -146,20 +151,25 @@ def is_zero(value: Value) -> bool:
 def glass_bsdf(
     transmitted: Value | Element, reflected: Value, roughness: Value, ior: float, context: Context
 ) -> Element:
-    """Glass of two tints; of rough glass, energy that single scattering loses is restored."""
+    """Glass of two tints; of rough glass, constant ones restore the energy that single scattering loses."""
     ior = ior if abs(ior - 1.0) > 1e-3 else 1.001
     alpha = _alpha(roughness, context)
-    scale = 1.0 if not isinstance(alpha, float) else 1.0 / ggx.kept_energy(round(alpha, 3))
     tints: dict[str, Property] = {}
-    for name, value in (("specular_transmittance", transmitted), ("specular_reflectance", reflected)):
+    values = {"specular_transmittance": transmitted, "specular_reflectance": reflected}
+    for number, (name, value) in enumerate(values.items()):
         tint: Property
         if isinstance(value, Constant):
-            tint = colour(value.colour, scale)
+            gain = partial(_glass_gain, ior, number)
+            tint = _gained(value.colour, gain, alpha, roughness, f"{name} {ior:.3g}", context)
         else:
             tint = value if isinstance(value, Element) else context.textures.colour(value)
         if tint != WHITE:
             tints[name] = tint
     return _microfacets("dielectric", alpha, int_ior=ior, ext_ior=1.0, **tints)
+
+
+def _glass_gain(ior: float, number: int, alpha: float) -> float:
+    return ggx.glass_gains(round(alpha, 3), round(ior, 3))[number]
 
 
 def conductor_bsdf(
@@ -168,16 +178,19 @@ def conductor_bsdf(
 ) -> Element:  # fmt: skip
     """A metal, whose index of refraction is fitted where there are an edge tint and a constant colour."""
     alpha = _alpha(roughness, context)
-    typical = _typical(alpha, roughness, context)
     optics: dict[str, Property] = {"material": "none"}
     if isinstance(reflectance, Constant):
         r = np.clip(np.array(reflectance.colour), 0.0, 1.0)
-        gain = np.array([ggx.metal_scale(float(c), typical) for c in r])
+        tint = r
         if edge is not None:
             eta, k = mapping.conductor_ior(r, np.array(edge))
-            optics = {"eta": _unbounded(eta), "k": _unbounded(k), "specular_reflectance": colour(gain)}
-        else:
-            optics["specular_reflectance"] = colour(r * gain)
+            optics, tint = {"eta": _unbounded(eta), "k": _unbounded(k)}, np.ones(3)
+
+        def gain(alpha: float) -> np.ndarray:
+            return np.array([ggx.metal_scale(float(c), alpha) for c in r])
+
+        name = "metal" + "".join(f" {c:.3g}" for c in r)
+        optics["specular_reflectance"] = _gained(_unbounded(tint), gain, alpha, roughness, name, context)
     else:
         optics["specular_reflectance"] = context.textures.colour(reflectance)
     return _microfacets("conductor", alpha, extra, **optics)
@@ -195,17 +208,35 @@ def _microfacets(
 def _alpha(roughness: Value, context: Context) -> float | Element:
     """GGX alpha: the roughness squared, also of a texture."""
     if isinstance(roughness, Constant):
-        alpha = min(max(roughness.number, 0.0), 1.0) ** 2
+        alpha = clipped(roughness.number) ** 2
         return alpha if alpha < SMOOTH else max(alpha, ALPHA_MIN)
     if context.textures.has_pixels(roughness):
-        squared = np.maximum(context.textures.numbers(roughness) ** 2, ALPHA_MIN)
-        return context.textures.rewritten(roughness, squared, "alpha")
+        inside = np.clip(context.textures.numbers(roughness), 0.0, 1.0)
+        return context.textures.rewritten(roughness, np.maximum(inside**2, ALPHA_MIN), "alpha")
     return 0.25
+
+
+def _gained(
+    tint: tuple[float, float, float], gain: Callable[[float], float | np.ndarray], alpha: float | Element,
+    roughness: Value, name: str, context: Context,
+) -> Property:  # fmt: skip
+    """A reflectance times its gain at an alpha; a texture where the roughness is one."""
+    if isinstance(alpha, float) or not context.textures.has_pixels(roughness):
+        return colour(np.array(tint) * (gain(alpha) if isinstance(alpha, float) else 1.0))
+    gains = np.array([np.broadcast_to(gain(float(a)), 3) for a in ALPHAS])
+    alphas = np.clip(context.textures.numbers(roughness)[..., 0], 0.0, 1.0) ** 2
+    image = np.stack([np.interp(alphas, ALPHAS, gains[:, c]) for c in range(3)], axis=-1)
+    if np.ptp(image, axis=(0, 1)).max() < EVEN:
+        return colour(np.array(tint) * image.mean(axis=(0, 1)).round(2))  # of objects that can share it
+    name = " ".join([name, *(f"{c:.3g}" for c in tint)])
+    return context.textures.rewritten(roughness, image * np.array(tint), name)
 
 
 def _typical(alpha: float | Element, roughness: Value, context: Context) -> float:
     """An alpha; that of the mean roughness of a texture."""
-    return alpha if isinstance(alpha, float) else Constant(context.textures.mean(roughness)).number ** 2
+    if isinstance(alpha, float):
+        return alpha
+    return clipped(Constant(context.textures.mean(roughness)).number) ** 2
 
 
 def layered(
@@ -231,16 +262,17 @@ def layered(
 
 
 def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
-    """The BSDF inside a normal or bump map, without the shadowing that Cycles has for diffuse lobes alone."""
+    """The BSDF inside a normal or bump map, with the shadowing that Cycles has for diffuse lobes alone."""
     if isinstance(normal, ProceduralNormal):
         raise TypeError("procedural normals are baked before they are written")
     if normal is None or _is_void(normal.image, context):
         return bsdf
+    is_diffuse = {element.get("type") for element in bsdf.iter("bsdf")} <= DIFFUSE
     if isinstance(normal, NormalMap):
         texture = _normal_texture(normal, context)
-        return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=False)
+        return plugin("bsdf", "normalmap", bsdf, normalmap=texture, use_shadowing_function=is_diffuse)
     height = context.textures.number(normal.image)
-    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=False)
+    return plugin("bsdf", "bumpmap", bsdf, height, scale=normal.scale, use_shadowing_function=is_diffuse)
 
 
 def _is_void(value: Value, context: Context) -> bool:
@@ -271,6 +303,11 @@ def blend(
     if is_one(weight):
         return second()
     return plugin("bsdf", "blendbsdf", first(), second(), weight=context.textures.number(weight))
+
+
+def clipped(roughness: float) -> float:
+    """Roughness as Blender takes it."""
+    return min(max(roughness, 0.0), 1.0)
 
 
 def _unbounded(values: np.ndarray) -> tuple[float, float, float]:

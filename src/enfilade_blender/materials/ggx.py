@@ -59,6 +59,21 @@ def plastic_gain(alpha: float, ior: float) -> float:
     return float(passed * ior**2 * (1.0 - internal) / rough**2)
 
 
+@lru_cache(maxsize=256)
+def glass_gains(alpha: float, ior: float) -> tuple[float, float]:
+    """Factors of the transmittance and reflectance of Mitsuba's ``roughdielectric`` that restore its losses.
+
+    Light enters and leaves by one interface each; it is reflected on the denser side for the most part.
+    """
+    if alpha < 1e-3:
+        return 1.0, 1.0
+    mu, weights = _cosines()
+    outside, inside = (
+        float(np.array([sum(_interface(m, alpha, eta)) for m in mu]) @ weights) for eta in (ior, 1.0 / ior)
+    )
+    return (outside * inside) ** -0.5, 1.0 / min(outside, inside)
+
+
 def _cosines() -> tuple[np.ndarray, np.ndarray]:
     """Cosines of directions, and their weights under uniform light."""
     mu = (np.arange(COSINES) + 0.5) / COSINES

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from enfilade_blender.materials import mapping, table
@@ -29,6 +30,7 @@ from enfilade_blender.materials.values import (
     ProceduralNormal,
     Shader,
     Value,
+    values_of,
 )
 from enfilade_blender.notes import Notes
 
@@ -96,26 +98,28 @@ class Graph:
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
         """Value of an input."""
-        found = follow(socket, groups)
+        found, is_number = follow(socket, groups), socket.type == "VALUE"
         if not isinstance(found, Output):
-            return Constant(_numbers(found))
+            numbers = _numbers(found)
+            return Constant((sum(numbers) / 3.0,) if is_number and found.type == "VECTOR" else numbers)
         node = found.node
         if node.type in ("RGB", "VALUE"):
             return Constant(_numbers(found.socket))
         if node.type == "LIGHT_PATH":
             self._note_light_path(found)
             return Constant((0.0,))
-        if node.type == "VERTEX_COLOR" and found.socket.name == "Color":
-            return AttributeValue(found, node.layer_name)
-        if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and found.socket.name == "Color":
-            return AttributeValue(found, node.attribute_name)
+        if found.socket.name == "Color" and not is_number:
+            if node.type == "VERTEX_COLOR":
+                return AttributeValue(found, node.layer_name, self._owner)
+            if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY":
+                return AttributeValue(found, node.attribute_name, self._owner)
         if node.type == "TEX_IMAGE" and node.image is None:
             effect = "a mid grey is in its place"
             self._notes.add("approximated", self._owner, node.name, "there is no image", effect)
             return Constant((0.5, 0.5, 0.5))
         if node.type == "TEX_IMAGE" and (coordinates := image_coordinates(node, found.groups)):
             return ImageValue(found, *coordinates)
-        return Procedural(found, *_dependence(found))
+        return Procedural(found, *_dependence(found), is_number)
 
     def normal(self, socket: Any, groups: tuple[Any, ...]) -> Normal:
         """Normal of an input; None for the mesh's."""
@@ -126,14 +130,12 @@ class Graph:
         if node.type == "NORMAL_MAP" and not node.inputs["Color"].is_linked:
             return None  # as the importer of FBX files leaves it: its colour is the flat one
         if node.type == "NORMAL_MAP" and node.space == "TANGENT":
-            image, strength = (
-                self.value(node.inputs["Color"], inner),
-                self.value(node.inputs["Strength"], inner),
-            )
+            image = _exact(self.value(node.inputs["Color"], inner))
+            strength = self.value(node.inputs["Strength"], inner)
             if isinstance(strength, Constant) and (isinstance(image, ImageValue) or _is_of_uv(image)):
                 return NormalMap(image, strength.number, found)
         if node.type == "BUMP" and not node.inputs["Normal"].is_linked:
-            height = self.value(node.inputs["Height"], inner)
+            height = _exact(self.value(node.inputs["Height"], inner))
             strength, distance = (self.value(node.inputs[name], inner) for name in ("Strength", "Distance"))
             if isinstance(height, Constant):
                 return None
@@ -296,6 +298,24 @@ def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:
                 waiting.append(found)
 
 
+def is_of_place(shader: Shader) -> bool:
+    """Whether a baked value or normal of a shader depends on where in the world a copy of its object is."""
+    baked = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
+    return any(depends_on_place(found) for value in baked for found in upstream(value.output))
+
+
+def depends_on_place(found: Output) -> bool:
+    """Whether an output is in the space of the world, or of another object."""
+    node, name = found.node, found.socket.name
+    if node.type == "TEX_COORD":
+        return name == "Object" and node.object is not None
+    if node.type == "VECT_TRANSFORM":
+        return "WORLD" in (node.convert_from, node.convert_to) and node.convert_from != node.convert_to
+    if node.type == "NORMAL_MAP":
+        return node.space in ("WORLD", "BLENDER_WORLD")
+    return name in table.PLACE_SOCKETS.get(node.type, ())
+
+
 def _dependence(output: Output) -> tuple[str | None, bool]:
     """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
     is_of_uv, uv_maps = True, set()
@@ -310,6 +330,7 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
     is_of_uv &= len(uv_maps) <= 1
     is_of_view = any(
         found.node.type in table.VIEW_NODES
+        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
         or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
         for found in upstream(output)
     )
@@ -318,6 +339,11 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
 
 def _is_of_uv(value: Value) -> bool:
     return isinstance(value, Procedural) and value.uv_map is not None
+
+
+def _exact(value: Value) -> Value:
+    """The value with all digits, where it is baked."""
+    return replace(value, is_exact=True) if isinstance(value, Procedural) else value
 
 
 def _by_identifier(sockets: Any, like: Any) -> Any:

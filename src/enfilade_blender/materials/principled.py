@@ -10,6 +10,7 @@ from enfilade_blender.materials.bsdfs import (
     WHITE,
     Context,
     blend,
+    clipped,
     conductor_bsdf,
     glass_bsdf,
     is_zero,
@@ -56,7 +57,7 @@ def _metal(shader: Principled, context: Context) -> Element:
     extra: dict[str, Property] = {}
     if anisotropy > 0.0 and isinstance(roughness, Constant):
         aspect = (1.0 - 0.9 * anisotropy) ** 0.5
-        alpha = max(roughness.number**2, ALPHA_MIN)
+        alpha = max(clipped(roughness.number) ** 2, ALPHA_MIN)
         extra = {"alpha_u": alpha / aspect, "alpha_v": alpha * aspect}
     return conductor_bsdf(shader["Base Color"], roughness, extra, context, edge=edge)
 

@@ -63,6 +63,10 @@ COLOUR_NODES = {  # functions of their inputs alone
 }  # fmt: skip
 VIEW_NODES = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "CAMERA"}
 VIEW_SOCKETS = {"TEX_COORD": ("Camera", "Window", "Reflection"), "NEW_GEOMETRY": ("Incoming", "Backfacing")}
+PLACE_SOCKETS = {  # in the space of the world
+    "NEW_GEOMETRY": ("Position", "Normal", "True Normal", "Tangent"),
+    "OBJECT_INFO": ("Location",),
+}
 OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate as Cycles does, and how it does
     "PARTICLE_INFO": "data of particles are taken as 0",
     "HAIR_INFO": "data of hairs are taken as 0",
@@ -79,7 +83,11 @@ PRINCIPLED = (
     ("Base Color, Metallic 1", "mapped", "`conductor` or `roughconductor`, of a fitted index of refraction"),
     ("Metallic in between, or textured", "mapped", "`blendbsdf` of both"),
     ("Base Color of a metal, textured", "approximated", "its reflectance; no brighter edges"),
-    ("Roughness", "mapped", "GGX, alpha its square; energy of multiple scattering is added"),
+    (
+        "Roughness",
+        "mapped",
+        "GGX, alpha its square; multiple scattering is added, but for metals and glass of textured colour",
+    ),
     (
         "Roughness of 0.8 and more without Metallic",
         "mapped",
@@ -99,6 +107,7 @@ PRINCIPLED = (
         "mapped",
         "`normalmap`, `bumpmap`; where the UV map is mirrored, a shape and a map of their own",
     ),
+    ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
     (
         "Coat",
         "mapped",
@@ -123,9 +132,11 @@ INPUTS = (
     (
         "Attribute of vertices, corners or faces",
         "mapped",
-        "`mesh_attribute`; baked: its alpha, several in one material, and what nodes compute of it",
+        "`mesh_attribute`; baked: its alpha, its number, several in one material, what nodes compute of it",
     ),
+    ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
+    ("Baked heights and normals", "baked", "OpenEXR files of 32 bits"),
     (
         "Everything else: noise, ramps, Object and Generated coordinates",
         "baked",
@@ -137,10 +148,16 @@ INPUTS = (
         "`plastic`, `thindielectric` or a layer",
     ),
     ("Fresnel, Layer Weight elsewhere", "approximated", "baked as seen along the normal"),
+    ("Coordinates and vectors of the camera", "approximated", "baked: the same from all directions"),
     (
-        "Object Info: Random; properties; attributes of edges and instances; data of particles and hairs",
+        "Random of objects and islands; properties; attributes of edges, instances, particles and hairs",
         "approximated",
         "another number, or 0",
+    ),
+    (
+        "Geometry: Position, Normal; coordinates of another object; Vector Transform of the world",
+        "baked",
+        "each copy of an object by itself; of more than 64 copies as at the first one's place",
     ),
     ("Light Path", "approximated", "0: all rays see one material"),
     (
@@ -197,6 +214,7 @@ OBJECTS = (
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
     ("Triangles with a vertex that is NaN or infinite", "not carried", "missing"),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
+    ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
     (
         "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",

@@ -57,9 +57,9 @@ class Textures:
         return len(list((self._folder / "textures").iterdir()))
 
     def colour(self, value: Value) -> tuple[float, float, float] | Element:
-        """A colour or a texture."""
+        """A reflectance or a texture."""
         if isinstance(value, Constant):
-            return value.colour
+            return colour(value.colour)
         return self._texture(value)
 
     def scaled(self, value: Value, scale: float) -> tuple[float, float, float] | Element:
@@ -145,8 +145,8 @@ class Textures:
         """Whether numbers can be computed of a value's; that a mid grey is in their place is noted."""
         if isinstance(value, AttributeValue):
             what = "a colour attribute is taken as a mid grey, where numbers are computed of its own"
-            owner = value.name or "active colour attribute"
-            self._notes.add("approximated", owner, value.output.node.name, what, "its pattern is missing")
+            node = value.output.node.name
+            self._notes.add("approximated", value.material, node, what, "its pattern is missing")
         return isinstance(value, Texture) or (isinstance(value, ImageValue) and not self.is_missing(value))
 
     def is_missing(self, value: ImageValue) -> bool:
@@ -160,12 +160,12 @@ class Textures:
         self._notes.add("approximated", name, value.output.node.name, what, "a mid grey is in its place")
         return True
 
-    def write(self, name: str, image: F32, *, raw: bool) -> str:
-        """Write an image as PNG, or as OpenEXR where it has values above 1; its name in the scene.
+    def write(self, name: str, image: F32, *, raw: bool, is_exact: bool = False) -> str:
+        """Write an image as PNG, or as OpenEXR if exact or with values above 1; its name in the scene.
 
         Without `raw` the values of a PNG are sRGB, as Mitsuba expects.
         """
-        if image.max(initial=0.0) > 1.0:
+        if is_exact or image.max(initial=0.0) > 1.0:
             file = f"textures/{self._names.unique(file_stem(name))}.exr"
             write_exr(self._folder / file, np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float32))
         else:
@@ -179,7 +179,9 @@ class Textures:
         key = *key, name
         if key not in self._files:
             stem = Path(key[0]).stem
-            self._files[key] = self.write(f"{stem} {name}", image.astype(np.float32), raw=raw)
+            is_exact = value.file.endswith(".exr") if isinstance(value, Texture) else value.image.is_float
+            image = image.astype(np.float32)
+            self._files[key] = self.write(f"{stem} {name}", image, raw=raw, is_exact=is_exact)
         raw = raw or self._files[key].endswith(".exr")
         return self._bitmap(value, self._files[key], raw=raw)
 
@@ -207,11 +209,6 @@ class Textures:
         if isinstance(value, Texture):
             return bitmap(file, raw=raw, wrap="repeat", matrix=FLIP)
         node = value.output.node
-        if node.extension == "CLIP":
-            effect = "beyond its border the image's last pixels continue"
-            self._notes.add(
-                "approximated", node.image.name, node.name, "the extension Clip is taken as Extend", effect
-            )
         matrix = FLIP @ np.array(value.matrix)
         smooth = node.interpolation != "Closest"
         return bitmap(file, raw=raw, wrap=WRAP.get(node.extension, "repeat"), matrix=matrix, smooth=smooth)
@@ -227,7 +224,8 @@ class Textures:
                 file = self.write(f"{name} alpha", linear_pixels(image)[..., 3:], raw=True)
             else:
                 file = self._copied(image, name) if is_as_stored(value.output.node) else ""
-                file = file or self.write(name, image_colours(value.output.node), raw=raw)
+                colours = image_colours(value.output.node)
+                file = file or self.write(name, colours, raw=raw, is_exact=image.is_float)
             self._files[key] = file
         return self._files[key], raw
 

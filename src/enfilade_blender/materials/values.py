@@ -77,10 +77,11 @@ class ImageValue:
 
 @dataclass(frozen=True)
 class AttributeValue:
-    """A colour attribute of the mesh; an empty name is the active one."""
+    """A colour attribute of the mesh, of a material; an empty name is the active one."""
 
     output: Output
     name: str
+    material: str
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,17 @@ class Procedural:
         all objects. None: it depends on more.
     is_of_view : bool
         It depends on the direction of view or the kind of ray, which a texture does not.
+    is_number : bool
+        A number is made of it, as Cycles does: the luminance of a colour, the mean of a vector.
+    is_exact : bool
+        Its slopes count, as those of heights and normals: it is stored with all digits, below 0, too.
     """
 
     output: Output
     uv_map: str | None = None
     is_of_view: bool = False
+    is_number: bool = False
+    is_exact: bool = False
 
 
 @dataclass(frozen=True, eq=False)

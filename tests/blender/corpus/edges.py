@@ -28,7 +28,7 @@ def uncommon_materials(folder):
     new_file()
     half = image("half", _grey, 16, alpha=lambda x, _y: np.where(x < 0.5, 1.0, 0.5))
     (folder / "picture.png").write_bytes(half.packed_file.data)
-    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright
+    kinds = _cut_out, _see_through, _sheer_gloss, _bumpy_plastic, _pixelated, _bright, _decal
     materials = [make(half) for make in kinds]
     materials += [
         principled("premultiplied", half, Metallic=1.0),
@@ -111,7 +111,10 @@ def mirrored_camera(_folder):
 
 
 def mirrored_normals(_folder):
-    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection."""
+    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection.
+
+    One more has the tangents of another UV map than its image's, on which v is along x.
+    """
     new_file()
     tilted = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
     material, tree, bsdf = shader("tilted", "BsdfAnisotropic", Roughness=0.0)
@@ -126,6 +129,23 @@ def mirrored_normals(_folder):
     for vertex in pair.data.vertices:
         vertex.co.x += 0.5
     pair.modifiers.new("Mirror", "MIRROR")
+    turned, tree, bsdf = shader("turned", "BsdfAnisotropic", Roughness=0.0)
+    normal = node_of(tree, "NormalMap", Color=tilted)
+    normal.uv_map = "Turned"
+    fill(tree, bsdf, {"Normal": normal})
+    maps = plane("turned", (-2.0, 0.0, 0.0), 1.0, turned).data.uv_layers
+    for loop, shown in zip(maps.new(name="Turned").uv, maps[0].uv, strict=True):
+        loop.vector = 1.0 - shown.vector[1], shown.vector[0]
+
+
+def tilted(_folder):
+    """A white plane of tilted normals, in even light."""
+    new_file()
+    world((0.5, 0.5, 0.5))
+    tilt = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
+    material, tree, bsdf = shader("tilted", "BsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
+    fill(tree, bsdf, {"Normal": node_of(tree, "NormalMap", Color=tilt)})
+    plane("tilted", (0.0, 0.0, -1.0), 60.0, material)
 
 
 def lamp_nodes(_folder):
@@ -201,6 +221,67 @@ def attributes(_folder):
             setattr(item, "vector" if kind == "FLOAT_VECTOR" else "value", value)
 
 
+def numbers(_folder):
+    """Factors of a colour attribute, of a vector, and of a vector out of a group."""
+    new_file()
+    group = bpy.data.node_groups.new("vector", "ShaderNodeTree")
+    group.interface.new_socket("Vector", in_out="OUTPUT", socket_type="NodeSocketVector")
+    fill(group, group.nodes.new("NodeGroupOutput"), {0: node_of(group, "CombineXYZ", X=0.9, Z=0.6)})
+    for number, (name, kind, inputs) in enumerate(
+        (
+            ("colour", "VertexColor", {}),
+            ("vector", "CombineXYZ", {"X": 0.9, "Z": 0.9}),
+            ("grouped", "Group", {}),
+        )
+    ):
+        material, tree, mix = shader(name, "MixShader")
+        factor = node_of(tree, kind, **inputs)
+        if kind == "Group":
+            factor.node_tree = group
+        fill(tree, mix, {0: factor, 1: node_of(tree, "BsdfDiffuse"), 2: node_of(tree, "BsdfTranslucent")})
+        data = plane(name, (2.0 * number, 0.0, 0.0), 1.5, material).data
+        for corner in data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER").data:
+            corner.color = (0.9, 0.3, 0.0, 1.0)
+
+
+def heights(_folder):
+    """Bumps and normals that 8 bits above 0 can't hold, and roughnesses: three times an image, and little."""
+    new_file()
+    coarse = image("coarse", _grey_ramp, 64, space="Non-Color")
+    fine = image("fine", _grey_ramp, 64, space="Non-Color", is_float=True)
+    names = "below 0", "low", "as it is", "beside noise", "normals", "rough", "polished"
+    for number, name in enumerate(names):
+        material, tree, bsdf = shader(name, "BsdfPrincipled", Metallic=1.0, Roughness=0.5)
+        height = picture(tree, fine if name == "as it is" else coarse)
+        if name in ("below 0", "low", "rough", "polished"):
+            height, source = node_of(tree, "Math"), height
+            height.operation = "SUBTRACT" if name == "below 0" else "MULTIPLY"
+            factor = {"below 0": 0.5, "low": 0.004, "rough": 3.0, "polished": 0.2}[name]
+            fill(tree, height, {0: source, 1: factor})
+        if name == "beside noise":
+            fill(tree, bsdf, {"Base Color": node_of(tree, "TexNoise")})
+        if name == "normals":
+            height = node_of(tree, "TexNoise", Scale=1.0)
+        bumps = node_of(tree, "Bump", Height=height, Distance=0.3)
+        fill(tree, bsdf, {"Roughness": height} if name in ("rough", "polished") else {"Normal": bumps})
+        plane(name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
+def copies_in_the_world(_folder):
+    """Copies of a plane that have their place in the world as colour: few, and many."""
+    new_file()
+    material, tree, bsdf = shader("place", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "NewGeometry").outputs["Position"]})
+    for name, places in (("few", [(0.2, 0.2, 0.0), (0.8, 0.6, 0.0)]), ("many", [(0.1, 0.1, -1.0)] * 65)):
+        data = bpy.data.meshes.new(name)
+        data.from_pydata(places, [], [])
+        points = add(name, data)
+        points.instance_type = "VERTS"
+        points.show_instancer_for_render = False
+        copied = plane(f"{name} copied", (0.0, 0.0, 0.0), 0.2, material)
+        copied.parent = points
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
@@ -221,6 +302,8 @@ def left_out(folder):
     normals = {name: node_of(tree, "NormalMap", Color=tilted) for name in ("Normal", "Coat Normal")}
     fill(tree, tree.nodes["Principled BSDF"], normals)
     coated = plane("Coated", (0.0, 0.0, 0.0), 4.0, material)
+
+    _seen_and_counted()
 
     # A camera that clips, and what follows the render.
     scene.camera.data.clip_start = 5.0
@@ -248,6 +331,22 @@ def left_out(folder):
     text.body, text.font = "a", bpy.data.fonts.load(lost)
     add("Text", text)
     return Path(lost).unlink
+
+
+def _seen_and_counted():
+    """A matcap, a colour of islands, glass of a colour attribute, and a solid shadow of a clear surface."""
+    matcap, tree, diffuse = shader("matcap", "BsdfDiffuse")
+    turned = node_of(tree, "VectorTransform", Vector=node_of(tree, "NewGeometry").outputs["Normal"])
+    turned.convert_from, turned.convert_to = "WORLD", "CAMERA"
+    fill(tree, diffuse, {"Color": turned})
+    islands, tree, diffuse = shader("islands", "BsdfDiffuse")
+    fill(tree, diffuse, {"Color": node_of(tree, "NewGeometry").outputs["Random Per Island"]})
+    stained, tree, glass = shader("stained", "BsdfPrincipled", Transmission_Weight=1.0)
+    fill(tree, glass, {"Base Color": node_of(tree, "VertexColor")})
+    solid = principled("solid shadow", Alpha=0.5)
+    solid.use_transparent_shadow = False
+    for number, material in enumerate((matcap, islands, stained, solid)):
+        plane(material.name, (-5.0, 2.0 * number, 0.0), 1.0, material)
 
 
 def _torn():
@@ -348,6 +447,10 @@ def _grey(x, _y):
     return np.full((*x.shape, 3), 0.8)
 
 
+def _grey_ramp(x, _y):
+    return np.repeat(x[..., None], 3, -1)
+
+
 def _green(x, _y):
     return np.stack([0.0 * x, 0.2 + 0.6 * (x > 0.5), 0.0 * x], axis=-1)
 
@@ -391,4 +494,16 @@ def _pixelated(half):
     material = principled("pixelated", half, Roughness=0.5)
     texture = material.node_tree.nodes["Image Texture"]
     texture.interpolation, texture.extension = "Closest", "CLIP"
+    return material
+
+
+def _decal(half):
+    """An image over the middle quarter of the square, and nothing around it."""
+    material, tree, bsdf = shader("decal", "BsdfPrincipled")
+    over = node_of(tree, "TexCoord").outputs["UV"]
+    scaled = node_of(tree, "Mapping", Vector=over, Location=(-0.5, -0.5, 0.0), Scale=(2.0, 2.0, 1.0))
+    texture = picture(tree, half)
+    texture.extension = "CLIP"
+    fill(tree, texture, {"Vector": scaled})
+    fill(tree, bsdf, {"Base Color": texture, "Alpha": texture.outputs["Alpha"]})
     return material

@@ -154,14 +154,14 @@ def picture(tree, of):
     return texture
 
 
-def image(name, function, size=256, *, space="sRGB", alpha=None):
+def image(name, function, size=256, *, space="sRGB", alpha=None, is_float=False):
     """An image of ``function(x, y)`` -> (H, W, 3), x and y in 0..1 with y up, packed into the file."""
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size
     rgba = np.ones((size, size, 4), np.float32)
     rgba[..., :3] = function(x, y)
     if alpha is not None:
         rgba[..., 3] = alpha(x, y)
-    value = bpy.data.images.new(name, size, size, alpha=alpha is not None)
+    value = bpy.data.images.new(name, size, size, alpha=alpha is not None, float_buffer=is_float)
     value.colorspace_settings.name = space
     value.pixels.foreach_set(rgba.ravel())
     value.update()
