@@ -13,7 +13,7 @@ from enfilade_blender.evaluate import evaluate
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.lamp_nodes import LampNodes
-from enfilade_blender.left_out import note_inputs, note_light, note_settings
+from enfilade_blender.left_out import note_falloff, note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
@@ -66,6 +66,7 @@ def export(job: Job) -> dict[str, Any]:
     lamps, sun = split_suns(lamps, notes)
     note_sun(sun, views, selection, notes)
     note_clipping(views, selection, notes)
+    note_falloff(lamps, selection, notes)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)

@@ -37,6 +37,7 @@ FILES = (
     "lamps_in_view",
     "mirrored_camera",
     "lamp_nodes",
+    "near_lamps",
     "left_out",
     "frozen",
     "simplified",
@@ -185,6 +186,13 @@ def test_point_lights_keep_their_radius_unseen_by_the_camera(exported):
     assert notes(result, "approximated") == []
     lamps = [shapes(out)[name] for name in ("Seen", "Inside the left sphere", "Behind the camera")]
     assert all(shape.is_emitter() and shape.bsdf().id() == LAMP for shape in lamps)
+
+
+def test_soft_falloff_is_noted_of_lamps_near_surfaces(exported):
+    found = [note for note in exported("near_lamps")[1]["notes"] if note["node"] == "Soft Falloff"]
+    assert {note["object"] for note in found} == {"Near", "Down"}
+    # Measured in Cycles at two radii: 0.779 of the light without, off the axis in part.
+    assert all(note["effect"].endswith("at 0.5 units by 25%") for note in found)
 
 
 def test_constants_of_a_lamps_nodes_are_kept(exported):

@@ -158,6 +158,11 @@ LIGHTS = (
         "`spot`, also oval: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
     ),
     (
+        "Soft Falloff of points and spots",
+        "approximated",
+        "falloff is quadratic: surfaces nearer than three radii are brighter",
+    ),
+    (
         "Area: square, rectangle, disk, ellipse",
         "mapped",
         "`rectangle` or `disk`; not seen by the camera",

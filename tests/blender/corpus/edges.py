@@ -159,6 +159,17 @@ def _lamp_of_nodes(name):
     return data.node_tree, emission
 
 
+def near_lamps(_folder):
+    """Lamps of soft falloff, on by default, near a floor and not."""
+    new_file()
+    plane("Floor", (0.0, 0.0, 0.0), 20.0, principled("floor"))
+    light("POINT", "Near", (0.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25)
+    light("POINT", "Hard", (1.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25, use_soft_falloff=False)
+    light("POINT", "Far", (2.0, 0.0, 1.0), 10.0, shadow_soft_size=0.25)
+    for name, z in (("Down", 0.0), ("Up", 1.0)):
+        light("SPOT", name, (3.0, 0.0, 0.5), 10.0, (3.0, 0.0, z), shadow_soft_size=0.25)
+
+
 def painted(_folder):
     """Colour attributes: one by its alpha, and two in one material."""
     new_file()
