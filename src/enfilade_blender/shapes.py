@@ -11,7 +11,7 @@ import numpy as np
 from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.bsdfs import Context, is_one
 from enfilade_blender.materials.graph import Graph
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
@@ -32,7 +32,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, refe
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
-BACK_OFFSET = 1e-4  # of the size of an open emitter: distance of its back
+BACK_OFFSET = 4e-5  # of a vertex' largest coordinate plus 1: rays begin at 9e-5, which pass the other side
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +138,13 @@ class Shapes:
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             elements += self._shapes_of(name, mesh, material, radiance)
-            if radiance is not None and not self._hides_its_back(part.mesh, placed):
+            is_hidden = is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
+            if radiance is not None and not is_hidden:
                 elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
 
     def _hides_its_back(self, mesh: Mesh, placed: Placed) -> bool:
-        """Whether an emitter is closed, faces outward, and has neither a camera nor an object inside."""
+        """Whether an opaque emitter is closed, faces outward, and has neither a camera nor an object inside."""
         if not mesh.is_closed() or mesh.volume() <= 0.0:
             return False
         points = np.concatenate([self._eyes, self._middles[self._owners != id(placed)]])
@@ -262,7 +263,6 @@ def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:
 
 def _back(mesh: Mesh) -> Mesh:
     """The other side of an emitter, a little behind it."""
-    size = float(np.ptp(mesh.positions, axis=0).max(initial=0.0))
     back = mesh.reversed()
     corners = back.positions[back.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -270,4 +270,5 @@ def _back(mesh: Mesh) -> Mesh:
     for corner in range(3):
         np.add.at(offsets, back.triangles[:, corner], normals)
     offsets /= np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-30)
-    return replace(back, positions=back.positions + offsets * size * BACK_OFFSET, normals=-back.normals)
+    offsets *= BACK_OFFSET * (1.0 + np.abs(back.positions).max(axis=1, keepdims=True))
+    return replace(back, positions=back.positions + offsets, normals=-back.normals)

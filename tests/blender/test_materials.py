@@ -45,6 +45,17 @@ def test_an_inverted_opacity_is_that_of_the_baked_image(made):
     assert np.percentile(found, [5, 95]) == pytest.approx([1.0 - x**2 for x in linear], abs=0.01)
 
 
+def test_the_far_wall_of_a_closed_emitter_is_seen_through_the_near_one(made):
+    out, elements, _ = made
+    files = [elements[name].find("string[@name='filename']").get("value") for name in ("Ghost", "Ghost back")]
+    meshes = [mi.traverse(mi.load_dict({"type": "ply", "filename": str(out / file)})) for file in files]
+    front, back = (np.unique(np.array(m["vertex_positions"]).reshape(-1, 3), axis=0) for m in meshes)
+    apart = np.linalg.norm(back[:, None] - front, axis=-1).min(axis=1)
+    # A ray that leaves one of the two begins beyond the other: the surface is passed once.
+    assert (apart < mi.math.RayEpsilon * (1.0 + np.abs(back).max(axis=1))).all()
+    assert (apart > 0.0).all()
+
+
 def test_a_colour_is_multiplied_by_an_alpha_that_is_not_used(made):
     out, elements, _ = made
     found = pixels(out, elements["material premultiplied"].find(".//texture"))

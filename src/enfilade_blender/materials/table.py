@@ -92,7 +92,7 @@ PRINCIPLED = (
     (
         "Emission Color, Emission Strength",
         "mapped",
-        "`area` emitter; meshes that are open, or around something, shine on both sides",
+        "`area` emitter; meshes that are open, partly transparent, or around something shine on both sides",
     ),
     (
         "Normal: Normal Map, Bump of images",

@@ -19,6 +19,7 @@ from corpus.stage import (
     plane,
     principled,
     shader,
+    sphere,
     tiles,
     world,
 )
@@ -42,6 +43,7 @@ def uncommon_materials(folder):
     ]
     for number, material in enumerate(materials):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+    sphere("Ghost", (0.0, 60.0, 0.0), 50.0, bpy.data.materials["faint glow"])
 
 
 def kinds_of_rays(folder):
