@@ -144,7 +144,7 @@ class Shapes:
         return elements + (self._instances(placed, instanced) if instanced else [])
 
     def _hides_its_back(self, mesh: Mesh, placed: Placed) -> bool:
-        """Whether an opaque emitter is closed, faces outward, and has neither a camera nor an object inside."""
+        """Whether an emitter is closed, faces outward, and has neither a camera nor an object inside."""
         if not mesh.is_closed() or mesh.volume() <= 0.0:
             return False
         points = np.concatenate([self._eyes, self._middles[self._owners != id(placed)]])

@@ -203,7 +203,8 @@ def test_constants_of_a_lamps_nodes_are_kept(exported):
     falloff, pattern = np.multiply([1.0, 0.5, 0.5], 50.0 * watts), np.full(3, 5.0 * watts)
     warm = np.multiply([1.9351, 0.8035, 0.1917], 5.0 * watts)  # a world of this temperature, by Cycles
     computed = np.multiply([0.75, 0.0, 0.25], 15.0 * watts)
-    wanted = np.array([falloff, pattern, warm, computed, computed])
+    total = np.multiply([5.0 + 1.5, 2.5 + 1.5, 2.5 + 1.5], watts)  # of an emission, and 3/4 of another
+    wanted = np.array([falloff, pattern, warm, computed, computed, total])
     assert np.array(found) == pytest.approx(wanted, rel=1e-3, abs=1e-6)
     assert notes(result, "approximated") == [("Falloff", "its falloff is quadratic")]
     assert notes(result, "not-carried") == [("Pattern", "a pattern of its nodes is left out")]

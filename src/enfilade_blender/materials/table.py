@@ -170,7 +170,7 @@ LIGHTS = (
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     (
-        "Nodes of lights: constants and what is computed of them, Light Falloff",
+        "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",
         "mapped",
         "a factor; falloff is quadratic",
     ),

@@ -150,6 +150,14 @@ def lamp_nodes(_folder):
     fill(tree, emission, {"Color": mixed, "Strength": node_of(tree, "LightFalloff", Strength=product)})
     bpy.data.lights["Computed"].keyframe_insert("energy")
     add("Computed again", bpy.data.lights["Computed"], (1.0, 0.0, 3.0))
+    tree, emission = _lamp_of_nodes("Sum")
+    both = node_of(tree, "AddShader")
+    mixed = node_of(tree, "MixShader", Fac=0.25)
+    fill(tree, mixed, {1: node_of(tree, "Emission", Strength=2.0), 2: node_of(tree, "BsdfDiffuse")})
+    fill(tree, both, {0: emission, 1: mixed})
+    fill(tree, tree.nodes["Light Output"], {"Surface": both})
+    tree, _ = _lamp_of_nodes("Dark")
+    fill(tree, tree.nodes["Light Output"], {"Surface": node_of(tree, "BsdfDiffuse")})
 
 
 def _lamp_of_nodes(name):
