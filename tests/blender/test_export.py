@@ -36,6 +36,7 @@ FILES = (
     "emission",
     "lamps_in_view",
     "mirrored_camera",
+    "miniature",
     "lamp_nodes",
     "near_lamps",
     "left_out",
@@ -144,6 +145,39 @@ def test_a_mirrored_camera_looks_where_it_points(exported):
         "its negative scale is left out"
     ]
     assert ("Camera", "it is 5,000 units from the origin") in notes(result, "approximated")
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (-1.0, 1.0), (1.0, -1.0)])
+def test_the_axes_of_a_camera_may_be_oblique(exported, corner):
+    """As in Cycles, which normalizes the columns of its matrix, of a parent that is twice as high."""
+    path = json.loads((exported("miniature")[0] / "camera_path.json").read_text())
+    frame = path["camera_path"][0]
+    tangent = np.tan(0.5 * np.radians(frame["fov"])) * np.array(
+        [path["render_width"] / path["render_height"], 1]
+    )
+    centre = np.multiply(frame["principal_point"], (2.0, -2.0)) + np.array((-1.0, 1.0))
+    found = np.array(frame["camera_to_world"])[:3, :3] @ [*((corner - centre) * tangent), -1.0]
+    turn, (sine, cosine) = 0.5, (np.sin(np.pi / 3.0), np.cos(np.pi / 3.0))
+    rig = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 2]])
+    axes = rig @ [[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]]
+    axes /= np.linalg.norm(axes, axis=0)
+    width = 0.5 * 36.0 / 35.0  # of the sensor, by the focal length
+    size = np.array([width, width * path["render_height"] / path["render_width"]])
+    wanted = axes @ [*(corner * size), -1.0]
+    assert found / np.linalg.norm(found) == pytest.approx(wanted / np.linalg.norm(wanted), abs=1e-5)
+
+
+def test_a_shear_of_the_picture_is_noted(exported):
+    found = [name for name, what in notes(exported("near_lamps")[1], "approximated") if "shear" in what]
+    assert found == ["Camera"]
+
+
+def test_a_miniature_is_not_clipped_and_said_to_be_small(exported):
+    _, result = exported("miniature")
+    found = {note["node"]: note for note in result["notes"] if note["object"] == "Camera"}
+    assert set(found) == {"Clip Start", "Location"}
+    assert found["Clip Start"]["effect"] == "surfaces that it clips are visible: Coin"
+    assert "miniature" in found["Location"]["what"]
 
 
 def test_view_and_exposure_are_those_of_the_file(exported):

@@ -204,6 +204,16 @@ OBJECTS = (
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
     (
+        "Cameras below a turned parent of uneven scale",
+        "approximated",
+        "oblique axes become the principal point; shear of the picture itself is left out",
+    ),
+    (
+        "Cameras far from the origin, or within 0.1 units of what they see",
+        "approximated",
+        "shadows are lost near contacts",
+    ),
+    (
         "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",
         "not carried",
         "all light counts",

@@ -112,6 +112,17 @@ def mirrored_camera(_folder):
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
 
 
+def miniature(_folder):
+    """A coin of millimetres, nearer than Blender's Clip Start; the camera's parent has an uneven scale."""
+    scene = new_file()
+    light("POINT", "Lamp", (0.0, 0.0, 0.02), 1e-4, shadow_soft_size=0.0)
+    plane("Coin", (0.0, 0.0, 0.0), 0.01, principled("coin"))
+    eye = scene.camera
+    eye.location, eye.rotation_euler = (0.0, -0.0225, 0.0065), (math.radians(60.0), 0.0, 0.0)
+    eye.parent = rig = add("Rig", None)
+    rig.scale, rig.rotation_euler = (1.0, 1.0, 2.0), (0.0, 0.0, 0.5)
+
+
 def mirrored_normals(_folder):
     """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection."""
     new_file()
@@ -170,8 +181,10 @@ def _lamp_of_nodes(name):
 
 
 def near_lamps(_folder):
-    """Lamps of soft falloff, on by default, near a floor and not."""
-    new_file()
+    """Lamps of soft falloff, on by default, near a floor and not, seen by a camera with shear."""
+    eye = new_file().camera
+    eye.parent = rig = add("Rig", None)
+    rig.scale, eye.rotation_euler.z = (1.5, 1.0, 1.0), 0.7
     plane("Floor", (0.0, 0.0, 0.0), 20.0, principled("floor"))
     light("POINT", "Near", (0.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25)
     light("POINT", "Hard", (1.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25, use_soft_falloff=False)
