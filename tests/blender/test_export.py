@@ -269,6 +269,7 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("coated", "Principled BSDF: Coat Normal"),
     }
     assert ("World", "Is Camera Ray is left out") in notes(result, "approximated")
+    assert ("broken", "a number that is NaN or infinite is taken as 0") in notes(result, "approximated")
 
 
 def test_what_changes_is_noted(exported):
