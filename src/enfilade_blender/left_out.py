@@ -47,6 +47,10 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
     for (name, what, effect), is_used in settings.items():
         if is_used:
             notes.add("not-carried", scene.name, name, f"{what} is left out", effect)
+    (first, last), (start, end) = selection.frames, (scene.frame_start, scene.frame_end)
+    if first < start or last > end:
+        what = f"frames {first}-{last} reach beyond the range of the scene, {start}-{end}"
+        notes.add("approximated", scene.name, "Frame Range", what, "the camera may stand still in these")
     layer = selection.view_layer
     for name in ("material_override", "world_override"):  # Blender 4.2 has none of the world
         if getattr(layer, name, None) is not None:

@@ -356,6 +356,13 @@ def test_normalized_coordinates_are_baked(exported):
     assert [name for name, _ in notes(exported("simplified")[1], "baked")] == ["normalized, Soft"]
 
 
+def test_frames_beyond_the_range_of_the_scene_are_noted(blender, exported, files):
+    code, out, result = blender.job(files["agx"], "beyond", frames=[2, 3])
+    assert (code, len(json.loads((out / "camera_path.json").read_text())["camera_path"])) == (0, 2)
+    wanted = [("Scene", "frames 2-3 reach beyond the range of the scene, 1-1")]
+    assert (notes(result, "approximated"), notes(exported("agx")[1], "approximated")) == (wanted, [])
+
+
 def test_a_wrong_name_lists_the_right_ones(blender, files):
     code, _, error = blender.job(files["agx"], "wrong camera", camera="Kamera")
     assert (code, error["do"]) == (3, "choose one of Camera")
