@@ -221,15 +221,19 @@ def test_normal_maps_are_mirrored_with_their_uv_maps(blender):
     code, out, result = blender.job(blender.make("mirrored_normals")[0], "mirrored normals")
     assert code == 0, result
     scene = mi.load_file(str(out / "scene.xml"))
-    ray = mi.Ray3f(mi.Point3f([0.1, 2.1, 4.1, 6.1, 8.5, 7.5], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
+    places = [0.1, 2.1, 4.1, 6.1, 8.5, 7.5, 10.1, 12.1]
+    ray = mi.Ray3f(mi.Point3f(places, 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
     si = scene.ray_intersect(ray)
     sample, _ = si.bsdf().sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
     half = np.add(np.array(si.to_world(sample.wo)).T, [0.0, 0.0, 1.0])
-    # Cycles' normals: a mirrored v turns the tilt round, a mirrored u and a reflection along it do not.
-    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0]) * 0.6
+    # Cycles' normals: a mirrored v turns the tilt round, a mirrored u and a reflection along it do not. Seen
+    # from behind, the normal of the front is negated, also that of an image of heights.
+    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0]) * 0.6
     found = half / np.linalg.norm(half, axis=1, keepdims=True)
     assert found[:, 1] == pytest.approx(tilts, abs=0.01)
     assert found[:, 2] == pytest.approx(0.8, abs=0.01)
+    sides = {e.get("id"): len(e.findall("bsdf")) for e in ET.parse(out / "scene.xml").getroot().iter("bsdf")}
+    assert sorted(count for name, count in sides.items() if name) == [0, 1, 1, 1, 2, 2]  # the first of lamps
 
 
 def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blender):

@@ -97,7 +97,7 @@ PRINCIPLED = (
     (
         "Normal: Normal Map, Bump of images",
         "mapped",
-        "`normalmap`, `bumpmap`; where the UV map is mirrored, a shape and a map of their own",
+        "`normalmap`, `bumpmap`; mirrored UV maps and the backs of open meshes have maps of their own",
     ),
     (
         "Coat",

@@ -10,6 +10,7 @@ import numpy as np
 
 from corpus.stage import (
     add,
+    cube,
     fill,
     image,
     light,
@@ -124,7 +125,10 @@ def miniature(_folder):
 
 
 def mirrored_normals(_folder):
-    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection."""
+    """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection.
+
+    Then this one and a bump map seen from behind; the closed cube has no back.
+    """
     new_file()
     tilted = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
     material, tree, bsdf = shader("tilted", "BsdfAnisotropic", Roughness=0.0)
@@ -139,6 +143,14 @@ def mirrored_normals(_folder):
     for vertex in pair.data.vertices:
         vertex.co.x += 0.5
     pair.modifiers.new("Mirror", "MIRROR")
+    bumpy, tree, bsdf = shader("bumpy", "BsdfAnisotropic", Roughness=0.0)
+    slope = image(
+        "slope", lambda _, y: np.repeat(np.floor(y * 17)[..., None] / 17, 3, -1), 17, space="Non-Color"
+    )
+    fill(tree, bsdf, {"Normal": node_of(tree, "Bump", Strength=1.0, Distance=0.75, Height=slope)})
+    for number, behind in enumerate((material, bumpy)):
+        plane("behind", (10.0 + 2.0 * number, 0.0, 0.0), 1.0, behind).rotation_euler.y = math.pi
+    cube("closed", (14.0, 0.0, 0.0), 1.0, bumpy)
 
 
 def lamp_nodes(_folder):
