@@ -17,6 +17,7 @@ from enfilade_blender.records import Selection, View
 MM = 1000.0
 FAR = 1000.0  # scene units from the origin
 RAY_OFFSET = 9e-5  # of the distance from the origin, by which Mitsuba moves the origins of rays
+SHEAR = 1e-3  # cosine of the angle of a picture's axes
 KINDS = {"ORTHO": "an orthographic", "PANO": "a panoramic"}
 
 
@@ -66,13 +67,15 @@ def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
 def _view(camera: Any, selection: Selection, notes: Notes) -> View:
     graph = bpy.context.evaluated_depsgraph_get()
     evaluated = camera.evaluated_get(graph)
-    place, rotation, scale = evaluated.matrix_world.decompose()
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = np.array(rotation.to_matrix()), np.array(place)
-    if scale[0] < 0.0:  # all are: Blender makes a rotation of a mirrored matrix by turning its axes round
-        pose[:3, 1:3] *= -1.0
+    pose[:3, :3], tilt, is_sheared, is_mirrored = rigid(np.array(evaluated.matrix_world)[:3, :3])
+    pose[:3, 3] = evaluated.matrix_world.translation
+    if is_mirrored:
         what, effect = "its negative scale is left out", "the picture is not mirrored"
         notes.add("not-carried", camera.name, "Scale", what, effect)
+    if is_sheared:
+        what, effect = "the shear of its picture is left out", "edges of the picture are out of place"
+        notes.add("approximated", camera.name, "Scale", what, effect)
     width, height = selection.size
     render = selection.scene.render
     projection = np.array(
@@ -81,6 +84,9 @@ def _view(camera: Any, selection: Selection, notes: Notes) -> View:
         ),
         np.float64,  # JSON has no place for the float32 that Blender 5.2 hands over
     )
+    for axis in (0, 1):
+        projection[axis, 2] -= projection[axis, axis] * tilt[axis]
+        projection[axis, axis] *= tilt[2]
     lens: dict[str, Any] = {}
     if max(abs(projection[0, 2]), abs(projection[1, 2])) > 1e-7:
         lens["principal_point"] = [0.5 * (1.0 - projection[0, 2]), 0.5 * (1.0 + projection[1, 2])]
@@ -89,6 +95,36 @@ def _view(camera: Any, selection: Selection, notes: Notes) -> View:
         lens["aperture_radius"] = 0.5 * data.lens / MM / max(data.dof.aperture_fstop, 1e-3)
         lens["focus_distance"] = _focus(evaluated, graph)
     return View(camera.name, pose, projection, lens)
+
+
+def rigid(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool, bool]:
+    """The rotation nearest to the axes of a picture, as Cycles sees it below a turned parent of uneven scale.
+
+    Cycles normalizes the columns of a camera's matrix, and leaves them oblique.
+
+    Parameters
+    ----------
+    matrix : (3, 3) float64
+        Linear part of the camera's matrix.
+
+    Returns
+    -------
+    rotation : (3, 3) float64
+    tilt : (3,) float64
+        Third column in axes of the rotation: its first two move the picture, the last scales it.
+    is_sheared : bool
+        Whether the axes of the picture, which the rotation makes perpendicular, are not.
+    is_mirrored : bool
+        Whether the rotation has the opposite of the first column.
+    """
+    sizes = np.linalg.norm(matrix, axis=0)
+    axes = matrix / sizes if sizes.all() else np.eye(3)
+    is_mirrored = bool(np.linalg.det(axes) < 0.0)
+    axes = axes * (-1.0 if is_mirrored else 1.0, 1.0, 1.0)
+    left, _, right = np.linalg.svd(axes[:, :2], full_matrices=False)
+    across, down = (left @ right).T
+    rotation = np.stack([across, down, np.cross(across, down)], axis=1)
+    return rotation, rotation.T @ axes[:, 2], bool(abs(axes[:, 0] @ axes[:, 1]) > SHEAR), is_mirrored
 
 
 def _focus(camera: Any, graph: Any) -> float:

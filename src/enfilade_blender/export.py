@@ -13,7 +13,7 @@ from enfilade_blender.evaluate import evaluate
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.lamp_nodes import LampNodes
-from enfilade_blender.left_out import note_inputs, note_light, note_settings
+from enfilade_blender.left_out import note_falloff, note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
@@ -23,7 +23,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import LAMP, Element, named, plugin, write_scene
 from enfilade_blender.shapes import Shapes
-from enfilade_blender.visibility import note_clipping, note_sun
+from enfilade_blender.visibility import note_depths, note_sun
 from enfilade_blender.world import environment
 
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
@@ -65,7 +65,8 @@ def export(job: Job) -> dict[str, Any]:
         lamp.factor = nodes.factor(lamp)
     lamps, sun = split_suns(lamps, notes)
     note_sun(sun, views, selection, notes)
-    note_clipping(views, selection, notes)
+    note_depths(views, selection, notes)
+    note_falloff(lamps, selection, notes)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeScene
 from enfilade_blender.materials.graph import Graph, upstream
 from enfilade_blender.materials.table import COLOUR_NODES
-from enfilade_blender.materials.values import Constant, Emission, Procedural, Value
+from enfilade_blender.materials.values import Add, Constant, Emission, Mix, Nothing, Procedural, Shader, Value
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Lamp, Selection
 
@@ -28,25 +30,39 @@ class LampNodes:
         self._computed: dict[Any, Constant] = {}  # by outputs: lamps may share their nodes
 
     def factor(self, lamp: Lamp) -> tuple[float, float, float]:
-        """Factor of a lamp's nodes: an emission's colour and strength, each 1 where it is no constant."""
+        """Factor of a lamp's nodes: the sum of emissions, of colours and strengths that are constants."""
         tree = lamp.data.node_tree if lamp.data.use_nodes else None
         if tree is None:
             return 1.0, 1.0, 1.0
         outputs = [node for node in tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
         graph = Graph(lamp.name, self._notes)
-        shader = graph.shader(outputs[0].inputs["Surface"], ()) if outputs else None
-        factors: list[Constant | None] = [None, None]
+        shader = graph.shader(outputs[0].inputs["Surface"], ()) if outputs else Nothing()
+        r, g, b = self._emitted(shader, lamp, graph)
+        return float(r), float(g), float(b)
+
+    def _emitted(self, shader: Shader, lamp: Lamp, graph: Graph) -> np.ndarray:
+        """Light of a shader (3,); of others than emissions none."""
         if isinstance(shader, Emission):
-            factors = [self._constant(value, lamp, graph) for value in (shader.colour, shader.strength)]
-        if None in factors:
+            colour, strength = (self._known(v, 1.0, lamp, graph) for v in (shader.colour, shader.strength))
+            return np.array(colour.colour) * strength.number
+        if not isinstance(shader, Add | Mix):
+            return np.zeros(3)
+        first, second = (self._emitted(part, lamp, graph) for part in (shader.first, shader.second))
+        if isinstance(shader, Add):
+            return first + second
+        share = min(max(self._known(shader.factor, 0.5, lamp, graph).number, 0.0), 1.0)
+        return (1.0 - share) * first + share * second
+
+    def _known(self, value: Value, instead: float, lamp: Lamp, graph: Graph) -> Constant:
+        """The constant of a value; a number in place of a pattern, with a note."""
+        found = self._constant(value, lamp, graph)
+        if found is None:
             what, effect = (
                 "a pattern of its nodes is left out",
                 "light is even, and may be brighter or darker",
             )
             self._notes.add("not-carried", lamp.name, "Nodes", what, effect)
-        colour, strength = (factor or Constant((1.0,)) for factor in factors)
-        r, g, b = (c * strength.number for c in colour.colour)
-        return r, g, b
+        return found or Constant((instead,))
 
     def _constant(self, value: Value, lamp: Lamp, graph: Graph) -> Constant | None:
         """A constant, what nodes compute of constants, or such a strength of Light Falloff."""

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import math
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import bpy
+from mathutils import Vector
 
 from enfilade_blender.job import Job
 from enfilade_blender.notes import Notes
@@ -17,6 +20,7 @@ FAST_GI_EFFECTS = {
     "REPLACE": "indirect light is computed, not approximated: it may be brighter or darker",
     "ADD": "indirect light is darker: the approximation adds light of the world",
 }
+SOFT_FALLOFF = 0.1  # least error of the irradiance of the nearest surface that is noted
 LEAST_CLAMP = 10.0  # Cycles' own limit of indirect light; a lower one makes pictures darker
 
 
@@ -43,6 +47,10 @@ def note_settings(job: Job, selection: Selection, notes: Notes) -> None:
     for (name, what, effect), is_used in settings.items():
         if is_used:
             notes.add("not-carried", scene.name, name, f"{what} is left out", effect)
+    (first, last), (start, end) = selection.frames, (scene.frame_start, scene.frame_end)
+    if first < start or last > end:
+        what = f"frames {first}-{last} reach beyond the range of the scene, {start}-{end}"
+        notes.add("approximated", scene.name, "Frame Range", what, "the camera may stand still in these")
     layer = selection.view_layer
     for name in ("material_override", "world_override"):  # Blender 4.2 has none of the world
         if getattr(layer, name, None) is not None:
@@ -109,3 +117,28 @@ def note_light(selection: Selection, lamps: list[Lamp], notes: Notes, *, has_gla
             what = f"its limit of bounces, {light.max_bounces}, is left out"
             effect = "its light is reflected further, and indirect light is brighter"
             notes.add("not-carried", name, "Max Bounces", what, effect)
+
+
+def note_falloff(lamps: list[Lamp], selection: Selection, notes: Notes) -> None:
+    """Note lamps of soft falloff that are near surfaces for their radius.
+
+    In Cycles their light comes from a disc that faces every point that it lights, by I / (d^2 + r^2): of no
+    emitter with a place of its own.
+    """
+    graph = bpy.context.evaluated_depsgraph_get()
+    for lamp in lamps:
+        data = lamp.data
+        is_soft = data.type in ("POINT", "SPOT") and data.use_soft_falloff and data.energy > 0.0
+        if not is_soft or data.shadow_soft_size <= 0.0:
+            continue
+        reach = data.shadow_soft_size / math.sqrt(SOFT_FALLOFF)
+        place, axis = Vector(lamp.matrix[:3, 3]), Vector(-lamp.matrix[:3, 2]).normalized()
+        around = [Vector(one).normalized() for one in product((-1, 0, 1), repeat=3) if any(one)]
+        if data.type == "SPOT":
+            around = [one for one in around if one.dot(axis) > math.cos(0.5 * data.spot_size)]
+        hits = [selection.scene.ray_cast(graph, place, one, distance=reach) for one in (axis, *around)]
+        distances = [(hit[1] - place).length for hit in hits if hit[0]]
+        if distances:
+            excess = (data.shadow_soft_size / max(min(distances), 1e-6)) ** 2
+            effect = f"surfaces near it are brighter, at {min(distances):.2g} units by {excess:.0%}"
+            notes.add("approximated", lamp.name, "Soft Falloff", "its falloff is quadratic", effect)

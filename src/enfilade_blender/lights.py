@@ -62,8 +62,13 @@ def area_radiance(power: float, area: float) -> float:
 
 
 def lamp_colour(lamp: Lamp) -> Colour:
-    """Colour times power (or strength), with temperature, exposure and the factor of nodes."""
+    """Colour times power (or strength), with temperature, exposure and the factor of nodes.
+
+    A sun whose scale leaves it no direction is dark, as in Cycles.
+    """
     data = lamp.data
+    if data.type == "SUN" and not lamp.matrix[:3, 2].any():
+        return 0.0, 0.0, 0.0
     scale = data.energy * 2.0 ** getattr(data, "exposure", 0.0) * _unnormalized(data)
     tint = data.temperature_color if getattr(data, "use_temperature", False) else (1.0, 1.0, 1.0)
     r, g, b = (float(c) * float(t) * n * scale for c, t, n in zip(data.color, tint, lamp.factor, strict=True))

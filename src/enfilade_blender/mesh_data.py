@@ -12,7 +12,6 @@ import numpy as np
 from enfilade_blender.notes import Notes
 from enfilade_blender.ply import F32, Mesh
 
-UNIT = 1e-2  # deviation of a normal's length from 1
 KINDS = {  # attributes that nodes read: name, type and number of their values
     "FLOAT": ("value", np.float32, 1),
     "INT": ("value", np.int32, 1),
@@ -88,14 +87,10 @@ def _without_broken(mesh: Mesh, is_finite: Any, owner: str, notes: Notes) -> Mes
         what = f"triangles with a vertex that is NaN or infinite are left out: {count} of {len(mesh)}"
         notes.add("not-carried", owner, "Mesh", what, "they are missing from the picture")
     mesh = mesh.select(is_finite)
-    edges = np.diff(mesh.positions[mesh.triangles], axis=1)
-    flat = np.cross(edges[:, 0], edges[:, 1])
-    flat /= np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-30)
-    is_unit = np.abs(np.linalg.norm(mesh.normals, axis=-1, keepdims=True) - 1.0) < UNIT
     generated = mesh.generated
     if generated is not None and not np.isfinite(generated).all():
         generated = None
-    return replace(mesh, normals=np.where(is_unit, mesh.normals, flat[:, None]), generated=generated)
+    return replace(mesh, generated=generated).with_normals()
 
 
 def _generated(data: Any, positions: F32, triangles: Any) -> F32 | None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
+UNIT = 1e-2  # deviation of a normal's length from 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,22 @@ class Mesh:
         normals = self.normals @ (mirror * cofactors).T
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
         moved = replace(self, positions=positions.astype(np.float32), normals=normals.astype(np.float32))
-        return moved.reversed() if mirror < 0.0 else moved
+        return (moved.reversed() if mirror < 0.0 else moved).with_normals()
+
+    def with_normals(self) -> Mesh:
+        """The mesh; normals without a direction, as a flattened one has, are those of triangles.
+
+        Those of triangles without an area are +z: Mitsuba makes NaN of zeros.
+        """
+        is_void = ~(np.abs(np.linalg.norm(self.normals, axis=-1) - 1.0) < UNIT)
+        if not is_void.any():
+            return self
+        edges = np.diff(self.positions[self.triangles].astype(np.float64), axis=1)
+        flat = np.cross(edges[:, 0], edges[:, 1])
+        length = np.linalg.norm(flat, axis=-1, keepdims=True)
+        flat = np.where(length > 0.0, flat / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+        normals = np.where(is_void[..., None], flat[:, None], self.normals)
+        return replace(self, normals=normals.astype(np.float32))
 
     def reversed(self) -> Mesh:
         """The same corners in opposite order; normals stay."""

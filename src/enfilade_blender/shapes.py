@@ -11,15 +11,17 @@ import numpy as np
 from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
-from enfilade_blender.materials.bsdfs import Context
+from enfilade_blender.materials.bsdfs import Context, is_one
 from enfilade_blender.materials.graph import Graph, is_of_place
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
+    Add,
     AttributeValue,
     Constant,
     ImageValue,
     Lobe,
+    Mix,
     Shader,
     Texture,
     values_of,
@@ -33,7 +35,8 @@ DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
 FEW_COPIES = 64  # of an object that are baked one by one
-BACK_OFFSET = 1e-4  # of the size of an open emitter: distance of its back
+SAMPLED_EYES = 16  # of which backs are looked for
+BACK_OFFSET = 4e-5  # of a vertex' largest coordinate plus 1: rays begin at 9e-5, which pass the other side
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,7 @@ class _Material:
     is_own: bool
     uv: str | None
     attribute: str | None
+    is_back_seen: bool = False
 
 
 class Shapes:
@@ -130,7 +134,8 @@ class Shapes:
             shader, mesh, is_own = self._bakery.resolve(
                 self._shader(part.material), part.material, part.mesh, placed
             )
-            material = _Material(shader, part, is_own, *_maps(shader, mesh))
+            is_back_seen = _has_relief(shader) and self._shows_its_back(part.mesh, placed)
+            material = _Material(shader, part, is_own, *_maps(shader, mesh), is_back_seen)
             surface = self._surface(material)[1]
             if surface.is_invisible and not surface.emitted:
                 continue
@@ -144,7 +149,8 @@ class Shapes:
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             elements += self._shapes_of(name, mesh, material, radiance)
-            if radiance is not None and not self._hides_its_back(part.mesh, placed):
+            is_hidden = is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
+            if radiance is not None and not is_hidden:
                 elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
 
@@ -158,6 +164,19 @@ class Shapes:
             if ((points > copy.min(axis=0)) & (points < copy.max(axis=0))).all(axis=1).any():
                 return False
         return True
+
+    def _shows_its_back(self, mesh: Mesh, placed: Placed) -> bool:
+        """Whether a mesh is open, and has triangles that face away from a camera."""
+        if placed.mesh.is_closed():
+            return False
+        eyes = self._eyes[:: max(len(self._eyes) // SAMPLED_EYES, 1)]
+        for matrix in placed.matrices:
+            copy = mesh.transformed(matrix)
+            corners = copy.positions[copy.triangles]
+            fronts = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            if any((np.einsum("ij,ij->i", fronts, eye - corners[:, 0]) < 0.0).any() for eye in eyes):
+                return True
+        return False
 
     def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
         group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))
@@ -208,12 +227,14 @@ class Shapes:
     def _surface(self, of: _Material, *, is_mirrored: bool = False) -> tuple[str, Surface]:
         """Id of a BSDF, and its surface; `is_mirrored` as its normal maps."""
         material, part = of.part.material, of.part.name
-        key = material.name_full if material else "", is_mirrored, of.part if of.is_own else None
+        owner = of.part if of.is_own else None
+        key = material.name_full if material else "", is_mirrored, of.is_back_seen, owner
         if key in self._surfaces:
             return self._surfaces[key]
         context = self._context(material, is_mirrored=is_mirrored)
         surface = build(of.shader, context)
-        element = surface.element(context)
+        back = build(of.shader, replace(context, is_back=True)) if of.is_back_seen else None
+        element = surface.element(context, back)
         name = f"material {material.name if material else 'no material'}"
         identifier = self.identifiers.unique(f"{name}: {part}" if of.is_own else name)
         self._bsdfs.append(named(element, identifier))
@@ -248,6 +269,13 @@ def _parts(placed: Placed) -> Any:
         yield _Part(placed.name, mesh, placed.slots[slot] if placed.slots else None, placed)
 
 
+def _has_relief(shader: Shader) -> bool:
+    """Whether a shader has a normal or bump map."""
+    if isinstance(shader, Mix | Add):
+        return _has_relief(shader.first) or _has_relief(shader.second)
+    return getattr(shader, "normal", None) is not None
+
+
 def _middles(placed: Placed) -> np.ndarray:
     """Middles of the boxes of an object's copies, (N, 3)."""
     positions = placed.mesh.positions
@@ -278,7 +306,6 @@ def _with_maps(mesh: Mesh, uv: str | None, attribute: str | None) -> Mesh:
 
 def _back(mesh: Mesh) -> Mesh:
     """The other side of an emitter, a little behind it."""
-    size = float(np.ptp(mesh.positions, axis=0).max(initial=0.0))
     back = mesh.reversed()
     corners = back.positions[back.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -286,4 +313,5 @@ def _back(mesh: Mesh) -> Mesh:
     for corner in range(3):
         np.add.at(offsets, back.triangles[:, corner], normals)
     offsets /= np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-30)
-    return replace(back, positions=back.positions + offsets * size * BACK_OFFSET, normals=-back.normals)
+    offsets *= BACK_OFFSET * (1.0 + np.abs(back.positions).max(axis=1, keepdims=True))
+    return replace(back, positions=back.positions + offsets, normals=-back.normals)

@@ -3,19 +3,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
 from mathutils import Vector
 
+from enfilade_blender.camera import RAY_OFFSET
 from enfilade_blender.lights import Sun
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
 SAMPLED_VIEWS = 64
 RAYS = 8, 5  # of a view across and down
-NEAR = 0.1  # Blender's own, within which nothing is expected
+LISTED = 3  # objects that are named
+MINIATURE = 0.1  # scene units, of which Mitsuba's offset of rays is a thousandth
 FAR = 1e4  # scene units, to a point in the sun's direction
 
 
@@ -35,32 +35,33 @@ def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: No
             return
 
 
-def note_clipping(views: list[View], selection: Selection, notes: Notes) -> None:
-    """Note cameras that clip surfaces in Blender: here they see all from the eye on."""
-    graph, found = bpy.context.evaluated_depsgraph_get(), set()
-    boxes = [np.array(obj.matrix_world) @ _homogeneous(obj.bound_box).T for obj in selection.scene.objects]
-    corners = np.concatenate([box[:3].T for box in boxes])
+def note_depths(views: list[View], selection: Selection, notes: Notes) -> None:
+    """Note cameras that clip surfaces in Blender, and those as near to all they see as in a miniature.
+
+    Here they see all from the eye on.
+    """
+    graph = bpy.context.evaluated_depsgraph_get()
+    clipped: dict[tuple[str, str], dict[str, None]] = {}  # objects by camera and setting
     for view in views[:: max(len(views) // SAMPLED_VIEWS, 1)]:
         near, far = (view.projection[2, 3] / (view.projection[2, 2] + sign) for sign in (-1.0, 1.0))
-        eye = view.pose[:3, 3]
-        is_all_seen = near <= 1.01 * NEAR and np.linalg.norm(corners - eye, axis=1).max() <= far
-        if view.name in found or is_all_seen:
-            continue
+        eye, depths = view.pose[:3, 3], []
         for direction in _directions(view):  # of unit depth
-            length = float(np.linalg.norm(direction))
-            is_hit, place, *_ = selection.scene.ray_cast(graph, Vector(eye), Vector(direction))
-            depth = np.linalg.norm(np.array(place) - eye) / length if is_hit else near
+            is_hit, place, _, _, obj, _ = selection.scene.ray_cast(graph, Vector(eye), Vector(direction))
+            if not is_hit:
+                continue
+            depth = np.linalg.norm(np.array(place) - eye) / np.linalg.norm(direction)
+            depths.append(depth)
             if not near <= depth <= far:
-                what, effect = "its clipping is left out", "surfaces that it clips are visible"
-                notes.add(
-                    "not-carried", view.name, "Clip Start" if depth < near else "Clip End", what, effect
-                )
-                found.add(view.name)
-                break
-
-
-def _homogeneous(points: Any) -> np.ndarray:
-    return np.pad(np.array(points), ((0, 0), (0, 1)), constant_values=1.0)
+                setting = "Clip Start" if depth < near else "Clip End"
+                clipped.setdefault((view.name, setting), {})[obj.name] = None
+        if depths and np.median(depths) < MINIATURE:
+            what = f"it is as near to what it sees as in a miniature: within {MINIATURE} units"
+            effect = f"shadows are lost within {RAY_OFFSET:.2g} units of contacts: make the scene larger"
+            notes.add("approximated", view.name, "Location", what, effect)
+    for (name, setting), objects in clipped.items():
+        names = ", ".join([*objects][:LISTED]) + (" and others" if len(objects) > LISTED else "")
+        effect = f"surfaces that it clips are visible: {names}"
+        notes.add("not-carried", name, setting, "its clipping is left out", effect)
 
 
 def _directions(view: View) -> list[np.ndarray]:

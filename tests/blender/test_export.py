@@ -36,7 +36,9 @@ FILES = (
     "emission",
     "lamps_in_view",
     "mirrored_camera",
+    "miniature",
     "lamp_nodes",
+    "near_lamps",
     "left_out",
     "frozen",
     "simplified",
@@ -145,6 +147,39 @@ def test_a_mirrored_camera_looks_where_it_points(exported):
     assert ("Camera", "it is 5,000 units from the origin") in notes(result, "approximated")
 
 
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (-1.0, 1.0), (1.0, -1.0)])
+def test_the_axes_of_a_camera_may_be_oblique(exported, corner):
+    """As in Cycles, which normalizes the columns of its matrix, of a parent that is twice as high."""
+    path = json.loads((exported("miniature")[0] / "camera_path.json").read_text())
+    frame = path["camera_path"][0]
+    tangent = np.tan(0.5 * np.radians(frame["fov"])) * np.array(
+        [path["render_width"] / path["render_height"], 1]
+    )
+    centre = np.multiply(frame["principal_point"], (2.0, -2.0)) + np.array((-1.0, 1.0))
+    found = np.array(frame["camera_to_world"])[:3, :3] @ [*((corner - centre) * tangent), -1.0]
+    turn, (sine, cosine) = 0.5, (np.sin(np.pi / 3.0), np.cos(np.pi / 3.0))
+    rig = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 2]])
+    axes = rig @ [[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]]
+    axes /= np.linalg.norm(axes, axis=0)
+    width = 0.5 * 36.0 / 35.0  # of the sensor, by the focal length
+    size = np.array([width, width * path["render_height"] / path["render_width"]])
+    wanted = axes @ [*(corner * size), -1.0]
+    assert found / np.linalg.norm(found) == pytest.approx(wanted / np.linalg.norm(wanted), abs=1e-5)
+
+
+def test_a_shear_of_the_picture_is_noted(exported):
+    found = [name for name, what in notes(exported("near_lamps")[1], "approximated") if "shear" in what]
+    assert found == ["Camera"]
+
+
+def test_a_miniature_is_not_clipped_and_said_to_be_small(exported):
+    _, result = exported("miniature")
+    found = {note["node"]: note for note in result["notes"] if note["object"] == "Camera"}
+    assert set(found) == {"Clip Start", "Location"}
+    assert found["Clip Start"]["effect"] == "surfaces that it clips are visible: Coin"
+    assert "miniature" in found["Location"]["what"]
+
+
 def test_view_and_exposure_are_those_of_the_file(exported):
     _, result = exported("agx")
     assert result["view"] == {"display": "sRGB", "view_transform": "AgX", "look": "AgX - Punchy"}
@@ -187,6 +222,13 @@ def test_point_lights_keep_their_radius_unseen_by_the_camera(exported):
     assert all(shape.is_emitter() and shape.bsdf().id() == LAMP for shape in lamps)
 
 
+def test_soft_falloff_is_noted_of_lamps_near_surfaces(exported):
+    found = [note for note in exported("near_lamps")[1]["notes"] if note["node"] == "Soft Falloff"]
+    assert {note["object"] for note in found} == {"Near", "Down"}
+    # Measured in Cycles at two radii: 0.779 of the light without, off the axis in part.
+    assert all(note["effect"].endswith("at 0.5 units by 25%") for note in found)
+
+
 def test_constants_of_a_lamps_nodes_are_kept(exported):
     out, result = exported("lamp_nodes")
     emitters = ET.parse(out / "scene.xml").getroot().findall("emitter[@type='point']")
@@ -195,7 +237,8 @@ def test_constants_of_a_lamps_nodes_are_kept(exported):
     falloff, pattern = np.multiply([1.0, 0.5, 0.5], 50.0 * watts), np.full(3, 5.0 * watts)
     warm = np.multiply([1.9351, 0.8035, 0.1917], 5.0 * watts)  # a world of this temperature, by Cycles
     computed = np.multiply([0.75, 0.0, 0.25], 15.0 * watts)
-    wanted = np.array([falloff, pattern, warm, computed, computed])
+    total = np.multiply([5.0 + 1.5, 2.5 + 1.5, 2.5 + 1.5], watts)  # of an emission, and 3/4 of another
+    wanted = np.array([falloff, pattern, warm, computed, computed, total])
     assert np.array(found) == pytest.approx(wanted, rel=1e-3, abs=1e-6)
     assert notes(result, "approximated") == [("Falloff", "its falloff is quadratic")]
     assert notes(result, "not-carried") == [("Pattern", "a pattern of its nodes is left out")]
@@ -233,6 +276,7 @@ def test_settings_that_are_left_out_are_noted(exported):
         ("islands", "its Random Per Island are other numbers than in Cycles"),
         ("stained", grey),
     }
+    assert ("broken", "a number that is NaN or infinite is taken as 0") in notes(result, "approximated")
 
 
 def test_what_changes_is_noted(exported):
@@ -317,6 +361,13 @@ def test_limits_count_levels_that_simplify_leaves(blender, files):
 
 def test_normalized_coordinates_are_baked(exported):
     assert [name for name, _ in notes(exported("simplified")[1], "baked")] == ["normalized, Soft"]
+
+
+def test_frames_beyond_the_range_of_the_scene_are_noted(blender, exported, files):
+    code, out, result = blender.job(files["agx"], "beyond", frames=[2, 3])
+    assert (code, len(json.loads((out / "camera_path.json").read_text())["camera_path"])) == (0, 2)
+    wanted = [("Scene", "frames 2-3 reach beyond the range of the scene, 1-1")]
+    assert (notes(result, "approximated"), notes(exported("agx")[1], "approximated")) == (wanted, [])
 
 
 def test_a_wrong_name_lists_the_right_ones(blender, files):

@@ -89,6 +89,13 @@ def test_a_dark_lamp_is_left_out():
     assert notes.to_list() == []
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.1])
+def test_a_sun_without_a_direction_is_dark(angle):
+    flat = lamp("SUN", matrix=np.diag([1.0, 1.0, 0.0, 1.0]), angle=angle)
+    lamps, sun = split_suns([flat], Notes())
+    assert (sun, emitters(lamps[0], Identifiers(), Notes())) == (None, [])
+
+
 def test_a_lamp_that_takes_light_away_is_left_out_and_noted():
     notes = Notes()
     assert emitters(lamp("POINT", "Dimmer", energy=-10.0), Identifiers(), notes) == []

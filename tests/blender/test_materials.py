@@ -46,6 +46,17 @@ def test_an_inverted_opacity_is_that_of_the_baked_image(made):
     assert np.percentile(found, [5, 95]) == pytest.approx([1.0 - x**2 for x in linear], abs=0.01)
 
 
+def test_the_far_wall_of_a_closed_emitter_is_seen_through_the_near_one(made):
+    out, elements, _ = made
+    files = [elements[name].find("string[@name='filename']").get("value") for name in ("Ghost", "Ghost back")]
+    meshes = [mi.traverse(mi.load_dict({"type": "ply", "filename": str(out / file)})) for file in files]
+    front, back = (np.unique(np.array(m["vertex_positions"]).reshape(-1, 3), axis=0) for m in meshes)
+    apart = np.linalg.norm(back[:, None] - front, axis=-1).min(axis=1)
+    # A ray that leaves one of the two begins beyond the other: the surface is passed once.
+    assert (apart < mi.math.RayEpsilon * (1.0 + np.abs(back).max(axis=1))).all()
+    assert (apart > 0.0).all()
+
+
 def test_a_colour_is_multiplied_by_an_alpha_that_is_not_used(made):
     out, elements, _ = made
     found = pixels(out, elements["material premultiplied"].find(".//texture"))
@@ -220,16 +231,28 @@ def test_normal_maps_are_mirrored_with_their_uv_maps(blender):
     code, out, result = blender.job(blender.make("mirrored_normals")[0], "mirrored normals")
     assert code == 0, result
     scene = mi.load_file(str(out / "scene.xml"))
-    ray = mi.Ray3f(mi.Point3f([0.1, 2.1, 4.1, 6.1, 8.5, 7.5, -1.9], 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
+    places = [0.1, 2.1, 4.1, 6.1, 8.5, 7.5, 10.1, 12.1, -1.9]
+    ray = mi.Ray3f(mi.Point3f(places, 0.1, 3.0), mi.Vector3f(0.0, 0.0, -1.0))
     si = scene.ray_intersect(ray)
     sample, _ = si.bsdf().sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
     half = np.add(np.array(si.to_world(sample.wo)).T, [0.0, 0.0, 1.0])
-    # Cycles' normals: a mirrored v turns the tilt round, a mirrored u and a reflection along it do not.
-    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 0.0]) * 0.6
+    # Cycles' normals: a mirrored v turns the tilt round, a mirrored u and a reflection along it do not. Seen
+    # from behind, the normal of the front is negated, also that of an image of heights.
+    tilts = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, 1.0, 0.0]) * 0.6
     found = half / np.linalg.norm(half, axis=1, keepdims=True)
     assert found[:, 1] == pytest.approx(tilts, abs=0.01)
     assert found[:, 2] == pytest.approx(0.8, abs=0.01)
-    assert found[6, 0] == pytest.approx(0.6, abs=0.01)
+    assert found[8, 0] == pytest.approx(0.6, abs=0.01)
+    sides = {e.get("id"): len(e.findall("bsdf")) for e in ET.parse(out / "scene.xml").getroot().iter("bsdf")}
+    assert sorted(count for name, count in sides.items() if name) == [
+        0,
+        1,
+        1,
+        1,
+        1,
+        2,
+        2,
+    ]  # the first of lamps
 
 
 def test_the_alpha_of_a_colour_attribute_and_several_attributes_are_baked(blender):

@@ -1,5 +1,7 @@
 """PLY, PNG, OpenEXR and XML files, read again by other libraries."""
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
 import OpenEXR
@@ -72,6 +74,14 @@ def test_normals_stay_perpendicular_under_shear():
     corners = moved.positions[moved.triangles[0]]
     assert (corners[1] - corners[0]) @ moved.normals[0, 0] == pytest.approx(0.0, abs=1e-6)
     assert np.linalg.norm(moved.normals[0, 0]) == pytest.approx(1.0)
+
+
+def test_a_flattened_mesh_has_the_normals_of_its_triangles():
+    tilted = replace(square(), normals=np.full((2, 3, 3), 3**-0.5, np.float32))
+    flat = tilted.transformed(np.diag([1.0, 1.0, 0.0, 1.0]))
+    assert np.array_equal(flat.normals, square().normals)
+    point = tilted.transformed(np.diag([0.0, 0.0, 0.0, 1.0]))
+    assert np.linalg.norm(point.normals, axis=-1) == pytest.approx(1.0)
 
 
 def test_a_square_is_open_and_a_tetrahedron_closed():

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ from enfilade_blender.materials import ggx, mapping
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     AttributeValue,
+    Bump,
     Constant,
     ImageValue,
     Lobe,
@@ -54,6 +55,7 @@ class Context:
     textures: Textures
     notes: Notes
     is_mirrored: bool = False  # the UV map, below normal maps
+    is_back: bool = False  # the side of a surface that normals point away from
 
 
 def lobe_bsdf(lobe: Lobe, context: Context) -> Element:
@@ -123,18 +125,18 @@ def _two_roughnesses(roughness: Value, context: Context) -> tuple[float, float, 
     return low, high, context.textures.rewritten(roughness, share, "roughness")
 
 
-def two_sided(bsdf: Element) -> Element:
-    """The BSDF, whose opaque parts are seen from both sides."""
+def two_sided(bsdf: Element, back: Element | None = None) -> Element:
+    """The BSDF, whose opaque parts are seen from both sides; the back may have other textures."""
     if bsdf.get("type") == "twosided":
         return bsdf
     nested = [child for child in bsdf if child.tag == "bsdf"]
     kinds = {element.get("type") for element in bsdf.iter("bsdf")}
     if not kinds & TRANSMITTING:
-        return plugin("bsdf", "twosided", bsdf)
+        return plugin("bsdf", "twosided", bsdf, *([] if back is None else [back]))
     for child in nested:
         index = list(bsdf).index(child)
         bsdf.remove(child)
-        bsdf.insert(index, two_sided(child))
+        bsdf.insert(index, two_sided(child, None if back is None else back[index]))
     return bsdf
 
 
@@ -265,6 +267,8 @@ def with_normal(bsdf: Element, normal: Normal, context: Context) -> Element:
     """The BSDF inside a normal or bump map, with the shadowing that Cycles has for diffuse lobes alone."""
     if isinstance(normal, ProceduralNormal):
         raise TypeError("procedural normals are baked before they are written")
+    if context.is_back and isinstance(normal, Bump):
+        normal = replace(normal, scale=-normal.scale)
     if normal is None or _is_void(normal.image, context):
         return bsdf
     is_diffuse = {element.get("type") for element in bsdf.iter("bsdf")} <= DIFFUSE
@@ -282,15 +286,16 @@ def _is_void(value: Value, context: Context) -> bool:
 
 
 def _normal_texture(normal: NormalMap, context: Context) -> Element:
-    value = normal.image
-    is_as_is = abs(normal.strength - 1.0) < 1e-3 and not context.is_mirrored
+    value, is_turned = normal.image, context.is_back and normal.output.node.type == "NORMAL_MAP"
+    is_as_is = abs(normal.strength - 1.0) < 1e-3 and not context.is_mirrored and not is_turned
     if is_as_is or not isinstance(value, ImageValue | Texture):
         return context.textures.colour(value)
     n = context.textures.pixels(value) * 2.0 - 1.0
     n = n * np.array([1.0, -1.0 if context.is_mirrored else 1.0, 1.0])
+    n = n * (np.array([-1.0, -1.0, 1.0]) if is_turned else 1.0)  # Cycles negates all of it on a back
     n = np.concatenate([n[..., :2] * normal.strength, 1.0 + (n[..., 2:] - 1.0) * normal.strength], axis=-1)
     n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-6)
-    name = f"normal {normal.strength:.3g}{' mirrored' if context.is_mirrored else ''}"
+    name = f"normal {normal.strength:.3g}{' mirrored' * context.is_mirrored}{' back' * is_turned}"
     return context.textures.rewritten(value, 0.5 * n + 0.5, name)
 
 

@@ -100,11 +100,12 @@ class Graph:
         """Value of an input."""
         found, is_number = follow(socket, groups), socket.type == "VALUE"
         if not isinstance(found, Output):
-            numbers = _numbers(found)
-            return Constant((sum(numbers) / 3.0,) if is_number and found.type == "VECTOR" else numbers)
+            constant = self._constant(found)
+            numbers = constant.numbers
+            return Constant((sum(numbers) / 3.0,)) if is_number and found.type == "VECTOR" else constant
         node = found.node
         if node.type in ("RGB", "VALUE"):
-            return Constant(_numbers(found.socket))
+            return self._constant(found.socket)
         if node.type == "LIGHT_PATH":
             self._note_light_path(found)
             return Constant((0.0,))
@@ -143,6 +144,21 @@ class Graph:
             if is_plain and isinstance(strength, Constant) and isinstance(distance, Constant):
                 return Bump(height, strength.number * distance.number * (-1.0 if node.invert else 1.0))
         return ProceduralNormal(found)
+
+    def _constant(self, socket: Any) -> Constant:
+        """Default of a socket: a number, or the first three of a colour or vector; 0 where not finite."""
+        value = getattr(socket, "default_value", 0.0)
+        if isinstance(value, int | float):
+            value = (value,)
+        numbers = [float(number) for number in value][:3] if hasattr(value, "__len__") else [0.0]
+        finite = tuple(number if math.isfinite(number) else 0.0 for number in numbers)
+        if not all(map(math.isfinite, numbers)):
+            what, effect = (
+                "a number that is NaN or infinite is taken as 0",
+                "the surface or light may be darker",
+            )
+            self._notes.add("approximated", self._owner, f"{socket.node.name}: {socket.name}", what, effect)
+        return Constant(finite)
 
     def _lobe(self, node: Any, groups: tuple[Any, ...]) -> Shader:
         kind = table.LOBES.get(node.type)
@@ -274,6 +290,8 @@ def uv_coordinates(socket: Any, groups: tuple[Any, ...]) -> tuple[str, Matrix3] 
         location, rotation, scale = (tuple(node.inputs[i].default_value) for i in (1, 2, 3))
         if node.vector_type == "VECTOR":
             location = (0.0, 0.0, 0.0)
+        if not all(map(math.isfinite, (*location, *rotation, *scale))):
+            return None
         own = mapping.uv_matrix(node.vector_type, location, rotation, scale)
         return inner[0], mapping.product(own, inner[1])
     return None
@@ -348,11 +366,3 @@ def _exact(value: Value) -> Value:
 
 def _by_identifier(sockets: Any, like: Any) -> Any:
     return next(socket for socket in sockets if socket.identifier == like.identifier)
-
-
-def _numbers(socket: Any) -> tuple[float, ...]:
-    """Default of a socket: a number, or the first three of a colour or vector."""
-    value = getattr(socket, "default_value", 0.0)
-    if isinstance(value, int | float):
-        return (float(value),) if math.isfinite(value) else (0.0,)
-    return tuple(float(number) for number in value)[:3] if hasattr(value, "__len__") else (0.0,)

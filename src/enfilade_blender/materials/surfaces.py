@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree as ET
 
 from enfilade_blender.materials.bsdfs import (
     ALMOST,
@@ -73,9 +74,9 @@ class Surface:
         """BSDF without its opacity, of one side; black where there is none."""
         return self.bsdf if self.bsdf is not None else plugin("bsdf", "diffuse", reflectance=BLACK)
 
-    def element(self, context: Context) -> Element:
-        """BSDF with its opacity."""
-        bsdf = two_sided(self.plain())
+    def element(self, context: Context, back: Surface | None = None) -> Element:
+        """BSDF with its opacity; `back` is the surface as built for the other side."""
+        bsdf = two_sided(self.plain(), back and _other(back.plain(), self.plain()))
         if is_one(self.opacity):
             return bsdf
         opacity = context.textures.number(self.opacity)
@@ -100,6 +101,11 @@ class Surface:
             return context.textures.colour(radiance.colour)
         scaled = context.textures.pixels(radiance.colour) * radiance.strength
         return context.textures.rewritten(radiance.colour, scaled, f"emission {radiance.strength:.3g}")
+
+
+def _other(bsdf: Element, than: Element) -> Element | None:
+    """The BSDF, unless it is the same as another: every BSDF makes Mitsuba's kernels slower."""
+    return None if ET.tostring(bsdf) == ET.tostring(than) else bsdf
 
 
 def build(shader: Shader, context: Context) -> Surface:

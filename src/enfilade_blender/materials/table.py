@@ -100,12 +100,12 @@ PRINCIPLED = (
     (
         "Emission Color, Emission Strength",
         "mapped",
-        "`area` emitter; meshes that are open, or around something, shine on both sides",
+        "`area` emitter; meshes that are open, partly transparent, or around something shine on both sides",
     ),
     (
         "Normal: Normal Map, Bump of images",
         "mapped",
-        "`normalmap`, `bumpmap`; where the UV map is mirrored, a shape and a map of their own",
+        "`normalmap`, `bumpmap`; mirrored UV maps and the backs of open meshes have maps of their own",
     ),
     ("Normal Map of another UV map than its image's", "baked", "a `normalmap` of each mesh"),
     (
@@ -175,6 +175,11 @@ LIGHTS = (
         "`spot`, also oval: its blend is fitted by a linear ramp; its radius is left out: shadows are sharp",
     ),
     (
+        "Soft Falloff of points and spots",
+        "approximated",
+        "falloff is quadratic: surfaces nearer than three radii are brighter",
+    ),
+    (
         "Area: square, rectangle, disk, ellipse",
         "mapped",
         "`rectangle` or `disk`; not seen by the camera",
@@ -182,7 +187,7 @@ LIGHTS = (
     ("Sun of angle 0, or beside another sun", "mapped", "`directional`"),
     ("Sun with an angle", "mapped", "a disc in the environment map"),
     (
-        "Nodes of lights: constants and what is computed of them, Light Falloff",
+        "Nodes of lights: emissions of constants and what is computed of them, sums, mixes, Light Falloff",
         "mapped",
         "a factor; falloff is quadratic",
     ),
@@ -216,6 +221,16 @@ OBJECTS = (
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),
+    (
+        "Cameras below a turned parent of uneven scale",
+        "approximated",
+        "oblique axes become the principal point; shear of the picture itself is left out",
+    ),
+    (
+        "Cameras far from the origin, or within 0.1 units of what they see",
+        "approximated",
+        "shadows are lost near contacts",
+    ),
     (
         "Caustics switched off, clamping, Fast GI, limits of bounces of lights and the world",
         "not carried",

@@ -10,6 +10,7 @@ import numpy as np
 
 from corpus.stage import (
     add,
+    cube,
     fill,
     image,
     light,
@@ -19,6 +20,7 @@ from corpus.stage import (
     plane,
     principled,
     shader,
+    sphere,
     tiles,
     world,
 )
@@ -42,6 +44,7 @@ def uncommon_materials(folder):
     ]
     for number, material in enumerate(materials):
         plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+    sphere("Ghost", (0.0, 60.0, 0.0), 50.0, bpy.data.materials["faint glow"])
 
 
 def kinds_of_rays(folder):
@@ -110,10 +113,22 @@ def mirrored_camera(_folder):
     plane("Floor", (0.0, 0.0, 0.0), 4.0, principled("floor"))
 
 
+def miniature(_folder):
+    """A coin of millimetres, nearer than Blender's Clip Start; the camera's parent has an uneven scale."""
+    scene = new_file()
+    light("POINT", "Lamp", (0.0, 0.0, 0.02), 1e-4, shadow_soft_size=0.0)
+    plane("Coin", (0.0, 0.0, 0.0), 0.01, principled("coin"))
+    eye = scene.camera
+    eye.location, eye.rotation_euler = (0.0, -0.0225, 0.0065), (math.radians(60.0), 0.0, 0.0)
+    eye.parent = rig = add("Rig", None)
+    rig.scale, rig.rotation_euler = (1.0, 1.0, 2.0), (0.0, 0.0, 0.5)
+
+
 def mirrored_normals(_folder):
     """Mirrors of a tilted normal map: as it is, with u or v mirrored, of scale -1, and with a reflection.
 
-    One more has the tangents of another UV map than its image's, on which v is along x.
+    Then this one and a bump map seen from behind; the closed cube has no back. One more has the tangents of
+    another UV map than its image's, on which v is along x.
     """
     new_file()
     tilted = image("tilt", lambda x, _: np.full((*x.shape, 3), (0.5, 0.8, 0.9)), 16, space="Non-Color")
@@ -129,6 +144,14 @@ def mirrored_normals(_folder):
     for vertex in pair.data.vertices:
         vertex.co.x += 0.5
     pair.modifiers.new("Mirror", "MIRROR")
+    bumpy, tree, bsdf = shader("bumpy", "BsdfAnisotropic", Roughness=0.0)
+    slope = image(
+        "slope", lambda _, y: np.repeat(np.floor(y * 17)[..., None] / 17, 3, -1), 17, space="Non-Color"
+    )
+    fill(tree, bsdf, {"Normal": node_of(tree, "Bump", Strength=1.0, Distance=0.75, Height=slope)})
+    for number, behind in enumerate((material, bumpy)):
+        plane("behind", (10.0 + 2.0 * number, 0.0, 0.0), 1.0, behind).rotation_euler.y = math.pi
+    cube("closed", (14.0, 0.0, 0.0), 1.0, bumpy)
     turned, tree, bsdf = shader("turned", "BsdfAnisotropic", Roughness=0.0)
     normal = node_of(tree, "NormalMap", Color=tilted)
     normal.uv_map = "Turned"
@@ -168,6 +191,14 @@ def lamp_nodes(_folder):
     fill(tree, emission, {"Color": mixed, "Strength": node_of(tree, "LightFalloff", Strength=product)})
     bpy.data.lights["Computed"].keyframe_insert("energy")
     add("Computed again", bpy.data.lights["Computed"], (1.0, 0.0, 3.0))
+    tree, emission = _lamp_of_nodes("Sum")
+    both = node_of(tree, "AddShader")
+    mixed = node_of(tree, "MixShader", Fac=0.25)
+    fill(tree, mixed, {1: node_of(tree, "Emission", Strength=2.0), 2: node_of(tree, "BsdfDiffuse")})
+    fill(tree, both, {0: emission, 1: mixed})
+    fill(tree, tree.nodes["Light Output"], {"Surface": both})
+    tree, _ = _lamp_of_nodes("Dark")
+    fill(tree, tree.nodes["Light Output"], {"Surface": node_of(tree, "BsdfDiffuse")})
 
 
 def _lamp_of_nodes(name):
@@ -177,6 +208,19 @@ def _lamp_of_nodes(name):
     emission = data.node_tree.nodes["Emission"]
     fill(data.node_tree, emission, {"Color": (1.0, 0.5, 0.5, 1.0), "Strength": 5.0})
     return data.node_tree, emission
+
+
+def near_lamps(_folder):
+    """Lamps of soft falloff, on by default, near a floor and not, seen by a camera with shear."""
+    eye = new_file().camera
+    eye.parent = rig = add("Rig", None)
+    rig.scale, eye.rotation_euler.z = (1.5, 1.0, 1.0), 0.7
+    plane("Floor", (0.0, 0.0, 0.0), 20.0, principled("floor"))
+    light("POINT", "Near", (0.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25)
+    light("POINT", "Hard", (1.0, 0.0, 0.5), 10.0, shadow_soft_size=0.25, use_soft_falloff=False)
+    light("POINT", "Far", (2.0, 0.0, 1.0), 10.0, shadow_soft_size=0.25)
+    for name, z in (("Down", 0.0), ("Up", 1.0)):
+        light("SPOT", name, (3.0, 0.0, 0.5), 10.0, (3.0, 0.0, z), shadow_soft_size=0.25)
 
 
 def painted(_folder):
@@ -293,6 +337,7 @@ def left_out(folder):
     value.outputs[0].default_value = -2.0  # a strength that is not linked is 0 at least
     fill(tree, emission, {"Strength": value})
     plane("Hole", (0.0, 4.0, 0.0), 1.0, hole)
+    plane("Broken", (5.0, 4.0, 0.0), 1.0, principled("broken", (math.nan, 0.5, 0.5, 1.0)))
     scene.render.use_border = scene.render.use_multiview = scene.cycles.use_fast_gi = True
     scene.view_layers.new("Second")
     scene.view_layers[0].material_override = principled("clay")

@@ -66,8 +66,8 @@ class LightTransport:
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
         is_rest = sample.is_alive
         if self._shadow_rays.has_null:
-            # Null interactions that are passed by chance, or ended by Russian roulette, leave noise of the size
-            # of the emission: leave out the few directions that next-event estimation samples more often.
+            # Chance and Russian roulette at null interactions leave noise of the size of the emission: leave
+            # out the few directions that next-event estimation samples more often.
             is_rest &= dr.max(weighted) >= RARE_WEIGHT * dr.max(unweighted)
         indirect = dr.select(is_rest, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
