@@ -88,7 +88,7 @@ def _view(camera: Any, selection: Selection, notes: Notes) -> View:
         projection[axis, 2] -= projection[axis, axis] * tilt[axis]
         projection[axis, axis] *= tilt[2]
     lens: dict[str, Any] = {}
-    if max(abs(projection[0, 2]), abs(projection[1, 2])) > 1e-7:
+    if max(abs(projection[0, 2]), abs(projection[1, 2])) > 1e-6:
         lens["principal_point"] = [0.5 * (1.0 - projection[0, 2]), 0.5 * (1.0 + projection[1, 2])]
     data = evaluated.data
     if data.dof.use_dof:

@@ -102,7 +102,7 @@ class Shapes:
         """Write all meshes; elements of BSDFs and shapes."""
         shapes: list[Element] = []
         total = sum(len(p.mesh) * len(p.matrices) for p in placed)
-        placed = [one for item in placed for one in self._apart(item, total)]
+        placed = [one for item in placed for one in self._apart(item)]
         self._middles = np.concatenate([np.zeros((0, 3)), *map(_middles, placed)])
         self._owners = np.repeat([id(item) for item in placed], [len(item.matrices) for item in placed])
         for number, item in enumerate(placed):
@@ -114,9 +114,10 @@ class Shapes:
         self._bsdfs = share_bsdfs(self._bsdfs, shapes, self._baked, self.textures, self._out)
         return [*self._bsdfs, *shapes]
 
-    def _apart(self, placed: Placed, total: int) -> list[Placed]:
+    def _apart(self, placed: Placed) -> list[Placed]:
         """An object; its copies, if they are few, where a material depends on their place in the world."""
-        if not 1 < len(placed.matrices) <= FEW_COPIES or _is_instanced(placed, total):
+        copies = len(placed.matrices)
+        if not 1 < copies <= FEW_COPIES or copies * len(placed.mesh) > INSTANCED_TRIANGLES:
             return [placed]
         if not any(is_of_place(self._shader(material)) for material in placed.slots):
             return [placed]

@@ -150,6 +150,32 @@ def members(merged):
     return sorted(sorted(set(source.tolist())) for source in merged.sources)
 
 
+@pytest.fixture(autouse=True)
+def _few(monkeypatch):
+    monkeypatch.setattr(merge, "FEW_INSTANCES", 0)
+
+
+def test_few_instances_stay(with_instances, monkeypatch):
+    monkeypatch.setattr(merge, "FEW_INSTANCES", 4)
+    merged = merge_meshes(load_scene(with_instances))  # six: the smallest group is expanded, then another
+    kinds = [s.class_name() for s in merged.scene.shapes()]
+    assert kinds.count("Instance") == 1
+    monkeypatch.setattr(merge, "FEW_INSTANCES", 5)
+    kinds = [s.class_name() for s in merge_meshes(load_scene(with_instances)).scene.shapes()]
+    assert kinds.count("Instance") == 5
+
+
+def test_flat_instances_are_not_seen(with_instances):
+    """As in Mitsuba."""
+    file = with_instances
+    file.write_text(file.read_text().replace('value="0.3, 0.9, 0.5"', 'value="0.3, 0.9, 0"'))
+    merged = merge_meshes(load_scene(file))
+    assert not any(11 in members_ for members_ in members(merged))
+    for shape in merged.scene.shapes():
+        if shape.is_mesh():
+            assert np.isfinite(np.array(shape.vertex_normals_buffer())).all()
+
+
 def test_instances_of_meshes_become_meshes(with_instances):
     merged = merge_meshes(load_scene(with_instances))
     names = ("plain", "turned", "lone", "stretched", "mirrored", "round one")

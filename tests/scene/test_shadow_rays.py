@@ -7,6 +7,7 @@ import pytest
 from enfilade.arrays import Array3f, rows
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Rays
+from enfilade.scene.mitsuba import transport
 from support.mitsuba_scene import DIFFUSE, opened, placed, rgb, veil, write
 
 COUNT = 1 << 14
@@ -121,3 +122,23 @@ def test_a_small_lamp_behind_cut_outs_leaves_no_noise_in_the_rest(tmp_path, opac
         rows(of) for of in renderer.estimate_diffuse(renderer.intersect(rays), one_sequence(lanes))
     )
     assert np.abs(indirect).max() < 10.0 * direct.mean()
+
+
+def test_light_that_a_reflector_returns_through_its_lamp_is_kept(tmp_path, monkeypatch):
+    """Rays pass the lamp with certainty: what they find behind it has no noise of its emission."""
+    ball = '<float name="radius" value="0.05"/><point name="center" x="0" y="0" z="-2"/><ref id="lamp"/>'
+    area = f'<emitter type="area">{rgb("radiance", 100, 100, 100)}</emitter>'
+    bulb = f'<bsdf type="null" id="lamp"/><shape type="sphere">{ball}{area}</shape>'
+    behind = placed("disk", "reflector", (0, 0, -2.1), DIFFUSE, 0.15)
+    renderer = opened(write(tmp_path, FLOOR, bulb, behind, head=INTEGRATOR.format("path"), sky=""))
+    lanes = 1 << 18
+    rays = Rays(*(Array3f(*of) + dr.zeros(Array3f, lanes) for of in ((0.0, 0.0, -0.5), (0.0, 0.0, 1.0))))
+
+    def indirect():
+        point = renderer.intersect(rays)
+        return rows(renderer.estimate_diffuse(point, one_sequence(lanes))[1]).mean(dtype=float)
+
+    found = indirect()
+    monkeypatch.setattr(transport, "RARE_WEIGHT", 0.0)
+    assert found == pytest.approx(indirect(), rel=0.01)
+    assert found > 0.0

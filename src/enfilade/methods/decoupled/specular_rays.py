@@ -60,8 +60,10 @@ def shade_specular(
         Luminance of what camera rays see, which is displayed together with the AOVs.
     """
     # The denoiser would blur surfaces thinner than a pixel, which the centres of no pixels around meet.
-    near, is_specular = dilated(seen), dilated(np.isin(shot.walk.view(frame).geometry.surface, SPECULAR))
-    where, is_missed = near & is_specular, near & ~is_specular
+    # Cut-outs and veils are no such surfaces: their G-buffer may be of another class, or of what is behind.
+    near, is_specular = dilated(seen), np.isin(shot.walk.view(frame).geometry.surface, SPECULAR)
+    is_wide = dilated(is_specular | ~dilated(~seen))
+    where, is_missed = near & is_wide, near & ~is_wide
     nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
     black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
     if not near.any():
@@ -91,7 +93,8 @@ def shade_specular(
     aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
-    # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that.
+    # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that of
+    # noise.
     matters = AdaptiveSampling.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & matters(shown))

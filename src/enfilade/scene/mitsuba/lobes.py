@@ -32,7 +32,7 @@ WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the B
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
-COATED = {"SmoothPlastic", "TwoSidedBRDF"}
+COATED = {"SmoothPlastic", "TwoSidedBRDF"}  # of these alone: a smooth coat over a Lambertian lobe
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24

@@ -8,6 +8,7 @@ tell which shape of the file a triangle comes from, and its order may vary.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,9 @@ import numpy as np
 
 from enfilade.records import F32, U32
 
-EXPANDED_TRIANGLES = 50_000_000  # of all instances that become meshes; 5 to 9 GB
+EXPANDED_TRIANGLES = 50_000_000  # of all instances that become meshes; 7 to 12 GB
+FEW_INSTANCES = 16  # that cost little
+SINGULAR = 1e-7  # determinant of a matrix with columns of length 1, below which Mitsuba shows nothing
 SMALLEST = np.finfo(np.float32).tiny
 
 
@@ -124,38 +127,46 @@ def _expanded(
 ) -> tuple[list[_Placed], list[Any]]:
     """Shapes, with those of a group in place of its instances; and the groups that keep theirs.
 
-    Groups of few triangles are expanded first, so that few instances remain.
+    Groups of few triangles are expanded first, until few instances remain.
     """
     instances: dict[str, list[int]] = {name: [] for name in groups}
     group_of = {i: _group_of(s) for i, s in enumerate(shapes, start=1) if s.class_name() == "Instance"}
     for index, name in group_of.items():
-        instances[name].append(index)
+        instances.setdefault(name, []).append(index)
 
     # Choose the groups to expand.
-    left = EXPANDED_TRIANGLES
+    left, remaining = EXPANDED_TRIANGLES, len(group_of)
     kept = set(groups)
     triangles = {name: sum(s.primitive_count() for s in members) for name, (_, members) in groups.items()}
     for name in sorted(groups, key=triangles.__getitem__):
         total = triangles[name] * len(instances[name])
-        if total <= left and all(_is_mergeable(shape) for shape in groups[name][1]):
-            left -= total
+        is_known = len(instances) == len(groups)
+        is_worthwhile = is_known and remaining > FEW_INSTANCES and total <= left
+        if is_worthwhile and all(_is_mergeable(shape) for shape in groups[name][1]):
+            left, remaining = left - total, remaining - len(instances[name])
             kept.remove(name)
 
     # Put their shapes where their first instance is.
     placed = []
     for index, shape in enumerate(shapes, start=1):
         group = group_of.get(index)
-        if group is None or group in kept:
+        if group is None or group in kept or group not in groups:
             placed.append(_Placed(shape, (index,)))
         elif index == instances[group][0]:
             matrices = np.stack([_to_world(shapes[i - 1]) for i in instances[group]])
-            placed += [_Placed(member, tuple(instances[group]), matrices) for member in groups[group][1]]
+            length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+            linear = matrices[:, :3, :3] / np.maximum(length, SMALLEST)
+            is_shown = np.abs(np.linalg.det(linear)) > SINGULAR
+            indices = tuple(np.array(instances[group])[is_shown].tolist())
+            if indices:
+                placed += [_Placed(member, indices, matrices[is_shown]) for member in groups[group][1]]
     return placed, [groups[name][0] for name in groups if name in kept]
 
 
 def _group_of(instance: Any) -> str:
     """Identifier of an instance's group, which Mitsuba tells in its description alone."""
-    return str(instance).partition('name = "')[2].partition('"')[0]
+    found = re.search(r'name = "(.*)",\n', str(instance))
+    return found[1] if found else ""
 
 
 def _to_world(instance: Any) -> F32:

@@ -17,6 +17,7 @@ from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays, Target
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
 RARE_WEIGHT = 1e-4  # of MIS: next-event estimation samples a direction 100 times as often as the lobe
+ROULETTE_LAYERS = 3  # null interactions, after which Russian roulette may end a path
 
 Radiance = Callable[[Rays, Any, int, Any], tuple[Any, Any]]
 
@@ -60,50 +61,74 @@ class LightTransport:
         """Direct and indirect radiance of a sample: its path is continued by the path tracer."""
         found, is_valid = self._radiance(sample.rays, sampler, path_depth, sample.is_alive)
         # The path tracer adds the emission of the first hit unweighted: replace it by the weighted one.
-        met, unweighted, weighted = self._emission_along(sample)
+        met, unweighted, weighted, is_rare = self._emission_along(sample)
         # Mitsuba's `path` returns nothing for paths that meet null interactions alone and leave the scene.
         found = dr.select(is_valid, found, met)
         direct = sample.direct + dr.select(sample.is_alive, sample.throughput * weighted, 0.0)
-        is_rest = sample.is_alive
-        if self._shadow_rays.has_null:
-            # Chance and Russian roulette at null interactions leave noise of the size of the emission: leave
-            # out the few directions that next-event estimation samples more often.
-            is_rest &= dr.max(weighted) >= RARE_WEIGHT * dr.max(unweighted)
+        # Chance and Russian roulette at null interactions leave noise of the size of the emission: leave out
+        # the rest in the few directions that next-event estimation samples far more often.
+        is_rest = sample.is_alive & ~is_rare
         indirect = dr.select(is_rest, sample.throughput * (found - unweighted), 0.0)
         return Array3f(direct), Array3f(indirect)
 
-    def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any, Any]:
+    def _emission_along(self, sample: BsdfSample) -> tuple[Any, Any, Any, Any]:
         """Emission of the first hit, and of null interactions before it.
 
-        As a path meets it that passes all of them by chance; its expectation; and that weighted.
+        As a path meets it that passes all of them by chance; its expectation; that weighted; and whether any
+        of it that is met by chance has a weight below :data:`RARE_WEIGHT`.
         """
         ray = mi.Ray3f(mi.Point3f(sample.rays.origin), mi.Vector3f(sample.rays.direction))
         if not self._shadow_rays.has_null:
             si = self._scene.ray_intersect(ray, sample.is_alive)
             met = self.emission(si, None, sample.is_alive)
-            return met, met, self.emission(si, sample.bounce, sample.is_alive)
+            return met, met, self.emission(si, sample.bounce, sample.is_alive), Bool(False)
 
         def add_hit(
-            ray: Any, share: Any, met: Any, unweighted: Any, weighted: Any, active: Any, layer: Any
+            ray: Any,
+            share: Any,
+            met: Any,
+            unweighted: Any,
+            weighted: Any,
+            is_chance: Any,
+            is_rare: Any,
+            active: Any,
+            layer: Any,
         ) -> tuple[Any, ...]:
             si = self._scene.ray_intersect(ray, int(mi.RayFlags.All), Bool(True), active)
             emitted = dr.select(active, self.emission(si, None, active), 0.0)
             met += emitted
             unweighted += share * emitted
-            weighted += dr.select(active, share * self.emission(si, sample.bounce, active), 0.0)
+            own = dr.select(active, share * self.emission(si, sample.bounce, active), 0.0)
+            weighted += own
+            is_rare |= is_chance & (dr.max(own) < RARE_WEIGHT * dr.max(share * emitted))
             active = active & si.is_valid()
             passed = mi.unpolarized_spectrum(si.bsdf().eval_null_transmission(si, active))
             share = dr.select(active, share * Array3f(passed), share)
+            is_chance |= active & ((dr.min(passed) < 1.0) | (layer + 1 >= ROULETTE_LAYERS))
             active &= dr.max(share) > 0.0
-            return si.spawn_ray(ray.d), share, met, unweighted, weighted, active, layer + 1
+            return (
+                si.spawn_ray(ray.d),
+                share,
+                met,
+                unweighted,
+                weighted,
+                is_chance,
+                is_rare,
+                active,
+                layer + 1,
+            )
 
-        _, _, met, unweighted, weighted, _, _ = dr.while_loop(
-            (ray, Array3f(1), Array3f(0), Array3f(0), Array3f(0), Bool(sample.is_alive), UInt(0)),
-            lambda *state: state[5] & (state[6] < NULL_LAYERS),
+        none = Array3f(0), Array3f(0), Array3f(0), Bool(False), Bool(False)  # changed in place
+        _, _, met, unweighted, weighted, _, is_rare, _, _ = dr.while_loop(
+            (ray, Array3f(1), *none, Bool(sample.is_alive), UInt(0)),
+            lambda *state: state[7] & (state[8] < NULL_LAYERS),
             add_hit,
-            labels=("ray", "share", "met", "unweighted", "weighted", "active", "layer"),
+            labels=(
+                *("ray", "share", "met", "unweighted", "weighted"),
+                *("is_chance", "is_rare", "active", "layer"),
+            ),
         )
-        return met, unweighted, weighted
+        return met, unweighted, weighted, is_rare
 
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.sharp_light`."""
