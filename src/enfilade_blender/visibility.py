@@ -15,7 +15,7 @@ from enfilade_blender.records import Selection, View
 SAMPLED_VIEWS = 64
 RAYS = 8, 5  # of a view across and down
 LISTED = 3  # objects that are named
-MINIATURE = 0.1  # scene units, of which Mitsuba's offset of rays is a thousandth
+MINIATURE = 0.1  # scene units: Mitsuba moves the origins of rays by a thousandth of it
 FAR = 1e4  # scene units, to a point in the sun's direction
 
 
