@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.device import active
 from enfilade.gbuffer import find_geometry
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba import merge
@@ -151,7 +152,8 @@ def members(merged):
 
 
 @pytest.fixture(autouse=True)
-def _few(monkeypatch):
+def _variant_and_limit(monkeypatch):
+    mi.set_variant(active().variant)
     monkeypatch.setattr(merge, "FEW_INSTANCES", 0)
 
 

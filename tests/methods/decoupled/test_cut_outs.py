@@ -7,7 +7,7 @@ from PIL import Image
 
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled import Decoupled
+from enfilade.methods.decoupled import Decoupled, specular_rays
 from enfilade.methods.decoupled.path_kernels import PathKernels
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
@@ -86,3 +86,18 @@ def test_irradiance_on_sheer_surfaces_is_cached(tmp_path, monkeypatch):
     rays = run_passes(method, walk).facts("shading", MIDDLE)["rays"]["camera"]
     assert max(counts["shading"]) < 0.02 * rays
     assert min(counts["hash_grid"]) > 0
+
+
+def test_a_sheer_surface_is_filtered(tmp_path, monkeypatch):
+    """The G-buffer shows the wall behind it; that does not make it thinner than a pixel."""
+    sampled, own = [], specular_rays.filter_spatially
+    monkeypatch.setattr(
+        specular_rays,
+        "filter_spatially",
+        lambda virtual, aovs, where, **given: sampled.append(where) or own(virtual, aovs, where, **given),
+    )
+    renderer = opened(tmp_path, '<float name="opacity" value="0.3"/>')
+    run_passes(Decoupled(), walk_of(PATH, renderer))
+    height, width = SIZE[1], SIZE[0]
+    assert len(sampled) == len(PATH)
+    assert sampled[MIDDLE][height // 4 : -height // 4, width // 4 : -width // 4].all()

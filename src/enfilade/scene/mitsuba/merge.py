@@ -17,6 +17,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from enfilade.errors import SceneError
 from enfilade.records import F32, U32
 
 EXPANDED_TRIANGLES = 50_000_000  # of all instances that become meshes; 7 to 12 GB
@@ -132,7 +133,7 @@ def _expanded(
     instances: dict[str, list[int]] = {name: [] for name in groups}
     group_of = {i: _group_of(s) for i, s in enumerate(shapes, start=1) if s.class_name() == "Instance"}
     for index, name in group_of.items():
-        instances.setdefault(name, []).append(index)
+        instances[name].append(index)
 
     # Choose the groups to expand.
     left, remaining = EXPANDED_TRIANGLES, len(group_of)
@@ -140,8 +141,7 @@ def _expanded(
     triangles = {name: sum(s.primitive_count() for s in members) for name, (_, members) in groups.items()}
     for name in sorted(groups, key=triangles.__getitem__):
         total = triangles[name] * len(instances[name])
-        is_known = len(instances) == len(groups)
-        is_worthwhile = is_known and remaining > FEW_INSTANCES and total <= left
+        is_worthwhile = remaining > FEW_INSTANCES and total <= left
         if is_worthwhile and all(_is_mergeable(shape) for shape in groups[name][1]):
             left, remaining = left - total, remaining - len(instances[name])
             kept.remove(name)
@@ -150,7 +150,7 @@ def _expanded(
     placed = []
     for index, shape in enumerate(shapes, start=1):
         group = group_of.get(index)
-        if group is None or group in kept or group not in groups:
+        if group is None or group in kept:
             placed.append(_Placed(shape, (index,)))
         elif index == instances[group][0]:
             matrices = np.stack([_to_world(shapes[i - 1]) for i in instances[group]])
@@ -166,7 +166,9 @@ def _expanded(
 def _group_of(instance: Any) -> str:
     """Identifier of an instance's group, which Mitsuba tells in its description alone."""
     found = re.search(r'name = "(.*)",\n', str(instance))
-    return found[1] if found else ""
+    if found is None:
+        raise SceneError(f"this version of Mitsuba describes instances otherwise: {instance}")
+    return found[1]
 
 
 def _to_world(instance: Any) -> F32:
