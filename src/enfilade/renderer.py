@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.camera.pinhole import Camera
+from enfilade.kernels.guiding import PathGuide
 from enfilade.records import F32, U32, Shading
 
 MAX_PATH_DEPTH = 4  # greatest path depth at which an estimate may begin
@@ -38,6 +39,7 @@ class Purpose(IntEnum):
     VIRTUAL_IMAGES = 15
     GUIDE_SECOND_HALF = 16
     SEEN_HASH_GRID = 17
+    GUIDING = 18
 
 
 @dataclass(frozen=True)
@@ -224,6 +226,22 @@ class Emitters:
     shape_index: U32
 
 
+@dataclass(frozen=True, eq=False)
+class LitPoints:
+    """Points where rays from emitters meet surfaces; not those from environments.
+
+    Attributes
+    ----------
+    position : (N, 3) float32
+        World space.
+    flux : (N,) float64
+        Luminous power that a ray carries, in units of the scene.
+    """
+
+    position: F32
+    flux: npt.NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class SceneFacts:
     """Facts of a loaded scene.
@@ -313,6 +331,11 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     @property
+    def lit_points(self) -> LitPoints:
+        """The same points at each call: they suggest where bright surfaces are."""
+        ...
+
+    @property
     def has_sharp_light(self) -> bool:
         """Whether any emitter casts sharp shadows: a point, spot or directional one, small lamp, or sun."""
         ...
@@ -340,7 +363,9 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def estimate_diffuse(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_diffuse(
+        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: PathGuide | None = None
+    ) -> tuple[Any, Any]:
         """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
         Of a Lambertian surface this is irradiance over pi.
@@ -352,6 +377,8 @@ class LobeRenderer(Renderer, Protocol):
         path_depth
             Path segments from the camera to the surface, 1 to ``MAX_PATH_DEPTH``. They count where the scene
             limits the length of paths.
+        guide
+            Of the sampled direction.
 
         Returns
         -------
@@ -392,7 +419,9 @@ class LobeRenderer(Renderer, Protocol):
         """
         ...
 
-    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(
+        self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
+    ) -> BsdfSample:
         """Sample a direction of the diffuse lobe, divided by the albedo.
 
         Parameters
@@ -401,6 +430,9 @@ class LobeRenderer(Renderer, Protocol):
         sampler : PaddedSobolSampler
         soft_only
             Without next-event estimation of emitters that cast sharp shadows: :meth:`sharp_light`.
+        guide
+            The direction is sampled from its mixture. The density that the bounce keeps for multiple
+            importance sampling is that of the lobe, as without a guide.
         """
         ...
 

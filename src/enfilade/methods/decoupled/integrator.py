@@ -16,8 +16,10 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Float, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
+from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
+from enfilade.methods.decoupled.guiding import Probes
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.lookup import UploadedImage
@@ -259,6 +261,11 @@ class Integrator:
             scatter_add(target, layer, lane)
         return Samples(layers)
 
+    def probe(self, guide: PathGuide, path: Path) -> Probes:
+        """See :func:`trace_probes`."""
+        found: Probes = self._kernels.probe(guide, path)
+        return found
+
     def entries_of(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
         """Keys of the hash grid's entries at the next surfaces of paths, and their irradiance in the images.
 
@@ -398,7 +405,7 @@ class Integrator:
         missing: Any = dr.compress(is_miss)
         if dr.width(missing):
             unknown = compact(missed.path, missing)
-            weight, irradiance, keys = self._kernels.estimate(unknown)
+            weight, irradiance, keys = self._kernels.estimate(cache.path_guide, unknown)
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
                 _report(on_miss, keys, irradiance, dr.width(missing))

@@ -11,6 +11,7 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, matrix3, opaque, vector3
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX
+from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import HashGrid
 from enfilade.methods.decoupled.lookup import UploadedImage, footprint, lookup, packed
@@ -44,6 +45,8 @@ class IrradianceCache:
     hash_grid : HashGrid or None
     is_soft : bool
         Whether the images are without next-event estimates of emitters that cast sharp shadows.
+    path_guide : PathGuide or None
+        Of paths that estimate irradiance.
     """
 
     view: UploadedImage | None = None
@@ -51,6 +54,7 @@ class IrradianceCache:
     weights: tuple[Any, ...] = ()
     hash_grid: HashGrid | None = None
     is_soft: bool = False
+    path_guide: PathGuide | None = None
 
     @staticmethod
     def of(
@@ -60,10 +64,11 @@ class IrradianceCache:
         *,
         view: UploadedImage | None = None,
         is_soft: bool = False,
+        path_guide: PathGuide | None = None,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(view, tuple(images), own, hash_grid, is_soft)
+        return IrradianceCache(view, tuple(images), own, hash_grid, is_soft, path_guide)
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""

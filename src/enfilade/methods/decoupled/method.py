@@ -37,7 +37,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 29
+    revision = 30
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (
@@ -45,7 +45,12 @@ class Decoupled(Method):
         Pass("hash_grid", Entries, reads=("prepass",), is_barrier=True),
         Pass("irradiance", IrradianceImage, reads=("prepass", "hash_grid"), is_barrier=True),
         Pass("disocclusion", IrradianceImage, reads=("prepass", "hash_grid", "irradiance"), is_barrier=True),
-        Pass("shading", ShadedFrame, reads=("hash_grid", "irradiance", "disocclusion"), is_barrier=True),
+        Pass(
+            "shading",
+            ShadedFrame,
+            reads=("prepass", "hash_grid", "irradiance", "disocclusion"),
+            is_barrier=True,
+        ),
         Pass(FRAMES, Frame, reads=("shading",)),
     )
 

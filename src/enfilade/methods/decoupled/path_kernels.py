@@ -8,8 +8,10 @@ from typing import Any
 import drjit as dr
 
 from enfilade.arrays import Array3f, Bool
+from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_hash_grid, query_view
+from enfilade.methods.decoupled.guiding import trace_probes
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
 from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
 from enfilade.methods.decoupled.lookup import UploadedImage, lookup
@@ -72,6 +74,8 @@ class PathKernels:
 
     Attributes
     ----------
+    probe
+        Light on visible surfaces, and where it comes from.
     see
         Camera rays, and the irradiance in their view.
     see_aovs
@@ -96,6 +100,7 @@ class PathKernels:
         def state() -> Any:
             return renderer.state
 
+        self.probe = recorded(lambda guide, path: trace_probes(renderer, guide, path), state)
         self.see = recorded(self._see, state)
         self.see_aovs = recorded(self._see_aovs, state)
         self.query_further = recorded(query_further, lambda: None)
@@ -197,7 +202,7 @@ class PathKernels:
 
         # Intersect, and sample the diffuse lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=is_visible)
-        sample = self._renderer.sample_diffuse(point, sampler, soft_only=is_visible)
+        sample = self._renderer.sample_diffuse(point, sampler, soft_only=is_visible, guide=cache.path_guide)
 
         # Extend the path.
         extended = Path(
@@ -227,7 +232,7 @@ class PathKernels:
         is_diffuse &= path.is_active
         return _keys(point, path), irradiance, Bool(is_diffuse & is_known), Bool(is_diffuse & ~is_known)
 
-    def _estimate(self, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
+    def _estimate(self, guide: PathGuide | None, path: Path) -> tuple[Any, Any, tuple[Any, ...]]:
         """Path trace the irradiance at the next surface; also its weight, and its keys in the hash grid.
 
         Its depth is that of a surface seen directly, or after one bounce, as of the irradiance in the cache:
@@ -235,7 +240,8 @@ class PathKernels:
         """
         sampler = path.sampler.fork(ESTIMATE_SALT)
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth=2 if path.bounce else 1)
+        path_depth = 2 if path.bounce else 1
+        direct, indirect = self._renderer.estimate_diffuse(point, sampler, path_depth, guide)
         irradiance = Array3f(direct + indirect)
         return Array3f(path.throughput * point.surfaces.albedo), irradiance, _keys(point, path)
 

@@ -11,24 +11,31 @@ import numpy as np
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
+from enfilade.methods.decoupled.guiding import find_regions, upload_guide
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import PixelFilter, Purpose
 from enfilade.settings import LimitSettings
 
 SPP = 2
-OUTLIER = 256.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
+OUTLIER = 4096.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 
 
 def trace_prepass(shot: ShotContext, frame: int) -> Output:
     """Path trace the prepass image of a keyframe."""
     walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
     where = geometry.has_diffuse
+    regions = find_regions(
+        renderer.lit_points, shot.integrator.probe, geometry, walk.random(frame, Purpose.GUIDING)
+    )
+    guide = upload_guide(regions)
     estimate = Estimate(
         geometry.camera,
         np.flatnonzero(where).astype(np.uint32),
         lambda rays, sampler: Samples(
-            renderer.estimate_diffuse(renderer.intersect(rays, opaque_only=True), sampler, path_depth=2)
+            renderer.estimate_diffuse(
+                renderer.intersect(rays, opaque_only=True), sampler, path_depth=2, guide=guide
+            )
         ),
         chunk=walk.settings[LimitSettings].paths_in_flight,
         pixel_filter=PixelFilter.CENTRE,
@@ -41,5 +48,5 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     if (denoiser := shot.settings.denoiser) != "none":
         # Without noise: all of the light that the denoiser loses is added again, since many paths gather it.
         image = denoise_irradiance(geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER)
-    facts = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped}
+    facts = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped, "regions": regions}
     return Output({frame: image}, facts)

@@ -9,8 +9,10 @@ from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.guiding import PathGuide
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
+from enfilade.methods.decoupled.guiding import upload_guide
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -79,6 +81,7 @@ class ShotContext:
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
         self._disocclusions: dict[int, list[int]] | None = None
+        self._path_guides: LruCache[int, PathGuide] = LruCache(2)
         self._blank: list[UploadedImage] = []
 
     def is_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> bool:
@@ -96,7 +99,7 @@ class ShotContext:
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
         images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
         filled_up = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
-        return IrradianceCache.of(*filled_up, view=images[0])
+        return IrradianceCache.of(*filled_up, view=images[0], path_guide=self._path_guide(near[0]))
 
     def final_gather_cache(self, frame: int) -> IrradianceCache:
         """Prepass images and hash grid near a frame, for final gathering."""
@@ -120,8 +123,16 @@ class ShotContext:
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
         filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
         return IrradianceCache.of(
-            *filled_up, self.hash_grid(frame), view=reprojected, is_soft=self.renderer.has_sharp_light
+            *filled_up,
+            self.hash_grid(frame),
+            view=reprojected,
+            is_soft=self.renderer.has_sharp_light,
+            path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
         )
+
+    def _path_guide(self, keyframe: int) -> PathGuide:
+        regions = self.inputs.facts("prepass", keyframe)["regions"]
+        return self._path_guides.get(keyframe, lambda: upload_guide(regions))
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int

@@ -1,18 +1,23 @@
-"""Points on the emitters of a Mitsuba scene."""
+"""Points on the emitters of a Mitsuba scene, and where rays from them end."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from enfilade.arrays import Array3f, rows
 from enfilade.kernels.random import one_sequence
-from enfilade.renderer import Emitters
+from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.renderer import Emitters, LitPoints
 from enfilade.scene.mitsuba.merge import MergedScene
 from enfilade.scene.mitsuba.shapes import is_lamp
 
 MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
+EMITTED = 1 << 16  # rays from all emitters
 
 
 def find_emitters(merged: MergedScene) -> Emitters:
@@ -27,3 +32,17 @@ def find_emitters(merged: MergedScene) -> Emitters:
         np.concatenate([np.zeros((0, 3), np.float32), *points]),
         np.repeat(np.array([index for index, _ in shapes], np.uint32), count),
     )
+
+
+def find_lit_points(scene: Any) -> LitPoints:
+    """Follow rays from all emitters but environments to the next surface that is not a lamp's own."""
+    if not scene.emitters():
+        return LitPoints(np.zeros((0, 3), np.float32), np.zeros(0))
+    sampler = one_sequence(EMITTED)
+    points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
+    ray, weight, emitter = scene.sample_emitter_ray(0.0, sampler.next_1d(), *points, True)
+    si = scene.ray_intersect(ray)
+    flux = np.array(dr.dot(Array3f(weight), Array3f(*REC709_LUMINANCE)), np.float64)
+    is_local = np.array(si.is_valid() & ~mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite))
+    is_lit = is_local & np.isfinite(flux) & (flux > 0.0)
+    return LitPoints(rows(Array3f(si.p))[is_lit], flux[is_lit])

@@ -19,6 +19,7 @@ from enfilade.arrays import Array3f, Bool, Float, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.device import active
 from enfilade.kernels.estimate import estimate
+from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import recorded
 from enfilade.records import Shading
 from enfilade.renderer import (
@@ -26,6 +27,7 @@ from enfilade.renderer import (
     Bounce,
     BsdfSample,
     Emitters,
+    LitPoints,
     PixelFilter,
     RandomKey,
     Rays,
@@ -33,7 +35,7 @@ from enfilade.renderer import (
     ShadingPoint,
     Surfaces,
 )
-from enfilade.scene.mitsuba.emitters import find_emitters
+from enfilade.scene.mitsuba.emitters import find_emitters, find_lit_points
 from enfilade.scene.mitsuba.integrators import (
     is_volumetric,
     scene_integrator,
@@ -136,6 +138,11 @@ class MitsubaRenderer:
         """See :attr:`enfilade.renderer.LobeRenderer.emitters`."""
         return find_emitters(self._merged)
 
+    @cached_property
+    def lit_points(self) -> LitPoints:
+        """See :attr:`enfilade.renderer.LobeRenderer.lit_points`."""
+        return find_lit_points(self._scene)
+
     @property
     def has_sharp_light(self) -> bool:
         """See :attr:`enfilade.renderer.LobeRenderer.has_sharp_light`."""
@@ -168,9 +175,12 @@ class MitsubaRenderer:
             native=si,
         )
 
-    def estimate_diffuse(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
+    def estimate_diffuse(
+        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: PathGuide | None = None
+    ) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_diffuse`."""
-        return self._transport.estimate(self._transport.sample_diffuse(point, sampler), sampler, path_depth)
+        sample = self._transport.sample_diffuse(point, sampler, guide=guide)
+        return self._transport.estimate(sample, sampler, path_depth)
 
     def estimate_specular(self, point: ShadingPoint, sampler: Any, path_depth: int = 1) -> tuple[Any, Any]:
         """See :meth:`enfilade.renderer.LobeRenderer.estimate_specular`."""
@@ -184,9 +194,11 @@ class MitsubaRenderer:
         """See :meth:`enfilade.renderer.LobeRenderer.coat_emission`."""
         return self._transport.coat_emission(point)
 
-    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(
+        self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
+    ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
-        return self._transport.sample_diffuse(point, sampler, soft_only=soft_only)
+        return self._transport.sample_diffuse(point, sampler, soft_only=soft_only, guide=guide)
 
     def sample_specular(
         self,

@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool, UInt
+from enfilade.kernels.guiding import PathGuide
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
@@ -157,13 +158,17 @@ class LightTransport:
         emitted = weight * self.emission(hit, None, point.is_coated)
         return Array3f(dr.select(point.is_coated, emitted, 0.0))
 
-    def sample_diffuse(self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False) -> BsdfSample:
+    def sample_diffuse(
+        self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
+    ) -> BsdfSample:
         """See :meth:`enfilade.renderer.LobeRenderer.sample_diffuse`."""
         si, albedo = point.native, point.surfaces.albedo
         active = si.is_valid() & (dr.max(albedo) > MIN_DIFFUSE_ALBEDO)
         bsdf = si.bsdf()
         direct = self._next_event(si, bsdf, self._lobes.eval_diffuse, sampler, active, albedo, soft_only)
         wo, pdf, weight = self._lobes.sample_diffuse(si, bsdf, sampler, active)
+        if guide is not None:
+            wo, pdf, weight = self._guided(guide, point, sampler, active, wo, pdf, weight)
         ray = si.spawn_ray(si.to_world(wo))
         return BsdfSample(
             rays=Rays(Array3f(ray.o), Array3f(ray.d)),
@@ -175,6 +180,26 @@ class LightTransport:
             is_image=Bool(False),
             is_passed=Bool(False),
         )
+
+    def _guided(
+        self, guide: PathGuide, point: ShadingPoint, sampler: Any, active: Any, wo: Any, pdf: Any, weight: Any
+    ) -> tuple[Any, Any, Any]:
+        """Replace some samples of the diffuse lobe by a guide's, and weigh all by the mixture's density.
+
+        The density that is returned is that of the lobe: it serves multiple importance sampling, whose
+        weights may be any that add up to one, and these do so whatever the guide.
+        """
+        si = point.native
+        bsdf = si.bsdf()
+        mixture = guide.at(point.position, point.surfaces.normal)
+        direction, is_guided = mixture.sample(sampler.next_1d(), sampler.next_2d())
+        is_guided &= active
+        towards = si.to_local(mi.Vector3f(direction))
+        value, own_pdf = self._lobes.eval_diffuse(si, bsdf, towards, is_guided)
+        wo, pdf = dr.select(is_guided, towards, wo), dr.select(is_guided, own_pdf, pdf)
+        value = dr.select(is_guided, value, weight * pdf)
+        density = mixture.pdf(Array3f(si.to_world(wo)), pdf)
+        return wo, pdf, dr.select(pdf > 0.0, value / density, 0.0)
 
     def sample_specular(
         self,

@@ -1,0 +1,191 @@
+"""The guide of a keyframe: surfaces beside lamps that light the scene, and that reflection rarely finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+
+from enfilade.arrays import Array3f, Bool, Float, lanes, opaque, rows
+from enfilade.kernels.guiding import REGIONS, PathGuide
+from enfilade.kernels.random import samplers
+from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.records import Geometry
+from enfilade.renderer import LitPoints, LobeRenderer, RandomKey
+
+F64 = npt.NDArray[np.float64]
+
+PIXELS, PATHS = 1024, 8  # that probe the scene for each size of regions: pixels, and paths of each
+HALVINGS = range(3, 8)  # of the extent of the lit points: sizes of the cells that group them
+MIN_POINTS = 8  # in a cell
+WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
+MAX_NOISE = 0.8  # of the second moment without a guide: one that reduces it by less is not used
+
+
+@dataclass(frozen=True)
+class Probes:
+    """Paths from surfaces by their diffuse lobe, with a guide; as lanes.
+
+    Attributes
+    ----------
+    position, normal : Array3f
+        Of the surface.
+    direction : Array3f
+        Sampled there, unit length.
+    light : Float
+        Luminance that the surface receives over pi, as the path estimates it, other than from emitters.
+    is_used : Bool
+    """
+
+    position: Any
+    normal: Any
+    direction: Any
+    light: Any
+    is_used: Any
+
+
+def trace_probes(renderer: LobeRenderer, guide: PathGuide, path: Path) -> Probes:
+    """Estimate the light on the surfaces that paths meet, half of them after another bounce; a kernel."""
+    sampler = path.sampler.copy()
+    point = renderer.intersect(path.rays, opaque_only=True)
+    bounced = renderer.sample_diffuse(point, sampler)
+    point = renderer.intersect(dr.select((path.lane & 1) == 0, path.rays, bounced.rays), opaque_only=True)
+    sample = renderer.sample_diffuse(
+        point, sampler.copy(), guide=guide
+    )  # the one that the estimate takes, too
+    _, indirect = renderer.estimate_diffuse(point, sampler, path_depth=2, guide=guide)
+    light = dr.dot(indirect, Array3f(*REC709_LUMINANCE))
+    return Probes(
+        position=point.position,
+        normal=point.surfaces.normal,
+        direction=sample.rays.direction,
+        light=dr.select(sample.is_alive, light, 0.0),
+        is_used=Bool(point.surfaces.is_hit & dr.isfinite(light)),
+    )
+
+
+def find_regions(
+    lit: LitPoints,
+    probe: Callable[[PathGuide, Path], Probes],
+    geometry: Geometry,
+    random: RandomKey,
+) -> list[list[float]]:
+    """Find the regions of a guide from a keyframe.
+
+    Cells of lit points, of several sizes, are proposed, and the light from there is estimated.
+
+    Parameters
+    ----------
+    lit
+    probe
+        :func:`trace_probes` of a renderer, recorded.
+    geometry
+        G-buffer of the prepass image.
+    random
+
+    Returns
+    -------
+    list of [x, y, z, radius, radiance]
+        Followed by the background; empty if no guide is of use.
+    """
+    pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
+    if not len(pixels) or not len(lit.flux):
+        return []
+
+    # Take pixels at equal distances in the image.
+    pixels = pixels[np.linspace(0, len(pixels) - 1, PIXELS).astype(np.int64)]
+    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
+    position = rows(rays.origin + Float(geometry.depth.ravel()[pixels]) * rays.direction)
+    normal = geometry.normal.reshape(-1, 3)[pixels]
+    lane = lanes(np.repeat(pixels, PATHS))
+    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lane))
+    path = spawn(rays, samplers(lane, lanes(np.tile(np.arange(PATHS, dtype=np.uint32), PIXELS)), random), 0.0)
+
+    # Propose regions of several sizes, and take those that reduce the noise most.
+    corner, extent = lit.position.min(axis=0), float(np.ptp(lit.position, axis=0).max())
+    best, most = [], 0.0
+    for halvings in HALVINGS:
+        cell = np.floor((lit.position - corner) / (extent * 0.5**halvings))
+        proposed = _proposed(lit, cell, position, normal)
+        if proposed:
+            regions, saved = _measured(probe(upload_guide(proposed), path), proposed)
+            if saved > most:
+                best, most = regions, saved
+    return best
+
+
+def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide:
+    """Upload the regions; without any the guide is of no effect, so that one kernel serves all keyframes."""
+    table = np.zeros((REGIONS, 5), np.float32)
+    background = 1.0
+    if regions:
+        *spheres, (background,) = regions
+        table[: len(spheres)] = spheres
+    guide = PathGuide(
+        Array3f(*(Float(column) for column in table[:, :3].T)),
+        Float(table[:, 3]),
+        Float(table[:, 4]),
+        opaque(background),
+    )
+    dr.make_opaque(guide)
+    return guide
+
+
+def _proposed(lit: LitPoints, cell: Any, position: Any, normal: Any) -> list[list[float]]:
+    """Spheres around the cells that may contribute most to the second moment of the light on some points."""
+    # Describe the cells.
+    _, group, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    flux = np.bincount(group, lit.flux)
+    mean = np.stack([np.bincount(group, lit.flux * axis) / flux for axis in lit.position.T], axis=1)
+    spread = np.bincount(group, lit.flux * np.square(lit.position - mean[group]).sum(axis=1)) / flux
+    chosen = (counts >= MIN_POINTS) & (spread > 0.0)
+    center, radius = mean[chosen], WIDTH * np.sqrt(spread[chosen])
+    radiance = flux[chosen] / np.square(np.pi * radius)
+
+    # Take the brightest as they are seen from the points, without occluders.
+    to = center[None] - position[:, None].astype(np.float64)
+    distance = np.maximum(np.linalg.norm(to, axis=2), radius)
+    cosine = np.maximum((to * normal[:, None]).sum(axis=2) / distance, 0.0)
+    share = (np.square(radius / distance) * cosine).mean(axis=0)
+    order = np.argsort(-np.square(radiance) * share, kind="stable")[:REGIONS]
+    spheres = [[*center[k].tolist(), float(radius[k]), float(radiance[k])] for k in order]
+    return [*spheres, [0.0]] if spheres else []
+
+
+def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[float]], float]:
+    """Regions with their measured radiance, and the decrease of the second moment by this guide."""
+    # Estimate the light from each region, and from elsewhere.
+    used = np.array(probes.is_used)
+    if not used.any():
+        return [], 0.0
+    count = len(proposed) - 1
+    guide = upload_guide(proposed)
+    cones = guide.cones(probes.position, probes.normal)[:count]
+    light = np.array(probes.light)[used].astype(np.float64)
+    share = np.stack([np.array(cone.share)[used] for cone in cones]).astype(np.float64)
+    inside = np.stack([np.array(cone.contains(probes.direction))[used] for cone in cones])
+    inside &= np.cumsum(inside, axis=0) == 1
+    found, seen = (light * inside).mean(axis=1), share.mean(axis=1)
+    radiance = np.maximum(found, 0.0) / np.maximum(seen, 1e-12)
+    background = max(float(light.mean() - found.sum()), 0.0)
+
+    # Compare the second moments: with a uniform radiance of each region, and of the background.
+    rest = np.maximum(1.0 - share.sum(axis=0), 0.0)
+    dim = background / max(float(rest.mean()), 1e-12)
+    plain = float((np.square(radiance) * seen).sum() + dim**2 * rest.mean())
+    weights = radiance[:, None] * share
+    total = weights.sum(axis=0)
+    guided = weights / np.maximum(total + np.maximum(background, total), 1e-30)
+    own = 1.0 - guided.sum(axis=0)
+    moments = np.square(weights) / np.maximum(own * share + guided, 1e-30)
+    noise = float((moments.sum(axis=0) + dim**2 * rest / own).mean())
+    if noise > MAX_NOISE * plain:
+        return [], 0.0
+    spheres = [[*sphere[:4], float(of)] for sphere, of in zip(proposed, radiance, strict=False)]
+    return [*spheres, [background]], plain - noise
