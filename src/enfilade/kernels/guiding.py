@@ -79,7 +79,7 @@ class Cone:
     share: Any
 
     def contains(self, direction: Any) -> Any:
-        """Whether directions of unit length are inside; Bool."""
+        """Whether directions (Array3f of unit length) are inside; Bool."""
         return 0.5 * dr.squared_norm(direction - self.axis) <= (1.0 + BOUNDARY) * self.versine
 
 

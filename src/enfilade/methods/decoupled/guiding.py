@@ -10,22 +10,23 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array3f, Bool, Float, lanes, opaque, rows
+from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
 from enfilade.kernels.guiding import REGIONS, PathGuide
 from enfilade.kernels.random import samplers
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.paths import Path, spawn
-from enfilade.records import Geometry
+from enfilade.records import F32, Geometry
 from enfilade.renderer import LitPoints, LobeRenderer, RandomKey
 
 F64 = npt.NDArray[np.float64]
 
-PIXELS, PATHS = 1024, 8  # that probe the scene for each size of regions: pixels, and paths of each
-HALVINGS = range(3, 8)  # of the extent of the lit points: sizes of the cells that group them
+PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels, and paths of each
+HALVINGS = range(3, 7)  # of the extent of the lit points: sizes of the cells that group them
 MIN_POINTS = 8  # in a cell
 WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
-MAX_NOISE = 0.8  # of the second moment without a guide: one that reduces it by less is not used
+OUTLIER = 16.0  # times the mean light: brighter paths are limited
+MAX_NOISE = 0.4  # of the second moment without a guide: one that reduces it by less is not used
 
 
 @dataclass(frozen=True)
@@ -34,19 +35,18 @@ class Probes:
 
     Attributes
     ----------
-    position, normal : Array3f
-        Of the surface.
-    direction : Array3f
-        Sampled there, unit length.
     light : Float
         Luminance that the surface receives over pi, as the path estimates it, other than from emitters.
+    shares : tuple of Float
+        Of each region in the cosine-weighted hemisphere of the surface.
+    region : UInt
+        The first region from which the light comes; their number for other light.
     is_used : Bool
     """
 
-    position: Any
-    normal: Any
-    direction: Any
     light: Any
+    shares: tuple[Any, ...]
+    region: Any
     is_used: Any
 
 
@@ -60,12 +60,14 @@ def trace_probes(renderer: LobeRenderer, guide: PathGuide, path: Path) -> Probes
         point, sampler.copy(), guide=guide
     )  # the one that the estimate takes, too
     _, indirect = renderer.estimate_diffuse(point, sampler, path_depth=2, guide=guide)
-    light = dr.dot(indirect, Array3f(*REC709_LUMINANCE))
+    light, region = dr.dot(indirect, Array3f(*REC709_LUMINANCE)), UInt(REGIONS)
+    cones = guide.cones(point.position, point.surfaces.normal)
+    for k, cone in reversed(list(enumerate(cones))):
+        region = dr.select(cone.contains(sample.rays.direction), k, region)
     return Probes(
-        position=point.position,
-        normal=point.surfaces.normal,
-        direction=sample.rays.direction,
         light=dr.select(sample.is_alive, light, 0.0),
+        shares=tuple(cone.share for cone in cones),
+        region=region,
         is_used=Bool(point.surfaces.is_hit & dr.isfinite(light)),
     )
 
@@ -111,36 +113,32 @@ def find_regions(
     corner, extent = lit.position.min(axis=0), float(np.ptp(lit.position, axis=0).max())
     best, most = [], 0.0
     for halvings in HALVINGS:
-        cell = np.floor((lit.position - corner) / (extent * 0.5**halvings))
+        cells = 2**halvings + 1  # along each axis
+        cell = ((lit.position - corner) * ((cells - 1) / extent)).astype(np.int64) @ (1, cells, cells**2)
         proposed = _proposed(lit, cell, position, normal)
-        if proposed:
-            regions, saved = _measured(probe(upload_guide(proposed), path), proposed)
+        if guide := upload_guide(proposed):
+            regions, saved = _measured(probe(guide, path), proposed)
             if saved > most:
                 best, most = regions, saved
     return best
 
 
-def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide:
-    """Upload the regions; without any the guide is of no effect, so that one kernel serves all keyframes."""
+def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:
+    """Upload the regions; None if there are none."""
+    if not regions:
+        return None
+    *spheres, (background,) = regions
     table = np.zeros((REGIONS, 5), np.float32)
-    background = 1.0
-    if regions:
-        *spheres, (background,) = regions
-        table[: len(spheres)] = spheres
-    guide = PathGuide(
-        Array3f(*(Float(column) for column in table[:, :3].T)),
-        Float(table[:, 3]),
-        Float(table[:, 4]),
-        opaque(background),
-    )
+    table[: len(spheres)] = spheres
+    guide = PathGuide(lanes(table[None, :, :3]), lanes(table[:, 3]), lanes(table[:, 4]), opaque(background))
     dr.make_opaque(guide)
     return guide
 
 
-def _proposed(lit: LitPoints, cell: Any, position: Any, normal: Any) -> list[list[float]]:
+def _proposed(lit: LitPoints, cell: npt.NDArray[np.int64], position: F32, normal: F32) -> list[list[float]]:
     """Spheres around the cells that may contribute most to the second moment of the light on some points."""
     # Describe the cells.
-    _, group, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    _, group, counts = np.unique(cell, return_inverse=True, return_counts=True)
     flux = np.bincount(group, lit.flux)
     mean = np.stack([np.bincount(group, lit.flux * axis) / flux for axis in lit.position.T], axis=1)
     spread = np.bincount(group, lit.flux * np.square(lit.position - mean[group]).sum(axis=1)) / flux
@@ -164,14 +162,11 @@ def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[fl
     used = np.array(probes.is_used)
     if not used.any():
         return [], 0.0
-    count = len(proposed) - 1
-    guide = upload_guide(proposed)
-    cones = guide.cones(probes.position, probes.normal)[:count]
     light = np.array(probes.light)[used].astype(np.float64)
-    share = np.stack([np.array(cone.share)[used] for cone in cones]).astype(np.float64)
-    inside = np.stack([np.array(cone.contains(probes.direction))[used] for cone in cones])
-    inside &= np.cumsum(inside, axis=0) == 1
-    found, seen = (light * inside).mean(axis=1), share.mean(axis=1)
+    light = np.minimum(light, OUTLIER * light.mean())
+    share = np.stack([np.array(of)[used] for of in probes.shares]).astype(np.float64)
+    found = np.bincount(np.array(probes.region)[used], light, REGIONS + 1)[:REGIONS] / len(light)
+    seen = share.mean(axis=1)
     radiance = np.maximum(found, 0.0) / np.maximum(seen, 1e-12)
     background = max(float(light.mean() - found.sum()), 0.0)
 

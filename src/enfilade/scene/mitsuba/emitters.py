@@ -17,7 +17,7 @@ from enfilade.scene.mitsuba.shapes import is_lamp
 
 MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
-EMITTED = 1 << 16  # rays from all emitters
+EMITTED = 1 << 14  # rays from all emitters
 
 
 def find_emitters(merged: MergedScene) -> Emitters:

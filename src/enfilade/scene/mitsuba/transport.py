@@ -18,6 +18,7 @@ from enfilade.scene.mitsuba.shadow_rays import NULL_LAYERS, ShadowRays, Target
 from enfilade.scene.mitsuba.sharp_emitters import SharpEmitters, mis_weight
 
 RARE_WEIGHT = 1e-4  # of MIS: next-event estimation samples a direction 100 times as often as the lobe
+GUIDE_SALT = 0x632BE5AB  # makes guided directions independent of the path's random numbers
 ROULETTE_LAYERS = 3  # null interactions, after which Russian roulette may end a path
 
 Radiance = Callable[[Rays, Any, int, Any], tuple[Any, Any]]
@@ -192,7 +193,8 @@ class LightTransport:
         si = point.native
         bsdf = si.bsdf()
         mixture = guide.at(point.position, point.surfaces.normal)
-        direction, is_guided = mixture.sample(sampler.next_1d(), sampler.next_2d())
+        numbers = sampler.fork(GUIDE_SALT)
+        direction, is_guided = mixture.sample(numbers.next_1d(), numbers.next_2d())
         is_guided &= active
         towards = si.to_local(mi.Vector3f(direction))
         value, own_pdf = self._lobes.eval_diffuse(si, bsdf, towards, is_guided)
