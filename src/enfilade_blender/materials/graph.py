@@ -78,6 +78,8 @@ class Graph:
         if node.type == "BSDF_PRINCIPLED":
             names = (name for name in PRINCIPLED if name in node.inputs)
             inputs = {name: self.value(node.inputs[name], inner) for name in names}
+            if inputs["Emission Strength"] != Constant((0.0,)):
+                inputs["Emission Color"] = _baked(inputs["Emission Color"])
             self._note_coat_normal(node, inner)
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
@@ -91,9 +93,8 @@ class Graph:
         if node.type == "ADD_SHADER":
             return Add(self.shader(node.inputs[0], inner), self.shader(node.inputs[1], inner), node.name)
         if node.type in ("EMISSION", "BACKGROUND"):
-            return Emission(
-                self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)
-            )
+            colour, strength = (self.value(node.inputs[name], inner) for name in ("Color", "Strength"))
+            return Emission(_baked(colour), strength)
         return self._lobe(node, inner)
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
@@ -357,6 +358,11 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
 
 def _is_of_uv(value: Value) -> bool:
     return isinstance(value, Procedural) and value.uv_map is not None
+
+
+def _baked(value: Value) -> Value:
+    """The value of an emission: Mitsuba doesn't sample emitters by attributes of their mesh."""
+    return Procedural(value.output) if isinstance(value, AttributeValue) else value
 
 
 def _exact(value: Value) -> Value:

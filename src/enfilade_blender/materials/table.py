@@ -132,7 +132,7 @@ INPUTS = (
     (
         "Attribute of vertices, corners or faces",
         "mapped",
-        "`mesh_attribute`; baked: its alpha, its number, several in one material, what nodes compute of it",
+        "`mesh_attribute`; baked: light, its alpha or number, several in one material, what nodes make of it",
     ),
     ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),

@@ -243,6 +243,19 @@ def painted(_folder):
                 corner.color = colour
 
 
+def painted_lamps(_folder):
+    """Spheres that shine by a colour attribute, one of them five times as bright, over a floor."""
+    new_file()
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, shader("floor", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    for x, strength in ((-0.6, 1.0), (0.6, 5.0)):
+        glow, tree, emission = shader(f"glow {strength}", "Emission", Strength=strength)
+        fill(tree, emission, {"Color": node_of(tree, "VertexColor")})
+        data = sphere(glow.name, (x, 0.0, 0.8), 0.4, glow).data
+        paint = data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+        for vertex, colour in zip(data.vertices, paint.data, strict=True):
+            colour.color = (*(0.3 + 0.25 * np.sin(10.0 * np.array(vertex.co))), 1.0)
+
+
 def attributes(_folder):
     """A number of vertices and a vector of faces as colours, and a truth value of corners times 0.3."""
     new_file()
