@@ -23,7 +23,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import LAMP, Element, named, plugin, write_scene
 from enfilade_blender.shapes import Shapes
-from enfilade_blender.visibility import note_depths, note_sun
+from enfilade_blender.visibility import cast_count, note_depths, note_sun
 from enfilade_blender.world import environment
 
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
@@ -64,9 +64,10 @@ def export(job: Job) -> dict[str, Any]:
     for lamp in lamps:
         lamp.factor = nodes.factor(lamp)
     lamps, sun = split_suns(lamps, notes)
-    note_sun(sun, views, selection, notes)
-    note_depths(views, selection, notes)
-    note_falloff(lamps, selection, notes)
+    casts = cast_count(evaluated.instances)
+    note_sun(sun, views, selection, notes, casts=casts)
+    note_depths(views, selection, notes, casts=casts)
+    note_falloff(lamps, selection, notes, casts=casts)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)

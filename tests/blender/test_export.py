@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import enfilade_blender
 from enfilade.camera.load import load_path
 from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
@@ -43,6 +44,30 @@ FILES = (
     "frozen",
     "simplified",
 )
+
+COUNT_CASTS = """
+import sys
+from types import SimpleNamespace
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from enfilade_blender.left_out import note_falloff
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp, Selection, View
+from enfilade_blender.visibility import cast_count, note_depths
+
+class Scene:
+    count = 0
+    def ray_cast(self, *_, **__):
+        self.count += 1
+        return False, None, None, None, None, None
+
+bulb = SimpleNamespace(type="POINT", use_soft_falloff=True, energy=1.0, shadow_soft_size=0.1)
+views, lamps = 100 * [View("Camera", np.eye(4), np.ones((4, 4)), {})], 20 * [Lamp("Bulb", bulb, np.eye(4))]
+for note, items in ((note_depths, views), (note_falloff, lamps)):
+    scene = Scene()
+    note(items, Selection(scene, None, (1, 1), (8, 8)), Notes(), casts=cast_count(int(sys.argv[2])))
+    print(scene.count)
+"""
 
 
 @pytest.fixture(scope="session")
@@ -227,6 +252,16 @@ def test_soft_falloff_is_noted_of_lamps_near_surfaces(exported):
     assert {note["object"] for note in found} == {"Near", "Down"}
     # Measured in Cycles at two radii: 0.779 of the light without, off the axis in part.
     assert all(note["effect"].endswith("at 0.5 units by 25%") for note in found)
+
+
+def test_notes_cast_fewer_rays_at_more_objects(blender):
+    counts = {}
+    for objects in (100, 20_000, 1_000_000):
+        done = blender.run("-c", COUNT_CASTS, Path(enfilade_blender.__file__).parents[1], objects)
+        assert done.returncode == 0, done.stderr[-2000:]
+        counts[objects] = [int(count) for count in done.stdout.split()[-2:]]
+    # Of 100 views 40 rays of every second one, and of 20 lamps 27 rays; then a few.
+    assert counts == {100: [50 * 40, 20 * 27], 20_000: [5 * 8, 5 * 7], 1_000_000: [8, 7]}
 
 
 def test_constants_of_a_lamps_nodes_are_kept(exported):
