@@ -150,8 +150,9 @@ class Shapes:
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             elements += self._shapes_of(name, mesh, material, radiance)
-            is_hidden = is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
-            if radiance is not None and not is_hidden:
+            if radiance is not None and not (
+                is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
+            ):
                 elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
 
