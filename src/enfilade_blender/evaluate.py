@@ -118,7 +118,10 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         if not instance.show_self:
             continue
         matrix = np.array(instance.matrix_world, np.float64)
-        if obj.type == "LIGHT":
+        if not np.isfinite(matrix).all():
+            what = "an object whose place, rotation or scale is NaN or infinite is left out"
+            notes.add("not-carried", _name(instance), "Transform", what, "it is missing from the picture")
+        elif obj.type == "LIGHT":
             _note_linking(obj, notes)
             _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
             result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))

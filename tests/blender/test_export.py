@@ -43,6 +43,7 @@ FILES = (
     "left_out",
     "frozen",
     "simplified",
+    "without_light",
 )
 
 COUNT_CASTS = """
@@ -346,6 +347,20 @@ def test_triangles_without_a_place_are_left_out(exported):
     assert torn.face_count() == 2
     normals = np.array(mi.traverse(torn)["vertex_normals"]).reshape(-1, 3)
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_light_that_is_no_number_or_negative_is_left_out_and_noted(exported):
+    out, result = exported("without_light")
+    assert {(note["object"], note["node"]) for note in result["notes"]} == {
+        ("World", "World"),
+        ("Nowhere", "Transform"),
+        ("NaN", "Light"),
+        ("Infinite", "Light"),
+        ("Colour", "Light"),
+        ("Size", "Light"),
+        ("Scene", "Light"),
+    }
+    assert list(shapes(out)) == ["Floor"]
 
 
 def test_a_file_of_nothing_is_refused(blender):

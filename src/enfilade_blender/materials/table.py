@@ -195,7 +195,7 @@ LIGHTS = (
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, negative power and emission, light and shadow linking, patterns of nodes of lights",
+        "Spread, negative power, emission and world, light and shadow linking, patterns of nodes of lights",
         "not carried",
         "light is distributed as without them",
     ),
@@ -217,7 +217,11 @@ OBJECTS = (
     ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
-    ("Triangles with a vertex that is NaN or infinite", "not carried", "missing"),
+    (
+        "Triangles, objects and lamps with a vertex, place or light that is NaN or infinite",
+        "not carried",
+        "missing",
+    ),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),

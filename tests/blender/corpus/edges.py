@@ -417,6 +417,22 @@ def _torn():
     add("Torn", data)
 
 
+def without_light(_folder):
+    """A world that takes light away, and lamps and a cube of which a number is NaN or infinite."""
+    new_file()
+    tree = world((1.0, 1.0, 1.0)).node_tree
+    value = node_of(tree, "Value")
+    value.outputs[0].default_value = -0.5  # a strength that is not linked is 0 at least
+    fill(tree, tree.nodes["Background"], {"Strength": value})
+    paint = principled("paint")
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, paint)
+    cube("Nowhere", (math.nan, 0.0, 0.0), 1.0, paint)
+    light("POINT", "NaN", (0.0, 0.0, 2.0), math.nan)
+    light("SUN", "Infinite", (0.0, 0.0, 2.0), math.inf, angle=0.1)
+    light("AREA", "Colour", (0.0, 0.0, 2.0), 1.0, color=(1.0, math.nan, 1.0))
+    light("AREA", "Size", (0.0, 0.0, 2.0), 1.0, size=math.nan)
+
+
 def nothing(_folder):
     """A scene without any object."""
     camera = new_file().camera
