@@ -44,6 +44,7 @@ FILES = (
     "frozen",
     "simplified",
     "without_light",
+    "linked_duplicates",
 )
 
 COUNT_CASTS = """
@@ -136,6 +137,19 @@ def test_meshes_that_geometry_nodes_make_are_instances(exported):
     pedestal, *_ = counts
     assert pedestal == 2  # of one alone: the other has no surface
     assert counts[1:] == sorted(2 * [15 * ball, 15 * box])
+
+
+def test_linked_duplicates_of_many_triangles_are_instances(exported):
+    out, _ = exported("linked_duplicates")
+    root = ET.parse(out / "scene.xml").getroot()
+    names = {
+        kind: {e.get("id") for e in root.findall(f"shape[@type='{kind}']")} for kind in ("instance", "ply")
+    }
+    copies = [f" {number}" for number in range(1, 17)]
+    assert names["instance"] == {"paint", *(f"paint{copy}" for copy in copies)}
+    # Of another material, or of one that tells objects apart.
+    assert names["ply"] == {"other", "by object", *(f"by object{copy}" for copy in copies)}
+    assert root.findall("shape[@id='paint 3']/transform/matrix")[0].get("value").split()[7] == "6"
 
 
 def test_text_curves_surfaces_and_metaballs_are_meshes(exported):

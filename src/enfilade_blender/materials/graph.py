@@ -319,8 +319,19 @@ def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:
 
 def is_of_place(shader: Shader) -> bool:
     """Whether a baked value or normal of a shader depends on where in the world a copy of its object is."""
-    baked = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-    return any(depends_on_place(found) for value in baked for found in upstream(value.output))
+    return any(depends_on_place(found) for found in _read(shader))
+
+
+def is_of_object(shader: Shader) -> bool:
+    """Whether a baked value or normal of a shader differs between objects of one mesh."""
+    return any(depends_on_place(found) or found.node.type == "OBJECT_INFO" for found in _read(shader))
+
+
+def _read(shader: Shader) -> Iterator[Output]:
+    """Outputs that the baked values and normals of a shader depend on."""
+    for value in values_of(shader):
+        if isinstance(value, Procedural | ProceduralNormal):
+            yield from upstream(value.output)
 
 
 def depends_on_place(found: Output) -> bool:

@@ -203,7 +203,7 @@ LIGHTS = (
 OBJECTS = (
     ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
     (
-        "Collection, geometry nodes and particle instances",
+        "Collection, geometry nodes and particle instances, linked duplicates",
         "mapped",
         "merged, or `instance` where they are many",
     ),

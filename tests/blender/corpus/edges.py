@@ -12,6 +12,7 @@ from corpus.stage import (
     add,
     cube,
     fill,
+    finish,
     image,
     light,
     new_file,
@@ -337,6 +338,23 @@ def copies_in_the_world(_folder):
         points.show_instancer_for_render = False
         copied = plane(f"{name} copied", (0.0, 0.0, 0.0), 0.2, material)
         copied.parent = points
+
+
+def linked_duplicates(_folder):
+    """18 objects of a mesh of half a million triangles, one of another material; 17 of colours by Random."""
+    new_file()
+    paint, other = principled("paint"), principled("other", (0.1, 0.2, 0.3, 1.0))
+    by_object, tree, bsdf = shader("by object", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "ObjectInfo").outputs["Random"]})
+    for x, size, material in ((0.0, 500, paint), (2.0, 125, by_object)):
+        bpy.ops.mesh.primitive_grid_add(
+            x_subdivisions=size, y_subdivisions=size, size=1.0, location=(x, 0.0, 0.0)
+        )
+        first = finish(material.name, material)
+        for number in range(1, 17):
+            add(f"{material.name} {number}", first.data, (x, 2.0 * number, 0.0))
+    slot = add("other", bpy.data.objects["paint"].data, (-2.0, 0.0, 0.0)).material_slots[0]
+    slot.link, slot.material = "OBJECT", other
 
 
 def left_out(folder):
