@@ -107,9 +107,8 @@ class Graph:
         node = found.node
         if node.type in ("RGB", "VALUE"):
             return self._constant(found.socket)
-        if node.type == "LIGHT_PATH":
-            self._note_light_path(found)
-            return Constant((0.0,))
+        if node.type in ("LIGHT_PATH", "SHADERTORGB"):
+            return self._of_light(found, socket)
         if found.socket.name == "Color" and not is_number:
             if node.type == "VERTEX_COLOR":
                 return AttributeValue(found, node.layer_name, self._owner)
@@ -225,10 +224,16 @@ class Graph:
             what, effect = "the normals of the coat are left out", "its reflections are even"
             self._notes.add("not-carried", self._owner, f"{node.name}: Coat Normal", what, effect)
 
-    def _note_light_path(self, found: Output) -> None:
-        what = f"{found.socket.name} is taken as 0"
-        effect = "all rays see it as those do in Blender for which that is 0"
+    def _of_light(self, found: Output, socket: Any) -> Constant:
+        """What an input takes in place of a kind of ray, or of the light on a surface."""
+        if found.node.type == "LIGHT_PATH":
+            value, what = Constant((0.0,)), f"{found.socket.name} is taken as 0"
+            effect = "all rays see it as those do in Blender for which that is 0"
+        else:
+            value, what = self._constant(socket), table.OBJECT_DATA[found.node.type]
+            effect = table.OBJECT_EFFECT
         self._notes.add("approximated", self._owner, found.node.name, what, effect)
+        return value
 
 
 def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
@@ -346,6 +351,17 @@ def depends_on_place(found: Output) -> bool:
     return name in table.PLACE_SOCKETS.get(node.type, ())
 
 
+def is_of_view(output: Output) -> bool:
+    """Whether an output depends on the direction of view, the camera or the kind of ray."""
+    return any(
+        found.node.type in table.VIEW_NODES
+        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
+        or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
+        or getattr(found.node, "use_pixel_size", False)
+        for found in upstream(output)
+    )
+
+
 def _dependence(output: Output) -> tuple[str | None, bool]:
     """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
     is_of_uv, uv_maps = True, set()
@@ -358,13 +374,7 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
         else:
             is_of_uv &= node.type in table.COLOUR_NODES
     is_of_uv &= len(uv_maps) <= 1
-    is_of_view = any(
-        found.node.type in table.VIEW_NODES
-        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
-        or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
-        for found in upstream(output)
-    )
-    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view
+    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view(output)
 
 
 def _is_of_uv(value: Value) -> bool:

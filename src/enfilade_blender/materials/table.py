@@ -72,8 +72,9 @@ OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate a
     "HAIR_INFO": "data of hairs are taken as 0",
     "POINT_INFO": "data of points are taken as 0",
     "AMBIENT_OCCLUSION": "other objects do not occlude",
-    "SHADERTORGB": "the light on a surface is no colour in Cycles, and is taken as 0",
+    "SHADERTORGB": "the light on a surface is no colour in Cycles, where the input's own value holds",
 }
+OBJECT_EFFECT = "the surface differs where it depends on that"
 PRINCIPLED = (
     (
         "Base Color, Metallic 0",

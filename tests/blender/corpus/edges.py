@@ -357,6 +357,22 @@ def linked_duplicates(_folder):
     slot.link, slot.material = "OBJECT", other
 
 
+def of_view(_folder):
+    """Bumps of window coordinates, wires as wide as pixels, and light as a colour."""
+    new_file()
+    bumps, tree, diffuse = shader("bumps", "BsdfDiffuse")
+    noise = node_of(tree, "TexNoise", Vector=node_of(tree, "TexCoord").outputs["Window"])
+    fill(tree, diffuse, {"Normal": node_of(tree, "Bump", Height=noise)})
+    wires, tree, diffuse = shader("wires", "BsdfDiffuse")
+    wire = node_of(tree, "Wireframe")
+    wire.use_pixel_size = True
+    fill(tree, diffuse, {"Color": wire})
+    toon, tree, diffuse = shader("toon", "BsdfDiffuse", Color=(0.7, 0.2, 0.1, 1.0))
+    fill(tree, diffuse, {"Color": node_of(tree, "ShaderToRGB", Shader=node_of(tree, "BsdfAnisotropic"))})
+    for number, material in enumerate((bumps, wires, toon)):
+        plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
