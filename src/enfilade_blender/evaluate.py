@@ -17,6 +17,7 @@ from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Limits
 from enfilade_blender.mesh_data import read_mesh
 from enfilade_blender.notes import Notes
+from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
 
 ENGINE = "ENFILADE_EXPORT"
@@ -108,6 +109,7 @@ def _render(selection: Selection) -> None:
 def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
     _check_generated(graph, limits)
     by_key: dict[Any, Placed | None] = {}
+    meshes: dict[int, Mesh] = {}
     names = _attributes_of_materials()
     for instance in graph.object_instances:
         obj = instance.object
@@ -118,7 +120,10 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         if not instance.show_self:
             continue
         matrix = np.array(instance.matrix_world, np.float64)
-        if obj.type == "LIGHT":
+        if not np.isfinite(matrix).all():
+            what = "an object whose place, rotation or scale is NaN or infinite is left out"
+            notes.add("not-carried", _name(instance), "Transform", what, "it is missing from the picture")
+        elif obj.type == "LIGHT":
             _note_linking(obj, notes)
             _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
             result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))
@@ -128,7 +133,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         elif isinstance(obj.data, bpy.types.Mesh):  # text, curves and metaballs have an instance of one
             key = (_name(instance), obj.name_full, obj.data.as_pointer())
             if key not in by_key:
-                by_key[key] = _place(instance, notes, names)
+                by_key[key] = _place(instance, meshes, notes, names)
             placed = by_key[key]
             if placed is not None:
                 placed.matrices.append(matrix)
@@ -170,10 +175,12 @@ def _attributes_of_materials() -> frozenset[str]:
     return frozenset(node.attribute_name for node in nodes if node.attribute_type == "GEOMETRY")
 
 
-def _place(instance: Any, notes: Notes, names: frozenset[str]) -> Placed | None:
-    obj = instance.object
+def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: frozenset[str]) -> Placed | None:
+    obj, pointer = instance.object, instance.object.data.as_pointer()
     _note_object(instance, notes)
-    mesh = read_mesh(obj.data, obj.name, notes, names)
+    if pointer not in meshes:
+        meshes[pointer] = read_mesh(obj.data, obj.name, notes, names)
+    mesh = meshes[pointer]
     if len(mesh) == 0:
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)

@@ -14,7 +14,7 @@ from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Job
 from enfilade_blender.lamp_nodes import LampNodes
 from enfilade_blender.left_out import note_falloff, note_inputs, note_light, note_settings
-from enfilade_blender.lights import emitters, is_portal, needs_passing, split_suns
+from enfilade_blender.lights import emitters, is_finite, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
 from enfilade_blender.motion import note_motion
 from enfilade_blender.notes import Notes, report_progress
@@ -23,7 +23,7 @@ from enfilade_blender.records import Selection
 from enfilade_blender.run import write_json
 from enfilade_blender.scene_xml import LAMP, Element, named, plugin, write_scene
 from enfilade_blender.shapes import Shapes
-from enfilade_blender.visibility import note_depths, note_sun
+from enfilade_blender.visibility import cast_count, note_depths, note_sun
 from enfilade_blender.world import environment
 
 GLASS = {"dielectric", "roughdielectric", "thindielectric"}
@@ -63,10 +63,12 @@ def export(job: Job) -> dict[str, Any]:
     lamps, nodes = [lamp for lamp in evaluated.lamps if not is_portal(lamp)], LampNodes(job, selection, notes)
     for lamp in lamps:
         lamp.factor = nodes.factor(lamp)
+    lamps = [lamp for lamp in lamps if is_finite(lamp, notes)]
     lamps, sun = split_suns(lamps, notes)
-    note_sun(sun, views, selection, notes)
-    note_depths(views, selection, notes)
-    note_falloff(lamps, selection, notes)
+    casts = cast_count(evaluated.instances)
+    note_sun(sun, views, selection, notes, casts=casts)
+    note_depths(views, selection, notes, casts=casts)
+    note_falloff(lamps, selection, notes, casts=casts)
     made = [element for lamp in lamps for element in emitters(lamp, shapes.identifiers, notes)]
     elements += [named(plugin("bsdf", "null"), LAMP), *made]
     is_volumetric = "mask" in shapes.kinds or needs_passing(made, sun)

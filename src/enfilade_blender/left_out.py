@@ -119,21 +119,23 @@ def note_light(selection: Selection, lamps: list[Lamp], notes: Notes, *, has_gla
             notes.add("not-carried", name, "Max Bounces", what, effect)
 
 
-def note_falloff(lamps: list[Lamp], selection: Selection, notes: Notes) -> None:
-    """Note lamps of soft falloff that are near surfaces for their radius.
+def note_falloff(lamps: list[Lamp], selection: Selection, notes: Notes, *, casts: int) -> None:
+    """Note lamps of soft falloff that are near surfaces for their radius; the largest, if rays are few.
 
     In Cycles their light comes from a disc that faces every point that it lights, by I / (d^2 + r^2): of no
     emitter with a place of its own.
     """
     graph = bpy.context.evaluated_depsgraph_get()
-    for lamp in lamps:
+    soft = [lamp for lamp in lamps if _is_soft(lamp.data)]
+    soft.sort(key=lambda lamp: -lamp.data.shadow_soft_size)
+    directions = [Vector(one).normalized() for one in product((-1, 0, 1), repeat=3) if any(one)]
+    if casts < len(soft) * (1 + len(directions)):
+        directions = [one for one in directions if max(map(abs, one)) == 1.0]
+    for lamp in soft[: casts // (1 + len(directions))]:
         data = lamp.data
-        is_soft = data.type in ("POINT", "SPOT") and data.use_soft_falloff and data.energy > 0.0
-        if not is_soft or data.shadow_soft_size <= 0.0:
-            continue
         reach = data.shadow_soft_size / math.sqrt(SOFT_FALLOFF)
         place, axis = Vector(lamp.matrix[:3, 3]), Vector(-lamp.matrix[:3, 2]).normalized()
-        around = [Vector(one).normalized() for one in product((-1, 0, 1), repeat=3) if any(one)]
+        around = directions
         if data.type == "SPOT":
             around = [one for one in around if one.dot(axis) > math.cos(0.5 * data.spot_size)]
         hits = [selection.scene.ray_cast(graph, place, one, distance=reach) for one in (axis, *around)]
@@ -142,3 +144,8 @@ def note_falloff(lamps: list[Lamp], selection: Selection, notes: Notes) -> None:
             excess = (data.shadow_soft_size / max(min(distances), 1e-6)) ** 2
             effect = f"surfaces near it are brighter, at {min(distances):.2g} units by {excess:.0%}"
             notes.add("approximated", lamp.name, "Soft Falloff", "its falloff is quadratic", effect)
+
+
+def _is_soft(data: Any) -> bool:
+    is_soft = data.type in ("POINT", "SPOT") and data.use_soft_falloff and data.energy > 0.0
+    return is_soft and data.shadow_soft_size > 0.0

@@ -22,6 +22,7 @@ from enfilade_blender.scene_xml import LAMP, Element, Identifiers, plugin, refer
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
+SIZES = ("shadow_soft_size", "size", "size_y", "angle", "spot_size", "spot_blend")  # of lamps
 DELTA = ("point", "spot", "directional")  # emitters that shadow rays alone reach
 
 
@@ -88,6 +89,16 @@ def _unnormalized(data: Any) -> float:
 def is_portal(lamp: Lamp) -> bool:
     """Whether a lamp emits nothing: it tells Cycles where the world's light comes in."""
     return lamp.data.type == "AREA" and bool(lamp.data.cycles.is_portal)
+
+
+def is_finite(lamp: Lamp, notes: Notes) -> bool:
+    """Whether a lamp has numbers that 32 bits hold; that it is left out otherwise is noted."""
+    numbers = [*lamp_colour(lamp), *(getattr(lamp.data, name, 0.0) for name in SIZES)]
+    if np.all(np.abs(numbers) <= np.finfo(np.float32).max):
+        return True
+    what, effect = "a lamp whose light or size is NaN or infinite is left out", "it gives no light"
+    notes.add("not-carried", lamp.name, "Light", what, effect)
+    return False
 
 
 def split_suns(lamps: list[Lamp], notes: Notes) -> tuple[list[Lamp], Sun | None]:

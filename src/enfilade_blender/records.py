@@ -75,6 +75,7 @@ class Placed:
     name : str
         Of the object; of an instance, with that of its instancer.
     mesh
+        Linked duplicates have the same.
     slots : tuple
         Materials (bpy) or None.
     matrices : list of (4, 4) float64
@@ -82,6 +83,8 @@ class Placed:
         RGBA of the object's viewport display, which materials may read.
     index : int
         Pass index of the object.
+    names : tuple of str
+        Of the copies; empty: all have the object's.
     """
 
     name: str
@@ -90,6 +93,7 @@ class Placed:
     matrices: list[np.ndarray] = field(default_factory=list)
     colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
     index: int = 0
+    names: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)

@@ -12,7 +12,7 @@ from enfilade_blender.job import Job
 from enfilade_blender.materials.atlas import share_bsdfs
 from enfilade_blender.materials.bake import Bakery
 from enfilade_blender.materials.bsdfs import Context, is_one
-from enfilade_blender.materials.graph import Graph, is_of_place
+from enfilade_blender.materials.graph import Graph, is_of_object, is_of_place
 from enfilade_blender.materials.surfaces import Surface, build
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import (
@@ -34,6 +34,7 @@ from enfilade_blender.scene_xml import Element, Identifiers, named, plugin, refe
 DEFAULT = Lobe("diffuse", Constant((0.8, 0.8, 0.8)), "no material")
 FLAT_TRIANGLES = 8_000_000  # a scene of more has instances
 INSTANCED_TRIANGLES = 500_000  # of all copies of a mesh that becomes instances
+FEW_INSTANCES = 16  # that a renderer does not expand: rays take 20 % more time with them
 FEW_COPIES = 64  # of an object that are baked one by one
 SAMPLED_EYES = 16  # of which backs are looked for
 BACK_OFFSET = 4e-5  # of a vertex' largest coordinate plus 1: rays begin at 9e-5, which pass the other side
@@ -102,7 +103,7 @@ class Shapes:
         """Write all meshes; elements of BSDFs and shapes."""
         shapes: list[Element] = []
         total = sum(len(p.mesh) * len(p.matrices) for p in placed)
-        placed = [one for item in placed for one in self._apart(item)]
+        placed = [one for item in self._linked(placed, total) for one in self._apart(item)]
         self._middles = np.concatenate([np.zeros((0, 3)), *map(_middles, placed)])
         self._owners = np.repeat([id(item) for item in placed], [len(item.matrices) for item in placed])
         for number, item in enumerate(placed):
@@ -113,6 +114,25 @@ class Shapes:
         self._bsdfs = [bsdf for bsdf in self._bsdfs if bsdf.get("id") in used]
         self._bsdfs = share_bsdfs(self._bsdfs, shapes, self._baked, self.textures, self._out)
         return [*self._bsdfs, *shapes]
+
+    def _linked(self, placed: list[Placed], total: int) -> list[Placed]:
+        """The objects; linked duplicates that are to be instances are copies of the first.
+
+        Objects whose materials tell them apart stay as they are.
+        """
+        groups: dict[Any, list[Placed]] = {}
+        for item in placed:
+            key = id(item.mesh), item.slots, item.colour, item.index
+            groups.setdefault(key, []).append(item)
+        result = []
+        for items in groups.values():
+            copies = [(item.name, matrix) for item in items for matrix in item.matrices]
+            names, matrices = zip(*copies, strict=True)
+            group = replace(items[0], matrices=list(matrices), names=names)
+            are_many = len(matrices) > FEW_INSTANCES and _is_instanced(group, total)
+            is_alike = are_many and not any(is_of_object(self._shader(material)) for material in group.slots)
+            result += [group] if is_alike else items
+        return result
 
     def _apart(self, placed: Placed) -> list[Placed]:
         """An object; its copies, if they are few, where a material depends on their place in the world."""
@@ -146,12 +166,13 @@ class Shapes:
             radiance = surface.radiance(self._context(part.material))
             mesh = _with_maps(mesh, material.uv, material.attribute)
             if is_instanced and radiance is None:
-                instanced += self._shapes_of(name, mesh, material, None)
+                instanced += self._shapes_of(f"{name} mesh", mesh, material, None)
                 continue
             mesh = joined([mesh.transformed(matrix) for matrix in placed.matrices])
             elements += self._shapes_of(name, mesh, material, radiance)
-            is_hidden = is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
-            if radiance is not None and not is_hidden:
+            if radiance is not None and not (
+                is_one(surface.opacity) and self._hides_its_back(part.mesh, placed)
+            ):
                 elements += self._shapes_of(f"{name} back", _back(mesh), material, radiance)
         return elements + (self._instances(placed, instanced) if instanced else [])
 
@@ -182,9 +203,10 @@ class Shapes:
     def _instances(self, placed: Placed, shapes: list[Element]) -> list[Element]:
         group = named(plugin("shape", "shapegroup", *shapes), self.identifiers.unique(f"{placed.name} group"))
         copies = []
-        for matrix in placed.matrices:
+        names = placed.names or [placed.name] * len(placed.matrices)
+        for name, matrix in zip(names, placed.matrices, strict=True):
             copy = plugin("shape", "instance", reference(group.get("id") or ""), to_world=matrix)
-            copies.append(named(copy, self.identifiers.unique(placed.name)))
+            copies.append(named(copy, self.identifiers.unique(name)))
         return [group, *copies]
 
     def _shapes_of(self, name: str, mesh: Mesh, material: _Material, radiance: Any) -> list[Element]:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -14,17 +16,24 @@ from enfilade_blender.records import Selection, View
 
 SAMPLED_VIEWS = 64
 RAYS = 8, 5  # of a view across and down
+EVERY = 5  # of these rays, where there are too many objects for all
+BOXES = 800_000  # of objects that the rays of one kind of note are tested against: 1.2 s
 LISTED = 3  # objects that are named
 MINIATURE = 0.1  # scene units: Mitsuba moves the origins of rays by a thousandth of it
 FAR = 1e4  # scene units, to a point in the sun's direction
 
 
-def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: Notes) -> None:
+def cast_count(instances: int) -> int:
+    """Number of rays that are cast at a scene for a kind of note: Blender tests each against all objects."""
+    return max(BOXES // max(instances, 1), math.prod(RAYS) // EVERY)
+
+
+def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: Notes, *, casts: int) -> None:
     """Note a sun that no object hides from the camera in some view."""
     if sun is None:
         return
     graph = bpy.context.evaluated_depsgraph_get()
-    for view in views[:: max(len(views) // SAMPLED_VIEWS, 1)]:
+    for view in _spread(views, casts):
         eye = view.pose[:3, 3]
         ((x, y, depth),) = view.pixels(eye[None] + FAR * sun.direction, selection.size)
         if depth <= 0.0 or not (0.0 <= x <= selection.size[0] and 0.0 <= y <= selection.size[1]):
@@ -35,17 +44,19 @@ def note_sun(sun: Sun | None, views: list[View], selection: Selection, notes: No
             return
 
 
-def note_depths(views: list[View], selection: Selection, notes: Notes) -> None:
+def note_depths(views: list[View], selection: Selection, notes: Notes, *, casts: int) -> None:
     """Note cameras that clip surfaces in Blender, and those as near to all they see as in a miniature.
 
     Here they see all from the eye on.
     """
     graph = bpy.context.evaluated_depsgraph_get()
     clipped: dict[tuple[str, str], dict[str, None]] = {}  # objects by camera and setting
-    for view in views[:: max(len(views) // SAMPLED_VIEWS, 1)]:
+    rays = math.prod(RAYS)
+    step = 1 if casts >= rays * min(len(views), SAMPLED_VIEWS) else EVERY
+    for view in _spread(views, casts * step // rays):
         near, far = (view.projection[2, 3] / (view.projection[2, 2] + sign) for sign in (-1.0, 1.0))
         eye, depths = view.pose[:3, 3], []
-        for direction in _directions(view):  # of unit depth
+        for direction in _directions(view)[::step]:  # of unit depth
             is_hit, place, _, _, obj, _ = selection.scene.ray_cast(graph, Vector(eye), Vector(direction))
             if not is_hit:
                 continue
@@ -62,6 +73,11 @@ def note_depths(views: list[View], selection: Selection, notes: Notes) -> None:
         names = ", ".join([*objects][:LISTED]) + (" and others" if len(objects) > LISTED else "")
         effect = f"surfaces that it clips are visible: {names}"
         notes.add("not-carried", name, setting, "its clipping is left out", effect)
+
+
+def _spread(views: list[View], count: int) -> list[View]:
+    """At most a number of views, and of sampled ones, along the path."""
+    return views[:: max(math.ceil(len(views) / min(count, SAMPLED_VIEWS)), 1)]
 
 
 def _directions(view: View) -> list[np.ndarray]:

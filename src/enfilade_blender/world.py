@@ -33,12 +33,16 @@ def environment(selection: Selection, sun: Sun | None, folder: Path, notes: Note
     world = selection.scene.world
     _note_world(selection, notes)
     plain = _plain(world, notes)
+    if plain is not None:
+        r, g, b = _positive(np.array(plain), world, notes).tolist()
+        plain = (r, g, b)
     if plain is not None and sun is None:
         return [plugin("emitter", "constant", radiance=plain)] if max(plain) > 0.0 else []
     if plain is not None:
         image = np.broadcast_to(np.array(plain, np.float32), (WIDTH_SUN // 2, WIDTH_SUN, 3)).copy()
     else:
         image = _rendered(world, WIDTH_SUN if sun else WIDTH, folder, selection.frames[0], notes)
+        image = _positive(image, world, notes)
         what = f"an environment map of {image.shape[1]}x{image.shape[0]}"
         notes.add("baked", world.name, "World", what, "detail is limited to its pixels")
     if sun is not None:
@@ -101,6 +105,14 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
         return None
     r, g, b = (c * strength.number for c in colour.colour)
     return r, g, b
+
+
+def _positive(radiance: np.ndarray, world: Any, notes: Notes) -> np.ndarray:
+    """The radiance; what is negative is 0, with a note."""
+    if (radiance < 0.0).any():
+        what, effect = "its negative light is left out", "surfaces are brighter: Blender takes light away"
+        notes.add("not-carried", world.name, "World", what, effect)
+    return np.maximum(radiance, 0.0)
 
 
 def _rendered(world: Any, width: int, folder: Path, frame: int, notes: Notes) -> F32:

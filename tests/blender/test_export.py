@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import enfilade_blender
 from enfilade.camera.load import load_path
 from enfilade.images import read_exr
 from enfilade.scene.mitsuba.files import check_scene
@@ -42,7 +43,33 @@ FILES = (
     "left_out",
     "frozen",
     "simplified",
+    "without_light",
+    "linked_duplicates",
 )
+
+COUNT_CASTS = """
+import sys
+from types import SimpleNamespace
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from enfilade_blender.left_out import note_falloff
+from enfilade_blender.notes import Notes
+from enfilade_blender.records import Lamp, Selection, View
+from enfilade_blender.visibility import cast_count, note_depths
+
+class Scene:
+    count = 0
+    def ray_cast(self, *_, **__):
+        self.count += 1
+        return False, None, None, None, None, None
+
+bulb = SimpleNamespace(type="POINT", use_soft_falloff=True, energy=1.0, shadow_soft_size=0.1)
+views, lamps = 100 * [View("Camera", np.eye(4), np.ones((4, 4)), {})], 20 * [Lamp("Bulb", bulb, np.eye(4))]
+for note, items in ((note_depths, views), (note_falloff, lamps)):
+    scene = Scene()
+    note(items, Selection(scene, None, (1, 1), (8, 8)), Notes(), casts=cast_count(int(sys.argv[2])))
+    print(scene.count)
+"""
 
 
 @pytest.fixture(scope="session")
@@ -110,6 +137,19 @@ def test_meshes_that_geometry_nodes_make_are_instances(exported):
     pedestal, *_ = counts
     assert pedestal == 2  # of one alone: the other has no surface
     assert counts[1:] == sorted(2 * [15 * ball, 15 * box])
+
+
+def test_linked_duplicates_of_many_triangles_are_instances(exported):
+    out, _ = exported("linked_duplicates")
+    root = ET.parse(out / "scene.xml").getroot()
+    names = {
+        kind: {e.get("id") for e in root.findall(f"shape[@type='{kind}']")} for kind in ("instance", "ply")
+    }
+    copies = [f" {number}" for number in range(1, 17)]
+    assert names["instance"] == {"paint", *(f"paint{copy}" for copy in copies)}
+    # Of another material, or of one that tells objects apart.
+    assert names["ply"] == {"other", "by object", *(f"by object{copy}" for copy in copies)}
+    assert root.findall("shape[@id='paint 3']/transform/matrix")[0].get("value").split()[7] == "6"
 
 
 def test_text_curves_surfaces_and_metaballs_are_meshes(exported):
@@ -229,6 +269,16 @@ def test_soft_falloff_is_noted_of_lamps_near_surfaces(exported):
     assert all(note["effect"].endswith("at 0.5 units by 25%") for note in found)
 
 
+def test_notes_cast_fewer_rays_at_more_objects(blender):
+    counts = {}
+    for objects in (100, 20_000, 1_000_000):
+        done = blender.run("-c", COUNT_CASTS, Path(enfilade_blender.__file__).parents[1], objects)
+        assert done.returncode == 0, done.stderr[-2000:]
+        counts[objects] = [int(count) for count in done.stdout.split()[-2:]]
+    # Of 100 views 40 rays of every second one, and of 20 lamps 27 rays; then a few.
+    assert counts == {100: [50 * 40, 20 * 27], 20_000: [5 * 8, 5 * 7], 1_000_000: [8, 7]}
+
+
 def test_constants_of_a_lamps_nodes_are_kept(exported):
     out, result = exported("lamp_nodes")
     emitters = ET.parse(out / "scene.xml").getroot().findall("emitter[@type='point']")
@@ -311,6 +361,20 @@ def test_triangles_without_a_place_are_left_out(exported):
     assert torn.face_count() == 2
     normals = np.array(mi.traverse(torn)["vertex_normals"]).reshape(-1, 3)
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_light_that_is_no_number_or_negative_is_left_out_and_noted(exported):
+    out, result = exported("without_light")
+    assert {(note["object"], note["node"]) for note in result["notes"]} == {
+        ("World", "World"),
+        ("Nowhere", "Transform"),
+        ("NaN", "Light"),
+        ("Infinite", "Light"),
+        ("Colour", "Light"),
+        ("Size", "Light"),
+        ("Scene", "Light"),
+    }
+    assert list(shapes(out)) == ["Floor"]
 
 
 def test_a_file_of_nothing_is_refused(blender):

@@ -11,7 +11,7 @@ from enfilade_blender.lights import area_radiance, point_intensity, sphere_radia
 from enfilade_blender.materials import mapping
 from enfilade_blender.materials.bsdfs import Context, plastic_bsdf
 from enfilade_blender.materials.graph import Graph, depends_on_place
-from enfilade_blender.materials.surfaces import Radiance, Surface, inverted
+from enfilade_blender.materials.surfaces import inverted
 from enfilade_blender.materials.textures import Textures, file_stem
 from enfilade_blender.materials.values import AttributeValue, Constant, Output
 from enfilade_blender.notes import Notes
@@ -135,9 +135,8 @@ def test_a_colour_attribute_that_numbers_are_computed_of_is_grey_and_noted(tmp_p
     notes = Notes()
     context = Context("wall", Textures(tmp_path, notes), notes)
     value = AttributeValue(Output(SimpleNamespace(node=SimpleNamespace(name="Paint node"))), "", "wall")
-    as_it_is = Surface(None, emitted=(Radiance(value, 1.0),)).radiance(context)
-    assert as_it_is.get("type") == "mesh_attribute"
+    assert context.textures.colour(value).get("type") == "mesh_attribute"
     assert notes.to_list() == []
     assert inverted(value, context) == 0.5
-    assert Surface(None, emitted=(Radiance(value, 3.0),)).radiance(context) == (1.5, 1.5, 1.5)
+    assert context.textures.scaled_number(value, 3.0) == 1.5
     assert [(note["object"], note["node"]) for note in notes.to_list()] == [("wall", "Paint node")]

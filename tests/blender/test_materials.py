@@ -173,7 +173,7 @@ def test_a_mix_with_transparent_by_the_kind_of_ray_is_its_other_side(blender):
     assert ray["effect"] == "all rays see it as those do in Blender for which that is 0"
 
 
-@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way", "tilted"])
+@pytest.mark.parametrize("name", ["leaves", "lamps_in_the_way", "tilted", "painted_lamps"])
 def test_light_is_that_of_cycles(blender, name):
     (source,) = blender.make(name)
     code, out, result = blender.job(source, name)
@@ -307,6 +307,20 @@ def test_heights_and_normals_have_all_digits(blender):
     gains = found("rough", "texture[@name='specular_reflectance']")
     assert (gains.min(), gains.max()) == pytest.approx((1.0, metal_scale(0.8, 1.0)), abs=0.01)
     assert bsdfs["material polished"].find(".//rgb[@name='specular_reflectance']").get("value") == "1 1 1"
+
+
+def test_what_depends_on_the_view_or_on_light_is_noted(blender):
+    code, out, result = blender.job(blender.make("of_view")[0], "of view")
+    assert code == 0, result
+    noted = {(n["object"], n["node"], n["what"]) for n in result["notes"] if n["kind"] == "approximated"}
+    toon = "the light on a surface is no colour in Cycles, where the input's own value holds"
+    assert noted == {
+        ("bumps, bumps", "Bump", "it depends on the view"),
+        ("wires, wires", "Wireframe", "it depends on the view"),
+        ("toon", "Shader to RGB", toon),
+    }
+    colour = ET.parse(out / "scene.xml").find("bsdf[@id='material toon']//rgb").get("value")
+    assert [float(number) for number in colour.split()] == pytest.approx([0.7, 0.2, 0.1])
 
 
 def test_few_copies_are_baked_at_their_places_in_the_world(blender):

@@ -16,10 +16,10 @@ import numpy as np
 from enfilade_blender.image_files import F32
 from enfilade_blender.job import Job
 from enfilade_blender.materials.bake_scene import BakeKind, BakeScene
-from enfilade_blender.materials.graph import depends_on_place, upstream
+from enfilade_blender.materials.graph import depends_on_place, is_of_view, upstream
 from enfilade_blender.materials.image_pixels import is_missing
 from enfilade_blender.materials.stand_ins import IMAGES
-from enfilade_blender.materials.table import OBJECT_DATA
+from enfilade_blender.materials.table import OBJECT_DATA, OBJECT_EFFECT
 from enfilade_blender.materials.textures import Textures
 from enfilade_blender.materials.values import (
     Add,
@@ -121,7 +121,10 @@ class Bakery:
             file = self._textures.write(
                 f"{placed.name} normal", pixels.astype(np.float32), raw=True, is_exact=True
             )
-            self._note(value.output, f"{material.name}, {placed.name}", size)
+            name = f"{material.name}, {placed.name}"
+            self._note(value.output, name, size)
+            if is_of_view(value.output):
+                self._note_view(value.output, name)
             return NormalMap(Texture(file, BAKED_UV, FLAT, raw=True), 1.0, value.output)
         return self._stored(pixels, covered, value, f"{material.name}, {placed.name}", BAKED_UV)
 
@@ -153,8 +156,7 @@ class Bakery:
             for found in upstream(value.output):
                 what = _lost(found, mesh, placed)
                 if what:
-                    effect = "the surface differs where it depends on that"
-                    self._notes.add("approximated", material.name, found.node.name, what, effect)
+                    self._notes.add("approximated", material.name, found.node.name, what, OBJECT_EFFECT)
 
     def _stored(
         self, pixels: F32, covered: Any, value: Procedural | ImageValue, name: str, uv_map: str
@@ -163,8 +165,7 @@ class Bakery:
         output = value.output
         is_exact = value.is_exact if isinstance(value, Procedural) else value.image.is_float
         if isinstance(value, Procedural) and value.is_of_view:
-            effect = "the surface looks the same from all directions"
-            self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
+            self._note_view(output, name)
         inside = pixels[covered] if covered is not None and covered.any() else pixels.reshape(-1, 3)
         mean = inside.mean(axis=0)
         colour = (float(mean[0]), float(mean[1]), float(mean[2]))
@@ -181,6 +182,10 @@ class Bakery:
     def _note(self, output: Output, name: str, size: int) -> None:
         node, what = f"{output.node.name}: {output.socket.name}", f"baked to {size}x{size} pixels"
         self._notes.add("baked", name, node, what, "detail is limited to its pixels")
+
+    def _note_view(self, output: Output, name: str) -> None:
+        effect = "the surface looks the same from all directions"
+        self._notes.add("approximated", name, output.node.name, "it depends on the view", effect)
 
     def _resolution(self, placed: Placed, mesh: Mesh) -> int:
         """A power of two, by the object's largest size in the views of the path."""

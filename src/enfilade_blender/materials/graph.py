@@ -78,6 +78,8 @@ class Graph:
         if node.type == "BSDF_PRINCIPLED":
             names = (name for name in PRINCIPLED if name in node.inputs)
             inputs = {name: self.value(node.inputs[name], inner) for name in names}
+            if inputs["Emission Strength"] != Constant((0.0,)):
+                inputs["Emission Color"] = _baked(inputs["Emission Color"])
             self._note_coat_normal(node, inner)
             return Principled(inputs, self.normal(node.inputs["Normal"], inner), node.name)
         if node.type == "MIX_SHADER":
@@ -91,9 +93,8 @@ class Graph:
         if node.type == "ADD_SHADER":
             return Add(self.shader(node.inputs[0], inner), self.shader(node.inputs[1], inner), node.name)
         if node.type in ("EMISSION", "BACKGROUND"):
-            return Emission(
-                self.value(node.inputs["Color"], inner), self.value(node.inputs["Strength"], inner)
-            )
+            colour, strength = (self.value(node.inputs[name], inner) for name in ("Color", "Strength"))
+            return Emission(_baked(colour), strength)
         return self._lobe(node, inner)
 
     def value(self, socket: Any, groups: tuple[Any, ...]) -> Value:
@@ -106,9 +107,8 @@ class Graph:
         node = found.node
         if node.type in ("RGB", "VALUE"):
             return self._constant(found.socket)
-        if node.type == "LIGHT_PATH":
-            self._note_light_path(found)
-            return Constant((0.0,))
+        if node.type in ("LIGHT_PATH", "SHADERTORGB"):
+            return self._of_light(found, socket)
         if found.socket.name == "Color" and not is_number:
             if node.type == "VERTEX_COLOR":
                 return AttributeValue(found, node.layer_name, self._owner)
@@ -224,10 +224,16 @@ class Graph:
             what, effect = "the normals of the coat are left out", "its reflections are even"
             self._notes.add("not-carried", self._owner, f"{node.name}: Coat Normal", what, effect)
 
-    def _note_light_path(self, found: Output) -> None:
-        what = f"{found.socket.name} is taken as 0"
-        effect = "all rays see it as those do in Blender for which that is 0"
+    def _of_light(self, found: Output, socket: Any) -> Constant:
+        """What an input takes in place of a kind of ray, or of the light on a surface."""
+        if found.node.type == "LIGHT_PATH":
+            value, what = Constant((0.0,)), f"{found.socket.name} is taken as 0"
+            effect = "all rays see it as those do in Blender for which that is 0"
+        else:
+            value, what = self._constant(socket), table.OBJECT_DATA[found.node.type]
+            effect = table.OBJECT_EFFECT
         self._notes.add("approximated", self._owner, found.node.name, what, effect)
+        return value
 
 
 def follow(socket: Any, groups: tuple[Any, ...]) -> Any:
@@ -318,8 +324,19 @@ def upstream(output: Output, *, below_images: bool = True) -> Iterator[Output]:
 
 def is_of_place(shader: Shader) -> bool:
     """Whether a baked value or normal of a shader depends on where in the world a copy of its object is."""
-    baked = [value for value in values_of(shader) if isinstance(value, Procedural | ProceduralNormal)]
-    return any(depends_on_place(found) for value in baked for found in upstream(value.output))
+    return any(depends_on_place(found) for found in _read(shader))
+
+
+def is_of_object(shader: Shader) -> bool:
+    """Whether a baked value or normal of a shader differs between objects of one mesh."""
+    return any(depends_on_place(found) or found.node.type == "OBJECT_INFO" for found in _read(shader))
+
+
+def _read(shader: Shader) -> Iterator[Output]:
+    """Outputs that the baked values and normals of a shader depend on."""
+    for value in values_of(shader):
+        if isinstance(value, Procedural | ProceduralNormal):
+            yield from upstream(value.output)
 
 
 def depends_on_place(found: Output) -> bool:
@@ -334,6 +351,17 @@ def depends_on_place(found: Output) -> bool:
     return name in table.PLACE_SOCKETS.get(node.type, ())
 
 
+def is_of_view(output: Output) -> bool:
+    """Whether an output depends on the direction of view, the camera or the kind of ray."""
+    return any(
+        found.node.type in table.VIEW_NODES
+        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
+        or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
+        or getattr(found.node, "use_pixel_size", False)
+        for found in upstream(output)
+    )
+
+
 def _dependence(output: Output) -> tuple[str | None, bool]:
     """UV map of which alone an output is a periodic function, or None; and whether it depends on the view."""
     is_of_uv, uv_maps = True, set()
@@ -346,17 +374,16 @@ def _dependence(output: Output) -> tuple[str | None, bool]:
         else:
             is_of_uv &= node.type in table.COLOUR_NODES
     is_of_uv &= len(uv_maps) <= 1
-    is_of_view = any(
-        found.node.type in table.VIEW_NODES
-        or "CAMERA" in (getattr(found.node, end, "") for end in ("convert_from", "convert_to"))
-        or found.socket.name in table.VIEW_SOCKETS.get(found.node.type, ())
-        for found in upstream(output)
-    )
-    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view
+    return (next(iter(uv_maps), "") if is_of_uv else None), is_of_view(output)
 
 
 def _is_of_uv(value: Value) -> bool:
     return isinstance(value, Procedural) and value.uv_map is not None
+
+
+def _baked(value: Value) -> Value:
+    """The value of an emission: Mitsuba doesn't sample emitters by attributes of their mesh."""
+    return Procedural(value.output) if isinstance(value, AttributeValue) else value
 
 
 def _exact(value: Value) -> Value:

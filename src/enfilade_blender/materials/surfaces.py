@@ -20,7 +20,6 @@ from enfilade_blender.materials.bsdfs import (
 from enfilade_blender.materials.principled import principled_bsdf
 from enfilade_blender.materials.values import (
     Add,
-    AttributeValue,
     Constant,
     Emission,
     Lobe,
@@ -92,12 +91,9 @@ class Surface:
         if isinstance(radiance.colour, Constant):
             r, g, b = (max(c * radiance.strength, 0.0) for c in radiance.colour.colour)
             return (r, g, b) if max(r, g, b) > 0.0 else None
-        is_as_is = abs(radiance.strength - 1.0) < 1e-3
-        if is_as_is and isinstance(radiance.colour, AttributeValue):
-            return context.textures.colour(radiance.colour)
         if not context.textures.has_pixels(radiance.colour):
             return (0.5 * radiance.strength,) * 3
-        if is_as_is:
+        if abs(radiance.strength - 1.0) < 1e-3:
             return context.textures.colour(radiance.colour)
         scaled = context.textures.pixels(radiance.colour) * radiance.strength
         return context.textures.rewritten(radiance.colour, scaled, f"emission {radiance.strength:.3g}")

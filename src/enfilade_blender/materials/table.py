@@ -72,8 +72,9 @@ OBJECT_DATA = {  # nodes that a bake on a copy of the object does not evaluate a
     "HAIR_INFO": "data of hairs are taken as 0",
     "POINT_INFO": "data of points are taken as 0",
     "AMBIENT_OCCLUSION": "other objects do not occlude",
-    "SHADERTORGB": "the light on a surface is no colour in Cycles, and is taken as 0",
+    "SHADERTORGB": "the light on a surface is no colour in Cycles, where the input's own value holds",
 }
+OBJECT_EFFECT = "the surface differs where it depends on that"
 PRINCIPLED = (
     (
         "Base Color, Metallic 0",
@@ -132,7 +133,7 @@ INPUTS = (
     (
         "Attribute of vertices, corners or faces",
         "mapped",
-        "`mesh_attribute`; baked: its alpha, its number, several in one material, what nodes compute of it",
+        "`mesh_attribute`; baked: light, its alpha or number, several in one material, what nodes make of it",
     ),
     ("Image of the extension Clip whose border lies on the mesh", "baked", "a bitmap of each mesh"),
     ("Colour corrections of images on the UV map", "baked", "a bitmap over the unit square of UV"),
@@ -195,7 +196,7 @@ LIGHTS = (
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
     (
-        "Spread, negative power and emission, light and shadow linking, patterns of nodes of lights",
+        "Spread, negative power, emission and world, light and shadow linking, patterns of nodes of lights",
         "not carried",
         "light is distributed as without them",
     ),
@@ -203,7 +204,7 @@ LIGHTS = (
 OBJECTS = (
     ("Mesh, curve, surface, text, metaball", "mapped", "triangles after modifiers, with split normals"),
     (
-        "Collection, geometry nodes and particle instances",
+        "Collection, geometry nodes and particle instances, linked duplicates",
         "mapped",
         "merged, or `instance` where they are many",
     ),
@@ -217,7 +218,11 @@ OBJECTS = (
     ),
     ("Frame step", "not carried", "every frame is rendered"),
     ("Hair, point clouds, volumes, grease pencil", "not carried", "missing"),
-    ("Triangles with a vertex that is NaN or infinite", "not carried", "missing"),
+    (
+        "Triangles, objects and lamps with a vertex, place or light that is NaN or infinite",
+        "not carried",
+        "missing",
+    ),
     ("Ray visibility, shadow catcher, holdout, indirect only", "not carried", "visible to all rays"),
     ("Transparent Shadows switched off", "not carried", "light passes where the surface is transparent"),
     ("Clipping of cameras", "not carried", "all is visible from the eye on"),

@@ -12,6 +12,7 @@ from corpus.stage import (
     add,
     cube,
     fill,
+    finish,
     image,
     light,
     new_file,
@@ -243,6 +244,19 @@ def painted(_folder):
                 corner.color = colour
 
 
+def painted_lamps(_folder):
+    """Spheres that shine by a colour attribute, one of them five times as bright, over a floor."""
+    new_file()
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, shader("floor", "BsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))[0])
+    for x, strength in ((-0.6, 1.0), (0.6, 5.0)):
+        glow, tree, emission = shader(f"glow {strength}", "Emission", Strength=strength)
+        fill(tree, emission, {"Color": node_of(tree, "VertexColor")})
+        data = sphere(glow.name, (x, 0.0, 0.8), 0.4, glow).data
+        paint = data.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+        for vertex, colour in zip(data.vertices, paint.data, strict=True):
+            colour.color = (*(0.3 + 0.25 * np.sin(10.0 * np.array(vertex.co))), 1.0)
+
+
 def attributes(_folder):
     """A number of vertices and a vector of faces as colours, and a truth value of corners times 0.3."""
     new_file()
@@ -326,6 +340,39 @@ def copies_in_the_world(_folder):
         copied.parent = points
 
 
+def linked_duplicates(_folder):
+    """18 objects of a mesh of half a million triangles, one of another material; 17 of colours by Random."""
+    new_file()
+    paint, other = principled("paint"), principled("other", (0.1, 0.2, 0.3, 1.0))
+    by_object, tree, bsdf = shader("by object", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "ObjectInfo").outputs["Random"]})
+    for x, size, material in ((0.0, 500, paint), (2.0, 125, by_object)):
+        bpy.ops.mesh.primitive_grid_add(
+            x_subdivisions=size, y_subdivisions=size, size=1.0, location=(x, 0.0, 0.0)
+        )
+        first = finish(material.name, material)
+        for number in range(1, 17):
+            add(f"{material.name} {number}", first.data, (x, 2.0 * number, 0.0))
+    slot = add("other", bpy.data.objects["paint"].data, (-2.0, 0.0, 0.0)).material_slots[0]
+    slot.link, slot.material = "OBJECT", other
+
+
+def of_view(_folder):
+    """Bumps of window coordinates, wires as wide as pixels, and light as a colour."""
+    new_file()
+    bumps, tree, diffuse = shader("bumps", "BsdfDiffuse")
+    noise = node_of(tree, "TexNoise", Vector=node_of(tree, "TexCoord").outputs["Window"])
+    fill(tree, diffuse, {"Normal": node_of(tree, "Bump", Height=noise)})
+    wires, tree, diffuse = shader("wires", "BsdfDiffuse")
+    wire = node_of(tree, "Wireframe")
+    wire.use_pixel_size = True
+    fill(tree, diffuse, {"Color": wire})
+    toon, tree, diffuse = shader("toon", "BsdfDiffuse", Color=(0.7, 0.2, 0.1, 1.0))
+    fill(tree, diffuse, {"Color": node_of(tree, "ShaderToRGB", Shader=node_of(tree, "BsdfAnisotropic"))})
+    for number, material in enumerate((bumps, wires, toon)):
+        plane(material.name, (2.0 * number, 0.0, 0.0), 1.5, material)
+
+
 def left_out(folder):
     """Settings that are easily overlooked, and a tinted coat with normals of its own over a bumpy base."""
     scene = new_file()
@@ -402,6 +449,22 @@ def _torn():
     data.materials.append(principled("roof", (0.5, 0.2, 0.1, 1)))
     data.shade_smooth()
     add("Torn", data)
+
+
+def without_light(_folder):
+    """A world that takes light away, and lamps and a cube of which a number is NaN or infinite."""
+    new_file()
+    tree = world((1.0, 1.0, 1.0)).node_tree
+    value = node_of(tree, "Value")
+    value.outputs[0].default_value = -0.5  # a strength that is not linked is 0 at least
+    fill(tree, tree.nodes["Background"], {"Strength": value})
+    paint = principled("paint")
+    plane("Floor", (0.0, 0.0, 0.0), 4.0, paint)
+    cube("Nowhere", (math.nan, 0.0, 0.0), 1.0, paint)
+    light("POINT", "NaN", (0.0, 0.0, 2.0), math.nan)
+    light("SUN", "Infinite", (0.0, 0.0, 2.0), math.inf, angle=0.1)
+    light("AREA", "Colour", (0.0, 0.0, 2.0), 1.0, color=(1.0, math.nan, 1.0))
+    light("AREA", "Size", (0.0, 0.0, 2.0), 1.0, size=math.nan)
 
 
 def nothing(_folder):
