@@ -25,7 +25,7 @@ PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels,
 HALVINGS = range(3, 7)  # of the extent of the lit points: sizes of the cells that group them
 MIN_POINTS = 8  # in a cell
 WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
-OUTLIER = 16.0  # times the mean light: brighter paths are limited
+OUTLIER = 16  # times the mean light: brighter paths are limited
 MAX_NOISE = 0.4  # of the second moment without a guide: one that reduces it by less is not used
 
 
