@@ -16,6 +16,8 @@ import drjit as dr
 from enfilade.arrays import Array3f, Bool, Float, UInt
 
 REGIONS = 8  # spheres of a guide
+OCTANTS = 8  # around the centre of a sphere: lamp shades shine to one side
+LEAST_ODDS = 3.0  # of the lobe against all cones: it is sampled in three of four cases or more
 MAX_SINE = 0.99  # of the half angle of a cone; points nearer to a sphere, and inside, are not guided to it
 MIN_VERSINE = 1e-5  # 1 - cosine of the half angle
 BOUNDARY = 1e-3  # of the versine: directions so near to a cone count as inside, whatever their rounding
@@ -32,7 +34,8 @@ class PathGuide:
     radii : Float
         Scene units.
     radiance : Float
-        Mean luminance of what is seen at a sphere, which may be hidden from some points; 0 if not used.
+        Mean luminance of a sphere as points in each octant around it see it: :data:`REGIONS` times
+        :data:`OCTANTS` lanes. 0 if not used.
     background : Float
         Mean luminance of all other light; one lane.
     """
@@ -56,7 +59,8 @@ class PathGuide:
             versine = dr.square(sine) / (1.0 + dr.sqrt(dr.maximum(1.0 - dr.square(sine), 0.0)))
             cosine = dr.clip(dr.dot(axis, normal) + sine, 0.0, 1.0)
             share = dr.select(sine < MAX_SINE, 2.0 * versine * cosine, 0.0)
-            found.append(Cone(axis, dr.maximum(versine, MIN_VERSINE), share))
+            octant = sum((dr.select(of < 0.0, UInt(1 << i), 0) for i, of in enumerate(to)), UInt(0))
+            found.append(Cone(axis, dr.maximum(versine, MIN_VERSINE), share, OCTANTS * k + octant))
         return found
 
 
@@ -72,11 +76,14 @@ class Cone:
         1 - cosine of the half angle.
     share : Float
         Of the cosine-weighted hemisphere; 0 where a point is too near to the sphere.
+    side : UInt
+        Index of the sphere's radiance towards the points.
     """
 
     axis: Any
     versine: Any
     share: Any
+    side: Any
 
     def contains(self, direction: Any) -> Any:
         """Whether directions (Array3f of unit length) are inside; Bool."""
@@ -87,7 +94,7 @@ class GuidedLobe:
     """A mixture of a lobe and cones.
 
     A cone is sampled in proportion to its radiance times its share of the hemisphere, the lobe in proportion
-    to the background, with a probability of at least one half.
+    to the background, and at least in three of four cases.
 
     Parameters
     ----------
@@ -98,9 +105,9 @@ class GuidedLobe:
 
     def __init__(self, guide: PathGuide, position: Any, normal: Any) -> None:
         self._cones = guide.cones(position, normal)
-        weights = [dr.gather(Float, guide.radiance, UInt(k)) * c.share for k, c in enumerate(self._cones)]
+        weights = [dr.gather(Float, guide.radiance, cone.side) * cone.share for cone in self._cones]
         total = sum(weights, Float(0))
-        scale = dr.rcp(dr.maximum(total + dr.maximum(guide.background, total), 1e-30))
+        scale = dr.rcp(dr.maximum(total + dr.maximum(guide.background, LEAST_ODDS * total), 1e-30))
         self._probabilities = [weight * scale for weight in weights]
         self._guided = total * scale
 

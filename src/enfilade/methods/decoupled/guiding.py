@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
-from enfilade.kernels.guiding import REGIONS, PathGuide
+from enfilade.kernels.guiding import LEAST_ODDS, OCTANTS, REGIONS, PathGuide
 from enfilade.kernels.random import samplers
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.tone import REC709_LUMINANCE
@@ -22,6 +22,7 @@ from enfilade.renderer import LitPoints, LobeRenderer, RandomKey
 F64 = npt.NDArray[np.float64]
 
 PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels, and paths of each
+MORE_PATHS = 32  # ... of each pixel that measure the regions of a guide that is used
 HALVINGS = range(3, 7)  # of the extent of the lit points: sizes of the cells that group them
 MIN_POINTS = 8  # in a cell
 WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
@@ -39,6 +40,8 @@ class Probes:
         Luminance that the surface receives over pi, as the path estimates it, other than from emitters.
     shares : tuple of Float
         Of each region in the cosine-weighted hemisphere of the surface.
+    sides : tuple of UInt
+        Index of each region's radiance towards the surface.
     region : UInt
         The first region from which the light comes; their number for other light.
     is_used : Bool
@@ -46,6 +49,7 @@ class Probes:
 
     light: Any
     shares: tuple[Any, ...]
+    sides: tuple[Any, ...]
     region: Any
     is_used: Any
 
@@ -56,9 +60,7 @@ def trace_probes(renderer: LobeRenderer, guide: PathGuide, path: Path) -> Probes
     point = renderer.intersect(path.rays, opaque_only=True)
     bounced = renderer.sample_diffuse(point, sampler)
     point = renderer.intersect(dr.select((path.lane & 1) == 0, path.rays, bounced.rays), opaque_only=True)
-    sample = renderer.sample_diffuse(
-        point, sampler.copy(), guide=guide
-    )  # the one that the estimate takes, too
+    sample = renderer.sample_diffuse(point, sampler.copy(), guide=guide)  # that of the estimate, too
     _, indirect = renderer.estimate_diffuse(point, sampler, path_depth=2, guide=guide)
     light, region = dr.dot(indirect, Array3f(*REC709_LUMINANCE)), UInt(REGIONS)
     cones = guide.cones(point.position, point.surfaces.normal)
@@ -67,6 +69,7 @@ def trace_probes(renderer: LobeRenderer, guide: PathGuide, path: Path) -> Probes
     return Probes(
         light=dr.select(sample.is_alive, light, 0.0),
         shares=tuple(cone.share for cone in cones),
+        sides=tuple(cone.side for cone in cones),
         region=region,
         is_used=Bool(point.surfaces.is_hit & dr.isfinite(light)),
     )
@@ -93,7 +96,7 @@ def find_regions(
 
     Returns
     -------
-    list of [x, y, z, radius, radiance]
+    list of [x, y, z, radius, radiance in eight octants]
         Followed by the background; empty if no guide is of use.
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
@@ -105,22 +108,23 @@ def find_regions(
     rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
     position = rows(rays.origin + Float(geometry.depth.ravel()[pixels]) * rays.direction)
     normal = geometry.normal.reshape(-1, 3)[pixels]
-    lane = lanes(np.repeat(pixels, PATHS))
-    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lane))
-    path = spawn(rays, samplers(lane, lanes(np.tile(np.arange(PATHS, dtype=np.uint32), PIXELS)), random), 0.0)
 
-    # Propose regions of several sizes, and take those that reduce the noise most.
+    def probed(guide: PathGuide, paths: int) -> Probes:
+        lane, path = lanes(np.repeat(pixels, paths)), np.tile(np.arange(paths, dtype=np.uint32), PIXELS)
+        rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lane))
+        return probe(guide, spawn(rays, samplers(lane, lanes(path), random), spread=0.0))
+
+    # Propose regions of several sizes, the largest first: small ones cover a part of what is bright.
     corner, extent = lit.position.min(axis=0), float(np.ptp(lit.position, axis=0).max())
-    best, most = [], 0.0
     for halvings in HALVINGS:
         cells = 2**halvings + 1  # along each axis
         cell = ((lit.position - corner) * ((cells - 1) / extent)).astype(np.int64) @ (1, cells, cells**2)
         proposed = _proposed(lit, cell, position, normal)
         if guide := upload_guide(proposed):
-            regions, saved = _measured(probe(guide, path), proposed)
-            if saved > most:
-                best, most = regions, saved
-    return best
+            _, noise = _measured(probed(guide, PATHS), proposed)
+            if noise < MAX_NOISE:
+                return _measured(probed(guide, MORE_PATHS), proposed)[0]
+    return []
 
 
 def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:
@@ -128,9 +132,9 @@ def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:
     if not regions:
         return None
     *spheres, (background,) = regions
-    table = np.zeros((REGIONS, 5), np.float32)
+    table = np.zeros((REGIONS, 4 + OCTANTS), np.float32)
     table[: len(spheres)] = spheres
-    guide = PathGuide(lanes(table[None, :, :3]), lanes(table[:, 3]), lanes(table[:, 4]), opaque(background))
+    guide = PathGuide(lanes(table[None, :, :3]), lanes(table[:, 3]), lanes(table[:, 4:]), opaque(background))
     dr.make_opaque(guide)
     return guide
 
@@ -152,35 +156,41 @@ def _proposed(lit: LitPoints, cell: npt.NDArray[np.int64], position: F32, normal
     cosine = np.maximum((to * normal[:, None]).sum(axis=2) / distance, 0.0)
     share = (np.square(radius / distance) * cosine).mean(axis=0)
     order = np.argsort(-np.square(radiance) * share, kind="stable")[:REGIONS]
-    spheres = [[*center[k].tolist(), float(radius[k]), float(radiance[k])] for k in order]
+    spheres = [[*center[k].tolist(), float(radius[k]), *[float(radiance[k])] * OCTANTS] for k in order]
     return [*spheres, [0.0]] if spheres else []
 
 
 def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[float]], float]:
-    """Regions with their measured radiance, and the decrease of the second moment by this guide."""
-    # Estimate the light from each region, and from elsewhere.
-    used = np.array(probes.is_used)
-    if not used.any():
-        return [], 0.0
-    light = np.array(probes.light)[used].astype(np.float64)
-    light = np.minimum(light, OUTLIER * light.mean())
-    share = np.stack([np.array(of)[used] for of in probes.shares]).astype(np.float64)
-    found = np.bincount(np.array(probes.region)[used], light, REGIONS + 1)[:REGIONS] / len(light)
-    seen = share.mean(axis=1)
-    radiance = np.maximum(found, 0.0) / np.maximum(seen, 1e-12)
-    background = max(float(light.mean() - found.sum()), 0.0)
+    """Regions with their measured radiance, and the second moment with this guide over that without one."""
+    used = np.flatnonzero(np.array(probes.is_used))
+    if not len(used):
+        return [], 1.0
 
-    # Compare the second moments: with a uniform radiance of each region, and of the background.
+    def taken(values: Any) -> Any:
+        return np.array(values)[used]
+
+    # Estimate the radiance of each side of each region, and the light from elsewhere.
+    light = taken(probes.light).astype(np.float64)
+    light = np.minimum(light, OUTLIER * light.mean())
+    share, side = np.stack(list(map(taken, probes.shares))), np.stack(list(map(taken, probes.sides)))
+    region, lane = taken(probes.region), np.arange(len(used))
+    found = np.zeros(REGIONS * OCTANTS)
+    is_from = region < REGIONS
+    np.add.at(found, side[region[is_from], lane[is_from]], light[is_from])
+    seen = np.bincount(side.ravel(), share.ravel(), REGIONS * OCTANTS)
+    radiance = np.maximum(found, 0.0) / np.maximum(seen, 1e-12)
+    background = max(float(light[~is_from].sum()) / len(used), 0.0)
+
+    # Compare the second moments: with a uniform radiance of each side, and of the background.
     rest = np.maximum(1.0 - share.sum(axis=0), 0.0)
     dim = background / max(float(rest.mean()), 1e-12)
-    plain = float((np.square(radiance) * seen).sum() + dim**2 * rest.mean())
-    weights = radiance[:, None] * share
+    weights = radiance[side] * share
+    plain = (radiance[side] * weights).sum(axis=0) + dim**2 * rest
     total = weights.sum(axis=0)
-    guided = weights / np.maximum(total + np.maximum(background, total), 1e-30)
+    guided = weights / np.maximum(total + np.maximum(background, LEAST_ODDS * total), 1e-30)
     own = 1.0 - guided.sum(axis=0)
     moments = np.square(weights) / np.maximum(own * share + guided, 1e-30)
-    noise = float((moments.sum(axis=0) + dim**2 * rest / own).mean())
-    if noise > MAX_NOISE * plain:
-        return [], 0.0
-    spheres = [[*sphere[:4], float(of)] for sphere, of in zip(proposed, radiance, strict=False)]
-    return [*spheres, [background]], plain - noise
+    noise = moments.sum(axis=0) + dim**2 * rest / own
+    spheres = zip(proposed, radiance.reshape(REGIONS, OCTANTS).tolist(), strict=False)
+    regions = [[*sphere[:4], *of] for sphere, of in spheres if len(sphere) > 1]
+    return [*regions, [background]], float(noise.mean()) / max(float(plain.mean()), 1e-30)

@@ -21,7 +21,6 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, of an entry that is used
-MANY_SAMPLES = 64
 RELIABLE_SAMPLES, RELIABLE_ERROR = 16, 0.1  # fewest, and largest relative standard error, of a reliable one
 MAX_ENTRIES = 1 << 22  # that are uploaded; of more, those with the most samples
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
@@ -222,10 +221,7 @@ class Entries:
 
         # Choose the entries that no single path dominates, but for those without light: a few paths miss rare
         # light by chance, and entries that have found it are often left out.
-        chosen = np.flatnonzero(
-            ((self.counts >= MANY_SAMPLES) | (self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR))
-            & (mean > 0.0)
-        )
+        chosen = np.flatnonzero((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))
         if not len(chosen):
             return None
         if len(chosen) > MAX_ENTRIES:

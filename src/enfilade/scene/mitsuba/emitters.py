@@ -36,8 +36,6 @@ def find_emitters(merged: MergedScene) -> Emitters:
 
 def find_lit_points(scene: Any) -> LitPoints:
     """Follow rays from all emitters but environments to the next surface that is not a lamp's own."""
-    if not scene.emitters():
-        return LitPoints(np.zeros((0, 3), np.float32), np.zeros(0))
     sampler = one_sequence(EMITTED)
     points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
     ray, weight, emitter = scene.sample_emitter_ray(0.0, sampler.next_1d(), *points, True)
