@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.camera.pinhole import Camera
-from enfilade.kernels.guiding import PathGuide
 from enfilade.records import F32, U32, Shading
 
 MAX_PATH_DEPTH = 4  # greatest path depth at which an estimate may begin
@@ -364,7 +363,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def estimate_diffuse(
-        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: PathGuide | None = None
+        self, point: ShadingPoint, sampler: Any, path_depth: int = 1, guide: Any = None
     ) -> tuple[Any, Any]:
         """Estimate the radiance reflected by the diffuse lobe, divided by the albedo, with one path.
 
@@ -377,7 +376,7 @@ class LobeRenderer(Renderer, Protocol):
         path_depth
             Path segments from the camera to the surface, 1 to ``MAX_PATH_DEPTH``. They count where the scene
             limits the length of paths.
-        guide
+        guide : PathGuide or None
             Of the sampled direction.
 
         Returns
@@ -420,7 +419,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     def sample_diffuse(
-        self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: PathGuide | None = None
+        self, point: ShadingPoint, sampler: Any, *, soft_only: bool = False, guide: Any = None
     ) -> BsdfSample:
         """Sample a direction of the diffuse lobe, divided by the albedo.
 
@@ -430,7 +429,7 @@ class LobeRenderer(Renderer, Protocol):
         sampler : PaddedSobolSampler
         soft_only
             Without next-event estimation of emitters that cast sharp shadows: :meth:`sharp_light`.
-        guide
+        guide : PathGuide or None
             The direction is sampled from its mixture. The density that the bounce keeps for multiple
             importance sampling is that of the lobe, as without a guide.
         """

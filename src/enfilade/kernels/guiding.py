@@ -159,7 +159,7 @@ class GuidedLobe:
 def _basis(axis: Any) -> tuple[Any, Any]:
     """Two vectors orthogonal to an axis and to each other (Duff et al. 2017)."""
     sign = dr.copysign(Float(1), axis.z)
-    a = -dr.rcp(sign + axis.z)
+    a = dr.rcp(-(sign + axis.z))
     b = axis.x * axis.y * a
-    tangent = Array3f(1.0 + sign * dr.square(axis.x) * a, sign * b, -sign * axis.x)
+    tangent = Array3f(1.0 + sign * dr.square(axis.x) * a, sign * b, -(sign * axis.x))
     return tangent, Array3f(b, sign + dr.square(axis.y) * a, -axis.y)

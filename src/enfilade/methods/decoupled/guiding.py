@@ -100,7 +100,7 @@ def find_regions(
         Followed by the background; empty if no guide is of use.
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
-    if not len(pixels) or not len(lit.flux):
+    if not len(pixels) or len(lit.flux) < MIN_POINTS:
         return []
 
     # Take pixels at equal distances in the image.
@@ -115,7 +115,7 @@ def find_regions(
         return probe(guide, spawn(rays, samplers(lane, lanes(path), random), spread=0.0))
 
     # Propose regions of several sizes, the largest first: small ones cover a part of what is bright.
-    corner, extent = lit.position.min(axis=0), float(np.ptp(lit.position, axis=0).max())
+    corner, extent = lit.position.min(axis=0), max(float(np.ptp(lit.position, axis=0).max()), 1e-9)
     for halvings in HALVINGS:
         cells = 2**halvings + 1  # along each axis
         cell = ((lit.position - corner) * ((cells - 1) / extent)).astype(np.int64) @ (1, cells, cells**2)
@@ -193,4 +193,4 @@ def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[fl
     noise = moments.sum(axis=0) + dim**2 * rest / own
     spheres = zip(proposed, radiance.reshape(REGIONS, OCTANTS).tolist(), strict=False)
     regions = [[*sphere[:4], *of] for sphere, of in spheres if len(sphere) > 1]
-    return [*regions, [background]], float(noise.mean()) / max(float(plain.mean()), 1e-30)
+    return [*regions, [background]], float(noise.mean() / plain.mean()) if plain.any() else 1.0

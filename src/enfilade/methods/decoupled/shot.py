@@ -81,7 +81,7 @@ class ShotContext:
         size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
         self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
         self._disocclusions: dict[int, list[int]] | None = None
-        self._path_guides: LruCache[int, PathGuide] = LruCache(2)
+        self._path_guides: LruCache[int, PathGuide | None] = LruCache(2)
         self._blank: list[UploadedImage] = []
 
     def is_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> bool:
@@ -130,7 +130,7 @@ class ShotContext:
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
         )
 
-    def _path_guide(self, keyframe: int) -> PathGuide:
+    def _path_guide(self, keyframe: int) -> PathGuide | None:
         regions = self.inputs.facts("prepass", keyframe)["regions"]
         return self._path_guides.get(keyframe, lambda: upload_guide(regions))
 
