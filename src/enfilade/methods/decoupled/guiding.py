@@ -121,9 +121,12 @@ def find_regions(
         cell = ((lit.position - corner) * ((cells - 1) / extent)).astype(np.int64) @ (1, cells, cells**2)
         proposed = _proposed(lit, cell, position, normal)
         if guide := upload_guide(proposed):
-            _, noise = _measured(probed(guide, PATHS), proposed)
-            if noise < MAX_NOISE:
-                return _measured(probed(guide, MORE_PATHS), proposed)[0]
+            for paths in (PATHS, MORE_PATHS):
+                regions, noise = _measured(probed(guide, paths), proposed)
+                if noise > MAX_NOISE:
+                    break
+            else:
+                return regions
     return []
 
 
