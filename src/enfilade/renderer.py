@@ -226,15 +226,15 @@ class Emitters:
 
 
 @dataclass(frozen=True, eq=False)
-class LitPoints:
-    """Points where rays from emitters meet surfaces; not those from environments.
+class Photons:
+    """Points where paths from emitters, but for environments, meet the first surface (Jensen 1995).
 
     Attributes
     ----------
     position : (N, 3) float32
         World space.
     flux : (N,) float64
-        Luminous power that a ray carries, in units of the scene.
+        Luminance of the power that a photon carries, in units of the scene.
     """
 
     position: F32
@@ -330,7 +330,7 @@ class LobeRenderer(Renderer, Protocol):
         ...
 
     @property
-    def lit_points(self) -> LitPoints:
+    def photons(self) -> Photons:
         """The same points at each call: they suggest where bright surfaces are."""
         ...
 

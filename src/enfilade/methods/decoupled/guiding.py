@@ -17,14 +17,14 @@ from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.records import F32, Geometry
-from enfilade.renderer import LitPoints, LobeRenderer, RandomKey
+from enfilade.renderer import LobeRenderer, Photons, RandomKey
 
 F64 = npt.NDArray[np.float64]
 
 PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels, and paths of each
 MORE_PATHS = 32  # ... of each pixel that measure the regions of a guide that is used
-HALVINGS = range(3, 7)  # of the extent of the lit points: sizes of the cells that group them
-MIN_POINTS = 8  # in a cell
+HALVINGS = range(3, 7)  # of the extent of the photons: sizes of the voxels that group them
+MIN_PHOTONS = 8  # in a voxel
 WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
 OUTLIER = 16  # times the mean light: brighter paths are limited
 MAX_NOISE = 0.4  # of the second moment without a guide: one that reduces it by less is not used
@@ -76,18 +76,18 @@ def trace_probes(renderer: LobeRenderer, guide: PathGuide, path: Path) -> Probes
 
 
 def find_regions(
-    lit: LitPoints,
+    photons: Photons,
     probe: Callable[[PathGuide, Path], Probes],
     geometry: Geometry,
     random: RandomKey,
 ) -> list[list[float]]:
     """Find the regions of a guide from a keyframe.
 
-    Cells of lit points, of several sizes, are proposed, and the light from there is estimated.
+    Groups of photons in voxels of several sizes are proposed, and the light from there is estimated.
 
     Parameters
     ----------
-    lit
+    photons
     probe
         :func:`trace_probes` of a renderer, recorded.
     geometry
@@ -100,7 +100,7 @@ def find_regions(
         Followed by the background; empty if no guide is of use.
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
-    if not len(pixels) or len(lit.flux) < MIN_POINTS:
+    if not len(pixels) or len(photons.flux) < MIN_PHOTONS:
         return []
 
     # Take pixels at equal distances in the image.
@@ -115,11 +115,11 @@ def find_regions(
         return probe(guide, spawn(rays, samplers(lane, lanes(path), random), spread=0.0))
 
     # Propose regions of several sizes, the largest first: small ones cover a part of what is bright.
-    corner, extent = lit.position.min(axis=0), max(float(np.ptp(lit.position, axis=0).max()), 1e-9)
+    corner, extent = photons.position.min(axis=0), max(float(np.ptp(photons.position, axis=0).max()), 1e-9)
     for halvings in HALVINGS:
-        cells = 2**halvings + 1  # along each axis
-        cell = ((lit.position - corner) * ((cells - 1) / extent)).astype(np.int64) @ (1, cells, cells**2)
-        proposed = _proposed(lit, cell, position, normal)
+        count = 2**halvings + 1  # along each axis
+        voxel = ((photons.position - corner) * ((count - 1) / extent)).astype(np.int64) @ (1, count, count**2)
+        proposed = _proposed(photons, voxel, position, normal)
         if guide := upload_guide(proposed):
             for paths in (PATHS, MORE_PATHS):
                 regions, noise = _measured(probed(guide, paths), proposed)
@@ -142,14 +142,16 @@ def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:
     return guide
 
 
-def _proposed(lit: LitPoints, cell: npt.NDArray[np.int64], position: F32, normal: F32) -> list[list[float]]:
-    """Spheres around the cells that may contribute most to the second moment of the light on some points."""
-    # Describe the cells.
-    _, group, counts = np.unique(cell, return_inverse=True, return_counts=True)
-    flux = np.bincount(group, lit.flux)
-    mean = np.stack([np.bincount(group, lit.flux * axis) / flux for axis in lit.position.T], axis=1)
-    spread = np.bincount(group, lit.flux * np.square(lit.position - mean[group]).sum(axis=1)) / flux
-    chosen = (counts >= MIN_POINTS) & (spread > 0.0)
+def _proposed(
+    photons: Photons, voxel: npt.NDArray[np.int64], position: F32, normal: F32
+) -> list[list[float]]:
+    """Spheres around the groups that may contribute most to the second moment of the light on some points."""
+    # Describe the groups.
+    _, group, counts = np.unique(voxel, return_inverse=True, return_counts=True)
+    flux = np.bincount(group, photons.flux)
+    mean = np.stack([np.bincount(group, photons.flux * axis) / flux for axis in photons.position.T], axis=1)
+    spread = np.bincount(group, photons.flux * np.square(photons.position - mean[group]).sum(axis=1)) / flux
+    chosen = (counts >= MIN_PHOTONS) & (spread > 0.0)
     center, radius = mean[chosen], WIDTH * np.sqrt(spread[chosen])
     radiance = flux[chosen] / np.square(np.pi * radius)
 

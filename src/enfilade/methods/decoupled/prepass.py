@@ -26,7 +26,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
     where = geometry.has_diffuse
     regions = find_regions(
-        renderer.lit_points, shot.integrator.probe, geometry, walk.random(frame, Purpose.GUIDING)
+        renderer.photons, shot.integrator.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
     guide = upload_guide(regions)
     estimate = Estimate(

@@ -11,13 +11,13 @@ import numpy as np
 from enfilade.arrays import Array3f, rows
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.tone import REC709_LUMINANCE
-from enfilade.renderer import Emitters, LitPoints
+from enfilade.renderer import Emitters, Photons
 from enfilade.scene.mitsuba.merge import MergedScene
 from enfilade.scene.mitsuba.shapes import is_lamp
 
 MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
-EMITTED = 1 << 14  # rays from all emitters
+PHOTONS = 1 << 14  # from all emitters together
 
 
 def find_emitters(merged: MergedScene) -> Emitters:
@@ -34,13 +34,13 @@ def find_emitters(merged: MergedScene) -> Emitters:
     )
 
 
-def find_lit_points(scene: Any) -> LitPoints:
-    """Follow rays from all emitters but environments to the next surface that is not a lamp's own."""
-    sampler = one_sequence(EMITTED)
+def trace_photons(scene: Any) -> Photons:
+    """Follow rays from all emitters but environments to the next surface."""
+    sampler = one_sequence(PHOTONS)
     points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
     ray, weight, emitter = scene.sample_emitter_ray(0.0, sampler.next_1d(), *points, True)
     si = scene.ray_intersect(ray)
     flux = np.array(dr.dot(Array3f(weight), Array3f(*REC709_LUMINANCE)), np.float64)
     is_local = np.array(si.is_valid() & ~mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite))
-    is_lit = is_local & np.isfinite(flux) & (flux > 0.0)
-    return LitPoints(rows(Array3f(si.p))[is_lit], flux[is_lit])
+    is_kept = is_local & np.isfinite(flux) & (flux > 0.0)
+    return Photons(rows(Array3f(si.p))[is_kept], flux[is_kept])

@@ -27,7 +27,7 @@ from enfilade.renderer import (
     Bounce,
     BsdfSample,
     Emitters,
-    LitPoints,
+    Photons,
     PixelFilter,
     RandomKey,
     Rays,
@@ -35,7 +35,7 @@ from enfilade.renderer import (
     ShadingPoint,
     Surfaces,
 )
-from enfilade.scene.mitsuba.emitters import find_emitters, find_lit_points
+from enfilade.scene.mitsuba.emitters import find_emitters, trace_photons
 from enfilade.scene.mitsuba.integrators import (
     is_volumetric,
     scene_integrator,
@@ -139,9 +139,9 @@ class MitsubaRenderer:
         return find_emitters(self._merged)
 
     @cached_property
-    def lit_points(self) -> LitPoints:
-        """See :attr:`enfilade.renderer.LobeRenderer.lit_points`."""
-        return find_lit_points(self._scene)
+    def photons(self) -> Photons:
+        """See :attr:`enfilade.renderer.LobeRenderer.photons`."""
+        return trace_photons(self._scene)
 
     @property
     def has_sharp_light(self) -> bool:
