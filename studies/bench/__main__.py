@@ -36,6 +36,7 @@ from studies.bench.tables import ratio_text
 HERE = Path(__file__).resolve().parent
 FRAMES, LARGE_FRAMES = 16, 8
 REFERENCE_SPP, LARGE_REFERENCE_SPP = "512", "128"  # a window of a large image has 13 times as many pixels
+SEEDS = "3"  # of enfilade's configurations; one of large images and of the quick bench
 
 
 def main() -> int:
@@ -73,12 +74,13 @@ def main() -> int:
         except EnfiladeError as error:
             parser.error(str(error))
         frames = arguments.frames or (LARGE_FRAMES if is_large else FRAMES)
-        spp = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
+        defaults = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
+        defaults += ["--seeds", "1" if is_large or arguments.quick else SEEDS]
         is_chosen = any(option.startswith("--only") for option in options)
         only = () if is_chosen else only_for(size, is_quick=arguments.quick)
         for case in cases:
             try:
-                benches.append(run_case(case, size, frames, only, arguments.out, [*spp, *options]))
+                benches.append(run_case(case, size, frames, only, arguments.out, [*defaults, *options]))
             except EnfiladeError as error:
                 failed.append(str(error))
     if benches:

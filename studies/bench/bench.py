@@ -3,7 +3,7 @@
 ::
 
     windows.json                 where it measures; drawn before any configuration is rendered
-    configurations/NAME/         run folders of the configurations
+    configurations/NAME/         run folders of the configurations; further seeds in NAME-seed-SEED
     costs/NAME.json  scores/NAME.json
     bench.json  bench.png  crops.png
 
@@ -25,6 +25,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from enfilade.cli.progress import watch
 from enfilade.device import Choice, activate
 from enfilade.errors import EnfiladeError, InputError, SettingsError
@@ -40,7 +42,7 @@ from enfilade.runs.statistics import add_costs
 from enfilade.settings import MetricSettings, SampleFilter, ViewingSettings
 from studies.bench import colorvideovdp
 from studies.bench.baselines import why_missing
-from studies.bench.configurations import FAMILIES, Configuration
+from studies.bench.configurations import FAMILIES, Configuration, with_seeds
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import GAUSSIAN_OF_BOX, available, measure, windows_of_run
 from studies.bench.ratios import ratios
@@ -79,6 +81,7 @@ def bench(
     place: Place,
     *,
     reference_spp: int,
+    seeds: int = 1,
     measures: Sequence[str] = (),
     reference_device: Choice = "auto",
     quiet: bool = False,
@@ -99,6 +102,9 @@ def bench(
     reference_spp
         Least number of paths a pixel of the references, half of them in each of two independent halves. A
         store that has more is used as it is.
+    seeds
+        How often each configuration of enfilade's methods is rendered: with the seed of the job and the next
+        ones. Baselines are rendered once.
     measures
         Names; empty: all that are available.
     reference_device
@@ -132,7 +138,7 @@ def bench(
     prepared_s = time.monotonic() - started
     runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
     floor = runs.floor()
-    rows = [runs.row(one, floor) for one in chosen]
+    rows = [runs.row(one, 1 if one.is_baseline else seeds, floor) for one in chosen]
     found = {
         **origin(),
         "machine": machine(),
@@ -203,22 +209,37 @@ class _Bench:
         self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
         self._references, self._windows = references, windows
 
-    def row(self, one: Configuration, floor: dict[str, list[float]]) -> dict[str, Any]:
-        """Render and measure a configuration; return its row of the result."""
-        run = self._folder / "configurations" / one.name
-        self._render(one, run)
-        values = self._best(one, run)
+    def row(self, one: Configuration, seeds: int, floor: dict[str, list[float]]) -> dict[str, Any]:
+        """Render and measure a configuration with each of its seeds; return its row of the result."""
+        runs = [self._run(member) for member in with_seeds(one, seeds)]
+        values = {
+            name: np.mean([run["values"][name] for run in runs], axis=0).tolist() for name in self._names
+        }
         return {
             "name": one.name,
             "family": one.family,
             "spp": one.spp,
             "variant": one.variant,
             "pixel_filter": one.pixel_filter.value,
-            "cost": self._cost(one, run),
-            "origin": read_json(self._folder / "costs" / f"{one.name}.json")["origin"],
+            "cost": mean_cost([run["cost"] for run in runs]),
+            "origin": runs[0]["origin"],
             "scores": {name: QUALITIES[name].score(values[name]) for name in self._names},
             "values": values,
+            "seeds": [
+                {"seed": run["seed"], "cpu_s": run["cost"]["cpu_s"], "values": run["values"]} for run in runs
+            ],
             "undecided": undecided(values, floor),
+        }
+
+    def _run(self, one: Configuration) -> dict[str, Any]:
+        """Render and measure a configuration with its own seed."""
+        folder = self._folder / "configurations" / one.name
+        self._render(one, folder)
+        return {
+            "seed": one.seed,
+            "values": self._best(one, folder),
+            "cost": self._cost(one, folder),
+            "origin": read_json(self._folder / "costs" / f"{one.name}.json")["origin"],
         }
 
     def floor(self) -> dict[str, list[float]]:
@@ -298,6 +319,18 @@ class _Bench:
         start = read_json(self._folder / "costs" / f"{one.name}.json")["cost"]
         total["cpu_s"] += start["start_cpu_s"]
         return {**total, **start, "stages": charged}
+
+
+def mean_cost(costs: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means of the costs of several runs, also by stage; the largest peak memory and number of kernels."""
+    found: dict[str, Any] = {}
+    for name, first in costs[0].items():
+        of = [cost[name] for cost in costs]
+        if isinstance(first, dict):
+            found[name] = mean_cost(of)
+        else:
+            found[name] = max(of) if name in ("peak_mib", "kernels") else sum(of) / len(of)
+    return found
 
 
 def undecided(values: Mapping[str, Sequence[float]], floors: Mapping[str, Sequence[float]]) -> list[str]:

@@ -53,6 +53,13 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     help="Paths a pixel of the references, in two halves.",
 )
 @click.option(
+    "--seeds",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    help="How often enfilade's configurations are rendered, each time with another seed.",
+)
+@click.option(
     "--references",
     "store",
     type=click.Path(path_type=Path, file_okay=False),

@@ -9,7 +9,14 @@ from typing import Any
 
 from enfilade.errors import SettingsError
 from enfilade.runs.job import Job
-from enfilade.settings import OutputSettings, ReferenceSettings, SampleFilter, SamplingSettings, Settings
+from enfilade.settings import (
+    OutputSettings,
+    ReferenceSettings,
+    SampleFilter,
+    SamplingSettings,
+    Settings,
+    TraceSettings,
+)
 from studies.bench.baselines import VARIANTS, DenoiserSettings
 
 FAMILIES = {  # in the order of tables: title
@@ -76,6 +83,11 @@ class Configuration:
         return self.job.settings[SamplingSettings].spp
 
     @property
+    def seed(self) -> int:
+        """Seed of its random numbers."""
+        return self.job.settings[TraceSettings].seed
+
+    @property
     def expected_spp(self) -> int:
         """Rough number of paths a pixel, for forecasts: methods that reuse light trace about eight."""
         return self.spp if self.family in ("traced", "denoised") else EXPECTED_SPP
@@ -97,6 +109,22 @@ def all_configurations(job: Job, *, traced: Iterable[int], denoised: Iterable[in
         preset = replace(job, method=method, settings=_overridden(job.settings, tables))
         found.append(Configuration(name, method, preset))
     return found
+
+
+def with_seeds(one: Configuration, count: int) -> list[Configuration]:
+    """A configuration, and copies with the next seeds, whose names end with ``-seed-SEED``."""
+    others = range(one.seed + 1, one.seed + count)
+    return [
+        one,
+        *(
+            replace(
+                one,
+                name=f"{one.name}-seed-{seed}",
+                job=replace(one.job, settings=one.job.settings.replace(TraceSettings, seed=seed)),
+            )
+            for seed in others
+        ),
+    ]
 
 
 def selected(configurations: Sequence[Configuration], patterns: Sequence[str]) -> list[Configuration]:

@@ -38,7 +38,8 @@ class Ratio:
         ``at least``: it is better than every baseline; the best one is compared, which would need more time.
         ``at most``: it is no better than the cheapest baseline, which is compared.
     low, high : float
-        Bootstrap interval of 90 % over the windows. It does not contain the spread of CPU times.
+        Bootstrap interval of 90 % over the windows, and over the seeds of the configuration where it was
+        rendered with several: of its errors and CPU times. That of the baselines' CPU times is not in it.
     is_decided : bool
         Whether the score is apart from the noise floor of the references.
     """
@@ -76,10 +77,33 @@ def ratio(one: Mapping[str, Any], baselines: Sequence[Mapping[str, Any]], measur
     for _ in range(DRAWS):
         chosen = random.integers(windows, size=windows).tolist()
         points = [_point(baseline, measure, chosen) for baseline in baselines]
-        drawn.append(cost_at(points, _point(one, measure, chosen).error)[0] / one["cost"]["cpu_s"])
+        ours = _with_drawn_seeds(one, measure, chosen, random)
+        drawn.append(cost_at(points, ours.error)[0] / ours.cpu_s)
     low, high = np.percentile(drawn, INTERVAL).tolist()
     is_decided = measure not in one["undecided"]
     return Ratio(cost / one["cost"]["cpu_s"], kind, low, high, is_decided)
+
+
+def _with_drawn_seeds(
+    one: Mapping[str, Any], measure: str, windows: Sequence[int], random: np.random.Generator
+) -> Point:
+    """A configuration in some windows, whose logarithms deviate as those of a resample of its seeds.
+
+    The deviation is increased by sqrt(n / (n - 1)), as resamples of n values vary too little by that factor.
+    """
+    point, count = _point(one, measure, windows), len(one["seeds"])
+    if count == 1:
+        return point
+    quality = QUALITIES[measure]
+    logs = np.log(
+        [
+            (run["cpu_s"], quality.error([run["values"][measure][window] for window in windows]))
+            for run in one["seeds"]
+        ]
+    )
+    resample = logs[random.integers(count, size=count)].mean(axis=0)
+    cpu, error = np.exp((resample - logs.mean(axis=0)) * math.sqrt(count / (count - 1)))
+    return Point(point.cpu_s * cpu, point.error * error)
 
 
 def _point(row: Mapping[str, Any], measure: str, windows: Sequence[int] | None = None) -> Point:

@@ -21,7 +21,7 @@ from enfilade.settings import (
 )
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
-from studies.bench.bench import Place, bench, undecided
+from studies.bench.bench import Place, bench, mean_cost, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
@@ -31,6 +31,7 @@ from support.study_runs import room_files, room_job
 
 MEASURES = ("aqm", "psnr", "flicker")
 NAMES = ["traced-1", "traced-4", *([] if why_no_denoiser() else ["denoised-2"])]
+SEEDED = "paper-16"
 
 
 def frames_of(run):
@@ -44,7 +45,8 @@ def line(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
     flags += ("--set", "masks.slow_deg_s=0.4")  # of a section that some configurations read
-    only = [word for name in NAMES for word in ("--only", name)]
+    flags += ("--seeds", 2)
+    only = [word for name in (*NAMES, SEEDED) for word in ("--only", name)]
     measures = [word for name in MEASURES for word in ("--measure", name)]
     words = ("bench", *room_files(folder, 4), *flags, *only, *measures, "--references", folder / "references")
     words += ("--out", folder / "bench")
@@ -60,8 +62,9 @@ def held(line):
 
 def test_every_configuration_is_rendered_charged_and_measured(held):
     found, folder = held
-    assert [row["name"] for row in found["configurations"]] == NAMES
-    for row in found["configurations"]:
+    assert [row["name"] for row in found["configurations"]] == [*NAMES, SEEDED]
+    for row in found["configurations"][:-1]:
+        assert [run["seed"] for run in row["seeds"]] == [0]
         cost = row["cost"]
         assert set(cost["stages"]) == {"frames", "trace", "files"}
         assert cost["start_cpu_s"] > 0.1  # at least Mitsuba's import
@@ -81,6 +84,33 @@ def test_every_configuration_is_rendered_charged_and_measured(held):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     text = "".join(as_text(table) for table in bench_tables(found))
     assert all(name in text for name in (*NAMES, "noise floor"))
+
+
+def test_methods_of_enfilade_are_rendered_with_several_seeds(held):
+    """Their values and costs are the means; baselines have one seed (above)."""
+    found, folder = held
+    row = found["configurations"][-1]
+    first, second = row["seeds"]
+    assert (first["seed"], second["seed"]) == (0, 1)
+    images = [frames_of(folder / "configurations" / name) for name in (SEEDED, f"{SEEDED}-seed-1")]
+    assert not np.array_equal(*images)
+    for name in MEASURES:
+        pairs = zip(first["values"][name], second["values"][name], strict=True)
+        assert row["values"][name] == pytest.approx([(a + b) / 2.0 for a, b in pairs])
+        assert first["values"][name] != second["values"][name]
+    assert row["cost"]["cpu_s"] == pytest.approx((first["cpu_s"] + second["cpu_s"]) / 2.0)
+    assert first["cpu_s"] != second["cpu_s"]
+    assert row["cost"]["cpu_s"] == pytest.approx(
+        sum(stage["cpu_s"] for stage in row["cost"]["stages"].values()) + row["cost"]["start_cpu_s"]
+    )
+
+
+def test_means_of_costs():
+    one = {"cpu_s": 2.0, "peak_mib": 5.0, "kernels": 0, "stages": {"trace": {"cpu_s": 1.0, "wall_s": 1.0}}}
+    two = {"cpu_s": 4.0, "peak_mib": 3.0, "kernels": 2, "stages": {"trace": {"cpu_s": 2.0, "wall_s": 1.5}}}
+    assert mean_cost([one, two]) == {
+        "cpu_s": 3.0, "peak_mib": 5.0, "kernels": 2, "stages": {"trace": {"cpu_s": 1.5, "wall_s": 1.25}},
+    }  # fmt: skip
 
 
 def test_more_paths_score_better_and_scores_near_the_noise_floor_are_undecided(held):

@@ -24,12 +24,14 @@ def test_between_points_both_axes_are_logarithmic():
     assert cost_at(BASELINES, 0.05) == (160.0, "at least")
 
 
-def row(name, family, cpu_s, flip, undecided=()):
+def row(name, family, cpu_s, flip, undecided=(), seeds=()):
+    """A configuration; `seeds` are pairs of CPU seconds and values."""
     return {
         "name": name,
         "family": family,
         "cost": {"cpu_s": cpu_s},
         "values": {"flip": flip},
+        "seeds": [{"cpu_s": cpu, "values": {"flip": of}} for cpu, of in seeds or [(cpu_s, flip)]],
         "undecided": undecided,
     }
 
@@ -67,6 +69,22 @@ def test_windows_that_agree_have_no_interval_and_others_enclose_the_ratio():
     assert mixed["times"] == pytest.approx(same["times"])
     assert ratios(baselines(), ["flip"]) == {}
     assert ratios([row("a", "decoupled", 5.0, [0.3])], ["flip"]) == {}
+
+
+def test_intervals_contain_seeds():
+    """With windows that agree, two seeds are left: both as drawn or the mean, deviating by sqrt(2)."""
+    seeds = [(4.0, [0.2, 0.2]), (6.0, [0.2, 0.2])]
+    one = row("a", "decoupled", 5.0, [0.2, 0.2], seeds=seeds)
+    found = ratios([*baselines(), one], ["flip"])["a"]["flip"]
+    assert found["times"] == pytest.approx(8.0)
+    reach = 1.5 ** (0.5 * math.sqrt(2.0))  # each seed is sqrt(1.5) from their geometric mean
+    assert (found["low"], found["high"]) == (pytest.approx(8.0 / reach), pytest.approx(8.0 * reach))
+    seeds = [(5.0, [0.25, 0.25]), (5.0, [0.35, 0.35])]
+    one = row("a", "decoupled", 5.0, [0.3, 0.3], seeds=seeds)
+    found = ratios([*baselines(), one], ["flip"])["a"]["flip"]
+    reach = (0.35 / 0.25) ** math.sqrt(2.0)  # cost falls with the square of the error; two seeds, sqrt(2)
+    middle = found["times"]
+    assert (found["low"], found["high"]) == (pytest.approx(middle / reach), pytest.approx(middle * reach))
 
 
 def test_errors_of_scores():
