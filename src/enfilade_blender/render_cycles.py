@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import bpy
@@ -42,24 +41,9 @@ def render_frames(job: Job) -> dict[str, Any]:
     for layer in scene.view_layers:
         layer.use = layer == selection.view_layer
     frames = job.frame_list or (selection.frames[0],)
-    seconds = []
     for number, frame in enumerate(frames):
         report_progress(number / len(frames), f"frame {frame}")
         scene.frame_set(frame)
         render.filepath = str(job.out / f"cycles-{frame:04d}.exr")
-        start = time.perf_counter(), time.process_time()
         bpy.ops.render.render(write_still=True, scene=scene.name)
-        seconds.append(
-            {
-                "frame": frame,
-                "wall_s": time.perf_counter() - start[0],
-                "cpu_s": time.process_time() - start[1],
-            }
-        )
-    return {
-        "format": "enfilade-cycles",
-        "version": 1,
-        "blender": bpy.app.version_string,
-        "spp": job.spp,
-        "frames": seconds,
-    }
+    return {"spp": job.spp, "frames": list(frames)}

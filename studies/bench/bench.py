@@ -164,10 +164,11 @@ def bench(
     return found
 
 
-def forecast_s(job: Job, configurations: Sequence[Configuration], cores: int) -> float:
+def forecast_s(job: Job, configurations: Sequence[Configuration], seeds: int, cores: int) -> float:
     """Rough duration of the configurations of a bench on CPUs, wall seconds, from the number of paths."""
     pixels = job.path.width * job.path.height * len(job.path)
-    return pixels * sum(c.expected_spp for c in configurations) / PATHS_PER_CPU_S / cores
+    spp = sum(c.expected_spp * (1 if c.is_baseline else seeds) for c in configurations)
+    return pixels * spp / PATHS_PER_CPU_S / cores
 
 
 def _prepare(job: Job, place: Place, spp: int, *, quiet: bool) -> list[Window]:

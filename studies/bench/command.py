@@ -126,7 +126,7 @@ def command(
     job = _job(ctx, scene, **path)
     configurations = selected(all_configurations(job, traced=traced, denoised=denoised), only)
     if not inputs["quiet"]:
-        minutes = forecast_s(job, configurations, len(os.sched_getaffinity(0))) / 60.0
+        minutes = forecast_s(job, configurations, inputs["seeds"], len(os.sched_getaffinity(0))) / 60.0
         count = f"{len(configurations)} configurations"
         click.echo(f"{count}, about {minutes:.0f} minutes once the references are there", err=True)
     found = bench(job, configurations, Place(folder, store), **inputs)

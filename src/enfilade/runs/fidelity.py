@@ -165,7 +165,7 @@ def _cycles(
     """Frames by Cycles, in the order of the job."""
     with scratch_folder("enfilade-cycles") as folder:
         run_job(blender, {**job, "out": str(folder), "seed": seed, "unbiased": True}, limits, monitor)
-        listed = [line["frame"] for line in read_json(folder / CYCLES_FILE)["frames"]]
+        listed = read_json(folder / CYCLES_FILE)["frames"]
         images = [read_exr(folder / f"cycles-{number:04d}.exr").get("RGB") for number in listed]
     found = [image.astype(np.float32) for image in images if image is not None]
     if listed != job["frame_list"] or len(found) != len(listed):

@@ -13,12 +13,12 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.comparison.measures.colorvideovdp import BLACK_LEAST_CD_M2
 from enfilade.errors import EnfiladeError
 from enfilade.viewing import Viewing
 
 HERE = Path(__file__).resolve().parent
 ENVIRONMENT = HERE.parents[2] / ".venv-judge"
-LEAST_BLACK_CD_M2 = 1e-3  # ColorVideoVDP takes a contrast, which must be finite
 
 Image: TypeAlias = npt.NDArray[np.float16]
 Pair: TypeAlias = tuple[Image, Image]
@@ -68,7 +68,7 @@ def predict_jod(sequences: Sequence[Sequence[Pair]], viewing: Viewing) -> list[f
             fps=viewing.fps,
             ppd=viewing.pixels_per_degree,
             peak_cd_m2=viewing.peak_cd_m2,
-            contrast=viewing.peak_cd_m2 / max(viewing.black_cd_m2, LEAST_BLACK_CD_M2),
+            contrast=viewing.peak_cd_m2 / max(viewing.black_cd_m2, BLACK_LEAST_CD_M2),
         )
         command = [
             str(ENVIRONMENT / "bin" / "python"),
