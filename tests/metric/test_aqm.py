@@ -181,7 +181,8 @@ def test_wrong_arrays_are_refused_by_name(paper, textured, name, array, word):
 
 
 def test_wrong_settings_are_refused_by_name(viewing):
-    with pytest.raises(InputError, match="mask_slope"):
-        Aqm.paper(viewing, mask_slope=1.5)
+    for metric in (Aqm.paper, HalvesAqm):
+        with pytest.raises(InputError, match="mask_slope"):
+            metric(viewing, mask_slope=1.5)
     with pytest.raises(InputError, match="workers"):
         HalvesAqm(viewing, workers=0)

@@ -76,7 +76,10 @@ def test_masked_pixels_do_not_count(aqm, textured):
     valid = np.ones(textured.shape, bool)
     valid[30:90, 40:110] = False
     one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
-    assert aqm.compare(other, one, valid=valid).jnd.max() == 0.0
+    found = aqm.compare(other, one, valid=valid)
+    assert found.jnd.max() == 0.0
+    held, valid[:] = valid.copy(), False
+    np.testing.assert_array_equal(found.valid, held)  # the metric keeps its own copy
 
 
 def test_a_uniform_difference_stands_still_wherever_the_image_moves(aqm):

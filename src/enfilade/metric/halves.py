@@ -12,7 +12,6 @@ Of images without noise this is the published metric with energies integrated ov
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +24,10 @@ from enfilade.metric.cortex import Band
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import check_pair, fill_undefined
-from enfilade.metric.masking import MASK_SLOPE, threshold_elevation
-from enfilade.metric.paper import Adaptation, adapt
+from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elevation
+from enfilade.metric.paper import adapt
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
-from enfilade.metric.pyramid import Pyramid
-from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable, coarse_velocity
+from enfilade.metric.sensitivity import SensitivityTable, coarse_velocity
 from enfilade.records import F32, Mask
 from enfilade.viewing import Viewing
 
@@ -58,6 +56,7 @@ class HalvesAqm:
     """
 
     def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE, workers: int = 1) -> None:
+        check_mask_slope(mask_slope)
         self.viewing = viewing
         self._mask_slope = mask_slope
         self._bank = ChannelBank(viewing, workers=workers)
@@ -92,7 +91,7 @@ class HalvesAqm:
         InputError
             As `Aqm.compare`.
         """
-        is_valid = np.ones(self._bank.image_shape, np.bool_) if valid is None else valid
+        is_valid = np.ones(self._bank.image_shape, np.bool_) if valid is None else valid.copy()
         filled = []
         for one, other in ((test.first, reference.first), (test.second, reference.second)):
             check_pair(self._bank.image_shape, one, other, velocity, valid)
@@ -104,7 +103,7 @@ class HalvesAqm:
         images = [adaptation.respond(one) for one in (reference_a, reference_b, test_a, test_b)]
         spectra = self._bank.spectra(*images[:2], images[2] - images[0], images[3] - images[1])
         moving = None if velocity is None else coarse_velocity(velocity, is_valid)
-        sensitivity = self._sensitivity(adaptation, moving, pursuit.hypotheses)
+        sensitivity = adaptation.sensitivity(self._table, is_valid.shape, moving, pursuit.hypotheses)
 
         # Integrate what the halves share, and mask it.
         pool = Pool(len(self._bank.bands), is_valid, POOLING_EXPONENT)
@@ -123,18 +122,6 @@ class HalvesAqm:
                 energy /= np.square(threshold_elevation(np.sqrt(np.minimum(*maskers)), self._mask_slope))
                 pool.add(band.level, raised(energy), self._aperture.reduction)
         return pool.comparison()
-
-    def _sensitivity(
-        self, adaptation: Adaptation, velocity: F32 | None, eyes: Sequence[Pursuit]
-    ) -> ChannelSensitivity:
-        return ChannelSensitivity(
-            self._table,
-            self._bank.image_shape,
-            adapting=Pyramid(np.asarray(adaptation.luminance_cd_m2, dtype=np.float32)),
-            contrast=Pyramid(np.asarray(adaptation.contrast, dtype=np.float32)),
-            velocity=velocity,
-            eyes=eyes,
-        )
 
     def _integrated(self, product: F32, area: F32 | None, band: Band) -> F32:
         """Energy under the aperture, 0 or more."""

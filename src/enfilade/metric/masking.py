@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from enfilade.errors import InputError
 from enfilade.records import F32
 
 MASK_SLOPE = 0.7  # s, no unit; Daly 1993 for low frequencies and coherent masks
@@ -14,6 +15,12 @@ K2 = BEND ** (1.0 / (1.0 - LEARNING))
 K1 = BEND ** (1.0 - 1.0 / (1.0 - LEARNING))
 
 DARKEST_MASKER = 1e-20  # keeps the logarithm finite; elevates no threshold
+
+
+def check_mask_slope(mask_slope: float) -> None:
+    """Raise InputError unless a slope of masking is from 0 to 1."""
+    if not 0.0 <= mask_slope <= 1.0:
+        raise InputError(f"metric: mask_slope is {mask_slope!r}; give a number from 0 to 1")
 
 
 def threshold_elevation(masker_jnd: F32, mask_slope: float = MASK_SLOPE) -> F32:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from enfilade.errors import InputError
 from enfilade.metric.adaptation import DARKEST_CD_M2
 from enfilade.metric.amplitude import contrast_gain, response
 from enfilade.metric.channels import ChannelBank
@@ -15,7 +14,7 @@ from enfilade.metric.comparison import Comparison
 from enfilade.metric.csf import spatiovelocity_sensitivity
 from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import Pair
-from enfilade.metric.masking import MASK_SLOPE, threshold_elevation
+from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elevation
 from enfilade.metric.noise import response_variance
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.pyramid import Pyramid
@@ -44,8 +43,7 @@ class PaperMetric:
     has_transient = False
 
     def __init__(self, viewing: Viewing, *, mask_slope: float = MASK_SLOPE) -> None:
-        if not 0.0 <= mask_slope <= 1.0:
-            raise InputError(f"metric: mask_slope is {mask_slope!r}; give a number from 0 to 1")
+        check_mask_slope(mask_slope)
         self.viewing = viewing
         self._mask_slope = mask_slope
         self._bank = ChannelBank(viewing)
@@ -64,14 +62,7 @@ class PaperMetric:
             luminance = np.float32(0.5) * (pair.test + pair.reference)
             variance = response_variance(luminance, pair.noise_variance)
             noise = self._bank.noise(variance, pair.noise_blur_px)
-        sensitivity = ChannelSensitivity(
-            self._table,
-            pair.valid.shape,
-            adapting=Pyramid(np.asarray(adaptation.luminance_cd_m2, dtype=np.float32)),
-            contrast=Pyramid(np.asarray(adaptation.contrast, dtype=np.float32)),
-            velocity=pair.velocity,
-            eyes=eyes,
-        )
+        sensitivity = adaptation.sensitivity(self._table, pair.valid.shape, pair.velocity, eyes)
         pool = Pool(len(self.bands), pair.valid, POOLING_EXPONENT)
         for band in self.bands:
             channels = self._bank.channels(spectra, band, pair.valid, noise)
@@ -109,6 +100,23 @@ class Adaptation:
     def respond(self, luminance_cd_m2: F32) -> F32:
         """Response to an image, less the mean."""
         return response(luminance_cd_m2) - np.float32(self.mean_response)
+
+    def sensitivity(
+        self,
+        table: SensitivityTable,
+        shape: tuple[int, int],
+        velocity: F32 | None,
+        eyes: Sequence[Pursuit],
+    ) -> ChannelSensitivity:
+        """Sensitivity to responses of channels; the arguments are those of `ChannelSensitivity`."""
+        return ChannelSensitivity(
+            table,
+            shape,
+            adapting=Pyramid(np.asarray(self.luminance_cd_m2, dtype=np.float32)),
+            contrast=Pyramid(np.asarray(self.contrast, dtype=np.float32)),
+            velocity=velocity,
+            eyes=eyes,
+        )
 
 
 def adapt(reference_cd_m2: F32, valid: Mask) -> Adaptation:

@@ -42,7 +42,7 @@ def opened_room(folder, *shapes, sky="", **settings):
 
 def regions_in(renderer):
     geometry = find_geometry(renderer, camera())
-    probe = Integrator(renderer).probe
+    probe = Integrator(renderer).kernels.probe
     return find_regions(renderer.photons, probe, geometry, RandomKey(0, 0, Purpose.GUIDING))
 
 

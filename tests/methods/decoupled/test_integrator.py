@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
-from enfilade.arrays import lanes
+from enfilade.arrays import UInt, lanes, rows
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry, positions
 from enfilade.images import write_exr
+from enfilade.kernels.random import one_sequence
+from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
+from enfilade.methods.decoupled.paths import compact, spawn
 from support.integrated import (
     EMPTY,
     LUMINANCE,
@@ -19,7 +23,15 @@ from support.integrated import (
     standard_errors,
     traced,
 )
-from support.material_scene import MATERIALS, front_camera, opened_scene, traced_irradiance
+from support.material_scene import (
+    MATERIALS,
+    PIXEL_ANGLE,
+    front_camera,
+    integrator_of,
+    opened_scene,
+    pixels_of,
+    traced_irradiance,
+)
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +151,34 @@ def test_final_gathering_without_a_cache_at_any_number_of_pixels(diffuse):
     renderer, _ = diffuse
     few, many = (gathered(renderer, EMPTY, front_camera(), 4, pixels=count)[1] for count in (500, 900))
     np.testing.assert_array_equal(few.color, many.color[:500])
+
+
+def test_a_hash_grid_without_images_gives_its_light(diffuse):
+    renderer, _ = diffuse
+    parts = []
+    camera = front_camera()
+
+    def radiance(rays, sampler):
+        integrator = integrator_of(renderer)
+        return integrator.final_gather(EMPTY, rays, sampler, parts.append, pixel_angle=PIXEL_ANGLE)
+
+    estimated(radiance, camera, 64, layers=2)
+    grid = Entries.joined(parts).upload()
+    assert grid is not None
+    found, reference = (
+        gathered(renderer, cache, camera, 16)[1] for cache in (IrradianceCache(hash_grid=grid), EMPTY)
+    )
+    assert found.color.mean() == pytest.approx(reference.color.mean(), rel=0.05)
+
+
+def test_final_gathering_of_no_paths(diffuse):
+    renderer, _ = diffuse
+    pixels = pixels_of(front_camera())[:10]
+    path = spawn(
+        camera_rays(front_camera(), pixel_centres(front_camera(), lanes(pixels))), one_sequence(10), 0.0
+    )
+    found = integrator_of(renderer).final_gather_of(EMPTY, compact(path, UInt()), lambda _: None, 10)
+    assert [rows(layer).tolist() for layer in found.layers] == [[[0.0] * 3] * 10] * 2
 
 
 def test_metal_and_glass_have_no_diffuse_lobe(tmp_path):

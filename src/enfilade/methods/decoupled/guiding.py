@@ -183,6 +183,7 @@ def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[fl
     is_from = region < REGIONS
     np.add.at(found, side[region[is_from], lane[is_from]], light[is_from])
     seen = np.bincount(side.ravel(), share.ravel(), REGIONS * OCTANTS)
+    found[seen == 0.0] = 0.0  # of points inside of a region, from which no cone to it is sampled
     radiance = np.maximum(found, 0.0) / np.maximum(seen, 1e-12)
     background = max(float(light[~is_from].sum()) / len(used), 0.0)
 

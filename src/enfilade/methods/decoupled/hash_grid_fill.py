@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
@@ -15,7 +14,6 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import SHARP
 from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
 from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
 SEEN_SPP = 4  # camera rays of each pixel of the light camera
@@ -27,54 +25,51 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.light_geometry(frame)
-    chunk = walk.settings[LimitSettings].paths_in_flight
 
     # Gather at the surfaces that mirrors and panes show.
     virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     is_sharp = np.isin(geometry.surface, SHARP).ravel()
-    random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     with_virtual = replace(cache, hash_grid=virtual.upload())
     for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):
-        specular = Estimate(
+        specular = shot.estimate(  # the same random numbers for pixels that have none in common
+            frame,
             camera,
-            np.flatnonzero(pixels).astype(np.uint32),
+            pixels,
             lambda rays, sampler, known=known: shot.integrator.specular_radiance(
                 known, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
             ),
-            chunk=chunk,
+            Purpose.HASH_GRID,
             pixel_filter=PixelFilter.BOX,
-            random=random,
             layers=SPECULAR_AOVS,
         )
         specular.add(SPECULAR_SPP)
         paths, dropped = paths + specular.paths, dropped + specular.dropped
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
-    seen = Estimate(
+    seen = shot.estimate(
+        frame,
         camera,
-        np.arange(camera.width * camera.height, dtype=np.uint32),
+        np.ones(camera.width * camera.height, np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
             cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
         ),
-        chunk=chunk,
+        Purpose.SEEN_HASH_GRID,
         pixel_filter=PixelFilter.GAUSSIAN,
-        random=walk.random(frame, Purpose.SEEN_HASH_GRID),
+        layers=1,
     )
     seen.add(SEEN_SPP)
 
     # Gather at the diffuse pixels of the prepass image.
-    gathered = Estimate(
+    gathered = shot.estimate(
+        frame,
         geometry.camera,
-        np.flatnonzero(geometry.has_diffuse).astype(np.uint32),
+        geometry.has_diffuse,
         lambda rays, sampler: shot.integrator.final_gather(
             cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
         ),
-        chunk=chunk,
-        pixel_filter=PixelFilter.CENTRE,
-        random=walk.random(frame, Purpose.PREPASS_HASH_GRID),
-        layers=2,
+        Purpose.PREPASS_HASH_GRID,
     )
     gathered.add(GATHER_SPP)
 

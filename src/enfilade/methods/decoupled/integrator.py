@@ -16,10 +16,8 @@ import numpy as np
 
 from enfilade.arrays import Array3f, Float, UInt, opaque, rows
 from enfilade.kernels.estimate import Samples
-from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
-from enfilade.methods.decoupled.guiding import Probes
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.lookup import UploadedImage
@@ -87,7 +85,7 @@ class Integrator:
     """
 
     def __init__(self, renderer: LobeRenderer) -> None:
-        self._kernels = PathKernels(renderer)
+        self.kernels = PathKernels(renderer)
 
     def diffuse_radiance(
         self,
@@ -118,7 +116,7 @@ class Integrator:
         Samples
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
-        vertex = self._kernels.see(cache, spawn(rays, sampler, ENTRY_PX * pixel_angle))
+        vertex = self.kernels.see(cache, spawn(rays, sampler, ENTRY_PX * pixel_angle))
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
         for found, lane in self._missed_light(cache, deferred, on_miss):
@@ -183,7 +181,7 @@ class Integrator:
         Samples
         """
         path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
-        *found, is_missing = self._kernels.see_aovs(aovs, path)
+        *found, is_missing = self.kernels.see_aovs(aovs, path)
         missing = compact(path, dr.compress(is_missing))
         if not dr.width(missing.lane):
             return Samples(tuple(found))
@@ -237,7 +235,7 @@ class Integrator:
             sharp shadows; and by all other.
         """
         path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
-        direct, vertex = self._kernels.gather(cache, path, True)
+        direct, vertex = self.kernels.gather(cache, path, True)
         return self._gathered(cache, path, direct, vertex, on_miss)
 
     def final_gather_of(self, cache: IrradianceCache, path: Path, on_miss: OnMiss, count: int) -> Samples:
@@ -252,41 +250,24 @@ class Integrator:
         count
             Number of lanes.
         """
+        if not dr.width(path.lane):
+            return Samples((dr.zeros(Array3f, count), dr.zeros(Array3f, count)))
         lane, path = path.lane, replace(path, lane=dr.arange(UInt, dr.width(path.lane)))
         dr.eval(path)
-        direct, vertex = self._kernels.gather(cache, path, False)
+        direct, vertex = self.kernels.gather(cache, path, False)
         found = self._gathered(cache, path, direct, vertex, on_miss)
         layers = tuple(dr.zeros(Array3f, count) for _ in found.layers)
         for target, layer in zip(layers, found.layers, strict=True):
             scatter_add(target, layer, lane)
         return Samples(layers)
 
-    def probe(self, guide: PathGuide, path: Path) -> Probes:
-        """See :func:`trace_probes`."""
-        found: Probes = self._kernels.probe(guide, path)
-        return found
-
-    def entries_of(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
-        """Keys of the hash grid's entries at the next surfaces of paths, and their irradiance in the images.
-
-        Returns
-        -------
-        keys : tuple of UInt64
-            One a level.
-        irradiance : Array3f
-            Over pi; 0 where the images do not show the surface.
-        is_known, is_missing : Bool
-            Whether a surface is diffuse, and in the images of the cache, or not.
-        """
-        found: tuple[tuple[Any, ...], Any, Any, Any] = self._kernels.find_entries(cache, path)
-        return found
-
     def _gathered(
         self, cache: IrradianceCache, path: Path, direct: Any, vertex: Vertex, on_miss: OnMiss | None
     ) -> Samples:
         """Both layers of a final gather, whose paths have made a bounce."""
         light, deferred = Contributions(dr.width(path.lane)), _Deferred()
-        if cache.view:  # an empty cache leaves a literal zero, whose size a recorded kernel does not adapt
+        # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
+        if cache.view or cache.hash_grid:
             light.add_once(vertex.radiance, vertex.path.lane)
         deferred.add_missed(vertex)
         onward = replace(vertex.path, throughput=vertex.onward)
@@ -346,7 +327,7 @@ class Integrator:
         jitter = 0.0 if path.bounce else JITTER
 
         # Scatter, and add next-event estimates, emission and cached irradiance at the next vertex.
-        direct, is_split, is_end, vertex = self._kernels.extend(cache, path, opaque(transmitted_at))
+        direct, is_split, is_end, vertex = self.kernels.extend(cache, path, opaque(transmitted_at))
         add = light.add if path.bounce else light.add_once
         add(direct, path.lane)
         add(vertex.radiance, vertex.path.lane)
@@ -371,7 +352,7 @@ class Integrator:
         if deferred.ends:
             ends = joined(deferred.ends)
             dr.eval(ends)
-            light.add(self._kernels.terminate(ends), ends.lane)
+            light.add(self.kernels.terminate(ends), ends.lane)
 
     def _missed_light(
         self, cache: IrradianceCache, deferred: _Deferred, on_miss: OnMiss | None = None
@@ -396,7 +377,7 @@ class Integrator:
 
         # Query the cache.
         if cache.images or cache.hash_grid:
-            found, is_miss = self._kernels.query_further(
+            found, is_miss = self.kernels.query_further(
                 cache, missed.query, missed.path.sampler, missed.jitter
             )
             contributions.append((found, missed.path.lane))
@@ -405,7 +386,7 @@ class Integrator:
         missing: Any = dr.compress(is_miss)
         if dr.width(missing):
             unknown = compact(missed.path, missing)
-            weight, irradiance, keys = self._kernels.estimate(cache.path_guide, unknown)
+            weight, irradiance, keys = self.kernels.estimate(cache.path_guide, unknown)
             contributions.append((weight * irradiance, unknown.lane))
             if on_miss:
                 _report(on_miss, keys, irradiance, dr.width(missing))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from enfilade.camera.path import Segment
-from enfilade.kernels.estimate import Estimate
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
@@ -15,8 +12,7 @@ from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
 from enfilade.records import Mask
-from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings
+from enfilade.renderer import Purpose
 
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
@@ -39,14 +35,12 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     walk, cache = shot.walk, shot.final_gather_cache(frame)
     whole = walk.path.cameras[frame]
     camera, pixel_angle = irradiance_camera(whole), light_camera(whole).pixel_angle
-    estimate = Estimate(
+    estimate = shot.estimate(
+        frame,
         camera,
-        np.flatnonzero(where).astype(np.uint32),
+        where,
         lambda rays, sampler: shot.integrator.final_gather(cache, rays, sampler, pixel_angle=pixel_angle),
-        chunk=walk.settings[LimitSettings].paths_in_flight,
-        pixel_filter=PixelFilter.CENTRE,
-        random=walk.random(frame, Purpose.IRRADIANCE),
-        layers=2,
+        Purpose.IRRADIANCE,
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)

@@ -224,7 +224,17 @@ class PathKernels:
         return Array3f(sample.direct + emitted), vertex
 
     def _find_entries(self, cache: IrradianceCache, path: Path) -> tuple[tuple[Any, ...], Any, Any, Any]:
-        """Keys of the next surface in the hash grid; its irradiance in the images; if known, if missing."""
+        """Keys of the hash grid's entries at the next surfaces of paths, and their irradiance in the images.
+
+        Returns
+        -------
+        keys : tuple of UInt64
+            One a level.
+        irradiance : Array3f
+            Over pi; 0 where the images do not show the surface.
+        is_known, is_missing : Bool
+            Whether a surface is diffuse, and in the images of the cache, or not.
+        """
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index
         irradiance, is_known = cache.lookup(*at)

@@ -6,16 +6,13 @@ Heckbert 1992; Jensen 1996).
 
 from __future__ import annotations
 
-import numpy as np
-
-from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.estimate import Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
 from enfilade.methods.decoupled.guiding import find_regions, upload_guide
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.renderer import PixelFilter, Purpose
-from enfilade.settings import LimitSettings
+from enfilade.renderer import Purpose
 
 SPP = 2
 OUTLIER = 4096.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
@@ -26,21 +23,19 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
     where = geometry.has_diffuse
     regions = find_regions(
-        renderer.photons, shot.integrator.probe, geometry, walk.random(frame, Purpose.GUIDING)
+        renderer.photons, shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
     guide = upload_guide(regions)
-    estimate = Estimate(
+    estimate = shot.estimate(
+        frame,
         geometry.camera,
-        np.flatnonzero(where).astype(np.uint32),
+        where,
         lambda rays, sampler: Samples(
             renderer.estimate_diffuse(
                 renderer.intersect(rays, opaque_only=True), sampler, path_depth=2, guide=guide
             )
         ),
-        chunk=walk.settings[LimitSettings].paths_in_flight,
-        pixel_filter=PixelFilter.CENTRE,
-        random=walk.random(frame, Purpose.PREPASS),
-        layers=2,
+        Purpose.PREPASS,
     )
     estimate.add(SPP)
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)

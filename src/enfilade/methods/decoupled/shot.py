@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from enfilade.cache import LruCache
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.estimate import Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
@@ -28,8 +31,8 @@ from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry, Mask
-from enfilade.renderer import LobeRenderer
-from enfilade.settings import DecoupledSettings
+from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
+from enfilade.settings import DecoupledSettings, LimitSettings
 
 ACCUMULATED = 4  # keyframes to each side that are averaged with one
 PREPASS_IMAGES = 4  # nearest ones that are looked up
@@ -93,6 +96,28 @@ class ShotContext:
         """The renderer."""
         assert isinstance(self.walk.renderer, LobeRenderer)  # noqa: S101  (`Decoupled.needs_lobes`)
         return self.walk.renderer
+
+    def estimate(
+        self,
+        frame: int,
+        camera: Camera,
+        where: Mask,
+        radiance: Radiance,
+        purpose: Purpose,
+        *,
+        pixel_filter: PixelFilter = PixelFilter.CENTRE,
+        layers: int = 2,
+    ) -> Estimate:
+        """An estimate of the pixels of a mask, with the random numbers of a frame and purpose."""
+        return Estimate(
+            camera,
+            np.flatnonzero(where).astype(np.uint32),
+            radiance,
+            chunk=self.walk.settings[LimitSettings].paths_in_flight,
+            pixel_filter=pixel_filter,
+            random=self.walk.random(frame, purpose),
+            layers=layers,
+        )
 
     def prepass_cache(self, frame: int) -> IrradianceCache:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""

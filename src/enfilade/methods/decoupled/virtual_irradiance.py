@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import Estimate, Samples
+from enfilade.kernels.estimate import Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
@@ -24,8 +24,7 @@ from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
-from enfilade.renderer import PixelFilter, Purpose, Rays
-from enfilade.settings import LimitSettings
+from enfilade.renderer import Purpose, Rays
 
 SPP = 8  # final gather rays of a pixel
 
@@ -56,7 +55,7 @@ def _gather(
     shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
 ) -> tuple[list[Entries], int, int]:
     """Entries of a virtual image, one list a level, the number of paths, and of those not finite."""
-    cache, camera, walk = shot.prepass_cache(frame), virtual.camera, shot.walk
+    cache, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
         return shot.virtual_images.seen_along(spawn(rays, sampler, ENTRY_PX * camera.pixel_angle), choice)
@@ -68,7 +67,7 @@ def _gather(
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return [], 0, 0
-    keys, irradiance, is_known, is_missing = shot.integrator.entries_of(cache, path)
+    keys, irradiance, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
         return [], 0, 0
@@ -82,15 +81,9 @@ def _gather(
         path = seen_along(rays, sampler)
         return shot.integrator.final_gather_of(cache, path, on_miss, dr.width(sampler.seed))
 
-    estimate = Estimate(
-        camera,
-        pixels,
-        radiance,
-        chunk=walk.settings[LimitSettings].paths_in_flight,
-        pixel_filter=PixelFilter.CENTRE,
-        random=walk.random(frame, Purpose.VIRTUAL_IMAGES),
-        layers=2,
-    )
+    is_gathered = np.zeros(virtual.shape_index.shape, np.bool_)
+    is_gathered.flat[pixels] = True
+    estimate = shot.estimate(frame, camera, is_gathered, radiance, Purpose.VIRTUAL_IMAGES)
     estimate.add(SPP)
 
     # Denoise it together with what the prepass images show, whose pixels would be black among these; a
@@ -98,9 +91,8 @@ def _gather(
     direct, indirect = estimate.shadings
     gathered, times = direct.color + indirect.color, 1
     if (denoiser := shot.settings.denoiser) != "none":
-        is_gathered, is_shown = (np.zeros(virtual.shape_index.shape, np.bool_) for _ in range(2))
-        is_gathered.flat[pixels], is_shown.flat[known_pixels] = True, True
-        is_shown |= is_gathered
+        is_shown = is_gathered.copy()
+        is_shown.flat[known_pixels] = True
         variance = np.float32(NOISE_SHARE) * (direct.variance + indirect.variance)
         light = Shading(gathered, variance).to_image(is_gathered)
         light.color.reshape(-1, 3)[known_pixels] = known_irradiance
