@@ -22,10 +22,10 @@ FIRST_FRAME = 11  # where the path is long enough
 LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
     *(f"denoised-{name}" for name in ("8", "16", "32", "64", "128", "8-accumulated-after")),
-    "paper-16", "decoupled-60", "decoupled-15",
+    "paper-16", "decoupled-60", "decoupled-10",
 )  # fmt: skip
-LARGE = ("denoised-8", "denoised-32", "decoupled-60", "decoupled-15")
-QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-15")
+LARGE = ("denoised-8", "denoised-32", "decoupled-60", "decoupled-10")
+QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-10")
 DENOISED_SPP = "4,8,16,32,64,128"  # those that any of them names
 
 
