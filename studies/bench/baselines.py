@@ -9,7 +9,7 @@ import numpy as np
 
 from enfilade.methods.analysis import Analysis
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.denoise import denoise, denoiser_name, why_no_denoiser
+from enfilade.methods.denoise import denoise, denoiser_name
 from enfilade.methods.reference import Reference
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import F32, U8, Frame, Provenance
@@ -117,8 +117,3 @@ class Denoised(Method):
 
 def _traced_everywhere(color: F32) -> U8:
     return np.full(color.shape[:2], Provenance.KEYFRAME, np.uint8)
-
-
-def why_missing(family: str) -> str:
-    """Reason why a baseline is not available, and how to install it; empty if it is available."""
-    return why_no_denoiser() if family == "denoised" else ""

@@ -29,7 +29,7 @@ import numpy as np
 
 from enfilade.cli.progress import watch
 from enfilade.device import Choice, activate
-from enfilade.errors import EnfiladeError, InputError, SettingsError
+from enfilade.errors import EnfiladeError, InputError
 from enfilade.files import read_json, write_json
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.resource_limits import die_with
@@ -41,8 +41,7 @@ from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
 from enfilade.settings import MetricSettings, SampleFilter, ViewingSettings
 from studies.bench import colorvideovdp
-from studies.bench.baselines import why_missing
-from studies.bench.configurations import FAMILIES, Configuration, with_seeds
+from studies.bench.configurations import Configuration, with_seeds
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import GAUSSIAN_OF_BOX, available, measure, windows_of_run
 from studies.bench.ratios import ratios
@@ -122,23 +121,17 @@ def bench(
     InputError
         The scene, the settings, or a folder that holds another bench.
     SettingsError
-        A requested measure is not available, or no configuration can be rendered.
+        A requested measure is not available.
     """
     job.check()
     names, left_out = available(measures, job)
-    reasons = {family: why for family in FAMILIES if (why := why_missing(family))}
-    missing = reasons.keys() & {c.family for c in configurations}
-    left_out += [f"{FAMILIES[family]} is left out: {reasons[family]}" for family in sorted(missing)]
-    chosen = [c for c in configurations if c.family not in reasons]
-    if not chosen:
-        raise SettingsError(f"no configuration can be rendered: {'; '.join(left_out)}")
     started = time.monotonic()
     windows = _alone(reference_device, _prepare, job, place, reference_spp, quiet=quiet)
     references = References(place.store, job, windows)
     prepared_s = time.monotonic() - started
     runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
     floor = runs.floor()
-    rows = [runs.row(one, 1 if one.is_baseline else seeds, floor) for one in chosen]
+    rows = [runs.row(one, 1 if one.is_baseline else seeds, floor) for one in configurations]
     found = {
         **origin(),
         "machine": machine(),

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
-from enfilade.methods.denoise import why_no_denoiser
 from enfilade.settings import (
     DecoupledSettings,
     KeyframeSettings,
@@ -21,7 +20,7 @@ from enfilade.settings import (
 )
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
-from studies.bench.bench import Place, bench, mean_cost, undecided
+from studies.bench.bench import mean_cost, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
@@ -30,7 +29,7 @@ from support.console import as_text
 from support.study_runs import room_files, room_job
 
 MEASURES = ("aqm", "psnr", "flicker")
-NAMES = ["traced-1", "traced-4", *([] if why_no_denoiser() else ["denoised-2"])]
+NAMES = ["traced-1", "traced-4", "denoised-2"]
 SEEDED = "paper-16"
 
 
@@ -165,13 +164,8 @@ def test_an_unknown_configuration_is_refused(run, line):
     assert "no configuration is called 'best'; there are: traced-1" in result.stderr
 
 
-def test_missing_baselines_and_measures_are_reported(tmp_path, monkeypatch):
+def test_missing_measures_are_reported(tmp_path, monkeypatch):
     job = room_job(tmp_path, 2, method="reference")
-    monkeypatch.setattr("studies.bench.bench.why_missing", lambda family: f"no {family} here")
-    with pytest.raises(SettingsError, match=r"no configuration can be rendered: .*no denoised here"):
-        bench(
-            job, all_configurations(job, traced=(), denoised=(1,)), Place(tmp_path, tmp_path), reference_spp=4
-        )
     monkeypatch.setattr("studies.bench.measuring.find_spec", lambda _: None)
     monkeypatch.setattr("studies.bench.colorvideovdp.why_missing", lambda: "no cvvdp")
     assert available((), job) == (["aqm", "psnr", "relrmse", "flicker"], ["no cvvdp", FLIP_IS_MISSING])

@@ -82,8 +82,6 @@ class Job:
         ------
         SceneError
             The scene is missing or malformed.
-        SettingsError
-            A library of the method is not installed.
         """
         method = self.opened_method()
         settings = self.settings.replace(OutputSettings, layers=self.settings[OutputSettings].ordered)

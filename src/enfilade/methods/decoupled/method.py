@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
 from enfilade.methods.decoupled.frame import Frames, window
@@ -18,7 +17,7 @@ from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import VirtualImages
-from enfilade.methods.denoise import denoiser_name, why_no_denoiser
+from enfilade.methods.denoise import denoiser_name
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Frame
 from enfilade.renderer import LobeRenderer
@@ -58,16 +57,6 @@ class Decoupled(Method):
         self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
         self._shot: ShotContext | None = None
         self._frames = Frames()
-
-    def check(self, settings: Settings) -> None:
-        """Refuse the denoiser where it is not installed.
-
-        Raises
-        ------
-        SettingsError
-        """
-        if settings[DecoupledSettings].denoiser != "none" and (why := why_no_denoiser()):
-            raise SettingsError(why)
 
     def libraries(self, settings: Settings) -> Mapping[str, str]:
         """The denoiser, where it is used."""

@@ -12,7 +12,7 @@ from enfilade.camera.path import Segment
 from enfilade.errors import SettingsError
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.denoise import denoiser_name, why_no_denoiser
+from enfilade.methods.denoise import denoiser_name
 from enfilade.methods.paper.inbetween import derive
 from enfilade.methods.paper.keyframe import MIN_SPP, trace_keyframe
 from enfilade.methods.paper.refine import Refinement, SegmentResult, leaf_of
@@ -62,7 +62,7 @@ class Paper(Method):
         self._context: _Context | None = None
 
     def check(self, settings: Settings) -> None:
-        """Refuse a single path a pixel, and a missing denoiser.
+        """Refuse a single path a pixel.
 
         Raises
         ------
@@ -73,8 +73,6 @@ class Paper(Method):
                 f"--method paper needs --spp {MIN_SPP} or more: keyframes are traced in two halves, by which "
                 "the metric tells differences from noise"
             )
-        if why := why_no_denoiser():
-            raise SettingsError(f"--method paper denoises its pixels. {why}")
 
     def libraries(self, settings: Settings) -> Mapping[str, str]:
         """The denoiser."""
