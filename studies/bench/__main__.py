@@ -14,7 +14,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from enfilade.errors import EnfiladeError
@@ -31,7 +30,7 @@ from studies.bench.suite import (
     run_case,
     summary,
 )
-from studies.bench.tables import ratio_text
+from studies.bench.tables import print_table, ratio_text
 
 HERE = Path(__file__).resolve().parent
 FRAMES, LARGE_FRAMES = 16, 8
@@ -111,7 +110,7 @@ def keep(benches: list[dict[str, Any]], folder: Path) -> None:
     for one in means:
         cells = [ratio_text(one["ratios"][name]) for name in measures]
         table.add_row(one["size"], one["split"], str(len(one["scenes"])), one["configuration"], *cells)
-    Console().print(table)
+    print_table(table)
     print(file, page, sep="\n")
 
 

@@ -156,11 +156,9 @@ def _job(ctx: click.Context, scene: Path, *, path_file: Path, size: Any, frames:
 
 
 def _show(found: dict[str, Any]) -> None:
-    from rich.console import Console
-
-    from studies.bench.tables import bench_tables
+    from studies.bench.tables import bench_tables, print_table
 
     for table in bench_tables(found):
-        Console().print(table)
+        print_table(table)
     for text in found["left_out"]:
         click.echo(text)

@@ -6,12 +6,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from studies.bench.measures import LEAST_ERROR, QUALITIES
 
 SIGNS = {"equal": "", "at least": "≥ ", "at most": "≤ ", None: "~ "}
+
+WIDTH = 180  # columns: narrower terminals wrap lines, and files have them whole
+
+
+def print_table(table: Table) -> None:
+    """Print a table, none of whose columns is shortened."""
+    Console(width=max(Console().width, WIDTH)).print(table)
 
 
 def bench_tables(found: Mapping[str, Any]) -> list[Table]:
@@ -60,7 +68,7 @@ def _ratios(found: Mapping[str, Any]) -> list[Table]:
     for name, by_measure in found["ratios"].items():
         table.add_row(name, *(ratio_text(by_measure[measure]) for measure in found["measures"]))
     table.caption = (
-        "in brackets bootstrap intervals of 90 % over the windows; ≥: better than every baseline; "
+        "in brackets bootstrap intervals of 90 % over the windows and seeds; ≥: better than every baseline; "
         "≤: no better than the cheapest baseline; *: within the noise of the references"
     )
     return [table]
