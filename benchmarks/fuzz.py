@@ -129,7 +129,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     """By kind: what makes a sound file in a folder, and what reads it."""
     from enfilade.camera import load_path
     from enfilade.images import read_exr
-    from enfilade.images.stills import image_pixels
+    from enfilade.images.exr import read_attributes
     from enfilade.runs.job import read_job
     from enfilade.scene.mitsuba.files import check_scene
     from enfilade.settings import LimitSettings
@@ -137,7 +137,7 @@ def all_readers() -> dict[str, tuple[Callable[[Path], Path], Callable[[Path], ob
     return {
         "exr": (make_exr, read_exr),
         "exr of a run": (lambda folder: make_exr(folder, is_portable=False), read_exr),
-        "exr header": (make_exr, image_pixels),
+        "exr header": (make_exr, read_attributes),
         "path": (make_path, load_path),
         "scene": (make_scene, lambda file: check_scene(file, LimitSettings())),
         "run": (lambda folder: make_run(folder) / "run.json", read_run),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -15,8 +14,9 @@ from types import SimpleNamespace
 import pytest
 
 from enfilade.errors import EnfiladeError, SettingsError
+from enfilade.files import write_json
 from enfilade.runs import farm
-from enfilade.runs.farm import Command, submit, template, write_template
+from enfilade.runs.farm import Command, submit, template
 from enfilade.runs.render import prepare
 from support.toys import slide, toy_job, wait_for
 
@@ -31,9 +31,8 @@ def begun(tmp_path):
 
 
 def test_the_template_is_one_of_open_job_description(begun):
-    write_template(begun, begun / "farm.json", shards=3)
-    made = json.loads((begun / "farm.json").read_text())
-    assert made == template(begun, 3)
+    made = template(begun, 3)
+    write_json(begun / "farm.json", made)
     assert [step["name"] for step in made["steps"]] == STEPS
     lines = farm._lines(made["steps"][1], begun)
     options = "--openjd --executor processes --workers 1 --pass light --shard 3/3"

@@ -9,8 +9,8 @@ from enfilade.errors import CameraPathError, RunFolderError, SceneError
 from enfilade.monitor import Silence
 from enfilade.runs.job import read_job
 from enfilade.runs.lock import Lock
-from enfilade.runs.source import imported_into
-from enfilade.settings import BlenderSettings, LimitSettings, Settings, ViewingSettings
+from enfilade.runs.source import imported_scene
+from enfilade.settings import Settings, ViewingSettings
 from support.fake_blender import NOTE, write_program
 
 
@@ -63,8 +63,7 @@ def test_import_from_python(shot, tables, tmp_path):
 
 
 def imported(source, run, tables):
-    blender = BlenderSettings.from_table(tables["blender"])
-    return imported_into(run, source, blender, LimitSettings(), Silence())
+    return imported_scene(source, run, Settings.from_tables(tables), Silence())
 
 
 def test_two_commands_do_not_import_into_one_folder(shot, tables, tmp_path):

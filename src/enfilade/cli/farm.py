@@ -46,13 +46,14 @@ def command(
         raise SettingsError("--slurm needs --submit slurm")
     if file is not None and cluster is not None:
         raise SettingsError("--out has no effect with --submit, which writes no template")
-    from enfilade.runs.farm import TEMPLATE, submit, write_template
+    from enfilade.files import write_json
+    from enfilade.runs.farm import TEMPLATE, submit, template
 
     if cluster is not None:
         submit(run, cluster, shards, dict(_pair(text) for text in options), click.echo)
         return
     out = run / TEMPLATE if file is None else file
-    write_template(run, out, shards)
+    write_json(out, template(run, shards))
     click.echo(f"template {out}")
 
 

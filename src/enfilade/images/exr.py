@@ -116,18 +116,6 @@ def color_layers(file: Path) -> tuple[str, ...]:
     return tuple(p.rstrip(".") or "RGB" for p in prefixes if {f"{p}G", f"{p}B"} <= set(names))
 
 
-def is_exr(file: Path) -> bool:
-    """Whether a file begins as OpenEXR files do, under any name; OSError if it can't be read."""
-    with file.open("rb") as raw:
-        return raw.read(len(MAGIC)) == MAGIC
-
-
-def exr_pixels(file: Path) -> int:
-    """Number of pixels of the largest window of all parts, from the headers; ImageError if damaged."""
-    sizes = [_size(header[w]) for header in _part_headers(file) for w in ("dataWindow", "displayWindow")]
-    return max(height * width for height, width in sizes)
-
-
 def read_attributes(file: Path) -> dict[str, Any]:
     """Attributes of the first part but for the standard ones, from the header; ImageError if damaged."""
     return {name: value for name, value in _part_headers(file)[0].items() if name not in STANDARD}

@@ -22,13 +22,11 @@ from PIL import Image
 from PIL.TiffImagePlugin import TiffImageFile
 
 from enfilade.errors import ImageError
-from enfilade.images.exr import MAGIC, exr_pixels
 from enfilade.kernels.tone import srgb_decode
 from enfilade.records import F32, U8
 
 STILL_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".webp", ".bmp"})
 FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "WEBP", "BMP")  # Pillow's names
-MITSUBA_FORMATS = ("PNG", "JPEG", "BMP", "TGA", "PPM")  # Pillow's names
 PNG_DEPTH = 24  # offset of the bit depth in IHDR, PNG (3rd ed.), 11.2.1
 TIFF_BITS, TIFF_PHOTOMETRIC, TIFF_TILE_WIDTH, TIFF_SAMPLE_FORMAT = 258, 262, 322, 339  # tags, TIFF 6.0
 TIFF_UNSIGNED = 1  # sample format
@@ -37,7 +35,6 @@ UNREADABLE = (  # raised by Pillow and PyAV on damaged files
     OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, EOFError, struct.error,
     zlib.error, Image.DecompressionBombError, av.FFmpegError,
 )  # fmt: skip
-PFM_HEADER = 256  # bytes in which the size of a portable float map must stand
 WEBP_EFFORT = 4  # 0 to 6: beyond it, time grows faster than files shrink
 DECODED = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))  # linear, of each 8-bit value
 
@@ -67,24 +64,6 @@ def read_image(file: Path) -> F32:
         linear: F32 = DECODED[rgba[..., :3]]
         return linear
     return srgb_decode(rgba[..., :3].astype(np.float32) / np.float32(65535.0))
-
-
-def image_pixels(file: Path) -> int:
-    """Number of pixels of an image that Mitsuba reads, except Radiance's; ImageError if it is none.
-
-    Nothing but the header is read.
-    """
-    with _reading(file), file.open("rb") as raw:
-        start = raw.read(PFM_HEADER)
-    if start.startswith(MAGIC):
-        return exr_pixels(file)
-    if start[:2] in (b"PF", b"Pf"):  # portable float map: white space between width, height and scale
-        words = start.split(maxsplit=3)
-        if len(words) == 4 and words[1].isdigit() and words[2].isdigit():
-            return int(words[1]) * int(words[2])
-        raise ImageError(f"{file} is a portable float map without a size")
-    with _reading(file), Image.open(file, formats=MITSUBA_FORMATS) as image:
-        return image.width * image.height
 
 
 def encode_webp(image: U8, *, quality: int | None) -> bytes:

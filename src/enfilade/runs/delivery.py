@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,7 @@ def write_clip(run: RunFolder, job: Job, first: int) -> Path:
     file = _clip(run, job, first)
     encode_video(
         file,
-        _images(run, job, span),
+        images_of(run, (job.path.numbers[frame] for frame in span)),
         fps=job.path.fps,
         width=job.path.width,
         height=job.path.height,
@@ -109,7 +109,7 @@ def _clip(run: RunFolder, job: Job, first: int) -> Path:
     return stem.with_name(f"{stem.name}{video_suffix(job.settings[VideoSettings].codec)}")
 
 
-def _images(run: RunFolder, job: Job, span: range) -> Iterator[F32]:
-    for frame in span:
-        file = run.file_of(FRAMES, job.path.numbers[frame])
-        yield read_exr(file)["RGB"].astype(np.float32)
+def images_of(run: RunFolder, numbers: Iterable[int]) -> Iterator[F32]:
+    """Colours of finished frames, (H, W, 3) linear; the files are checked as they are read."""
+    for number in numbers:
+        yield read_exr(run.file_of(FRAMES, number))["RGB"].astype(np.float32)

@@ -7,20 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from enfilade.camera.frames import ranges
 from enfilade.errors import RunFolderError, SettingsError, UnfinishedError
-from enfilade.images import check_encodable, encode_video, read_exr, video_suffix
+from enfilade.images import check_encodable, encode_video, video_suffix
 from enfilade.images.codecs import odd_size_note
 from enfilade.methods.base import FRAMES
 from enfilade.monitor import Monitor
 from enfilade.records import F32
+from enfilade.runs.delivery import images_of
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import read_job
+from enfilade.runs.scheduler import shortened
 from enfilade.settings import VideoSettings, ViewingSettings
 
 STEM = "encoded"  # of the video where none is given
-SHOWN_RANGES = 5  # of missing frames in a message
 
 
 def encode(
@@ -118,26 +118,14 @@ def _finished(run: RunFolder, numbers: Sequence[int], *, is_partial: bool) -> li
     missing = sorted(set(numbers) - set(there))
     advice = f"`enfilade work {shlex.quote(str(run.folder))}` renders the rest"
     advice += ", --unfinished encodes those that are there" if there else ""
+    listed = shortened(ranges(missing).split(","))
     raise UnfinishedError(
-        f"{run.folder} has {len(there)} of {len(numbers)} frames, {_ranges(missing)} are missing; {advice}",
+        f"{run.folder} has {len(there)} of {len(numbers)} frames, {listed} are missing; {advice}",
         tuple(f"{FRAMES} {number}" for number in missing),
     )
 
 
-def _ranges(numbers: Sequence[int]) -> str:
-    """Rising numbers as ``1-3, 7``."""
-    spans: list[list[int]] = []
-    for number in numbers:
-        if spans and number == spans[-1][1] + 1:
-            spans[-1][1] = number
-        else:
-            spans.append([number, number])
-    shown = [str(a) if a == b else f"{a}-{b}" for a, b in spans[:SHOWN_RANGES]]
-    more = len(numbers) - sum(b - a + 1 for a, b in spans[:SHOWN_RANGES])
-    return ", ".join(shown) + (f" and {more} more" if more else "")
-
-
 def _images(run: RunFolder, numbers: Sequence[int], monitor: Monitor) -> Iterator[F32]:
-    for count, number in enumerate(numbers, 1):
-        yield read_exr(run.file_of(FRAMES, number))["RGB"].astype(np.float32)
+    for count, image in enumerate(images_of(run, numbers), 1):
+        yield image
         monitor.progress("video", count, len(numbers))

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 from enfilade.errors import EnfiladeError, SettingsError
-from enfilade.files import write_json
 from enfilade.runs.delivery import VIDEO, analysis_tasks, video_tasks
 from enfilade.runs.job import read_job
 from enfilade.runs.scheduler import passes_of
@@ -37,34 +36,23 @@ CORE_OPTIONS = frozenset({"cpus_per_task", "slurm_cpus_per_task", "slurm_cpus_pe
 TAIL = 20  # lines of a command's output in the message that it failed
 
 
-def shards_for(frames: int) -> int:
-    """Shards of a pass, by default."""
-    return max(math.ceil(frames / FRAMES_PER_SHARD), 1)
-
-
-def write_template(folder: Path, file: Path, shards: int | None = None) -> None:
-    """Write an Open Job Description template for a run that was begun.
+def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
+    """An Open Job Description template for a run that was begun.
 
     Parameters
     ----------
     folder
         The run.
-    file
     shards
         Shards of a pass; None: one for each 16 frames.
 
     Raises
     ------
     RunFolderError
-        It holds no run, or the file can't be written.
+        It holds no run.
     """
-    write_json(file, template(folder, shards))
-
-
-def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
-    """See :func:`write_template`."""
     job = read_job(folder)
-    count = shards or shards_for(len(job.path))
+    count = shards or max(math.ceil(len(job.path) / FRAMES_PER_SHARD), 1)
     steps: list[dict[str, Any]] = []
     tasks = Counter(task.pass_name for task in (*analysis_tasks(len(job.path)), *video_tasks(len(job.path))))
     for of in passes_of(job):

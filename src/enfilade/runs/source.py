@@ -43,43 +43,18 @@ def imported_scene(
     size: tuple[int, int] | None = None,
     frames: tuple[int, int] | None = None,
 ) -> ImportedScene | None:
-    """The imported scene that a path names: that of a folder, or of a file, see :func:`imported_into`.
+    """The imported scene that a path names: that of a folder, or of a file, imported into the run folder.
 
-    None for all other paths, which name scenes of the renderer; without a run folder no file is imported.
-
-    Raises
-    ------
-    SceneError
-        The folder holds no imported scene, or the file can't be imported.
-    RunFolderError, NoSpaceError
-        As of :func:`imported_into`.
-    """
-    if scene.is_dir():
-        return ImportedScene.read(scene)
-    if run is None or not is_importable(scene):
-        return None
-    blender, limits = settings[BlenderSettings], settings[LimitSettings]
-    return imported_into(run, scene, blender, limits, monitor, size=size, frames=frames)
-
-
-def imported_into(
-    run: Path,
-    source: Path,
-    settings: BlenderSettings,
-    limits: LimitSettings,
-    monitor: Monitor,
-    *,
-    size: tuple[int, int] | None = None,
-    frames: tuple[int, int] | None = None,
-) -> ImportedScene:
-    """The scene of a file in a run folder; imported when the run begins, and kept.
+    A file is imported when the run begins, and kept. None for all other paths, which name scenes of the
+    renderer; without a run folder no file is imported.
 
     Parameters
     ----------
+    scene
     run
         The run folder; made if it is not there.
-    source
-    settings, limits
+    settings
+        Of which `[blender]` and `[limits]` are read.
     monitor
     size, frames
         Width and height of the images in pixels, first and last frame; None: the file's own.
@@ -87,18 +62,23 @@ def imported_into(
     Raises
     ------
     SceneError
-        The file can't be imported.
+        The folder holds no imported scene, or the file can't be imported.
     RunFolderError, NoSpaceError
         The file or the choices are not those of the run; or the folder holds something else, or can't be
         written.
     """
-    folder, choices = run / SCENE_FOLDER, choices_of(settings, size, frames)
-    if (folder / SOURCE_FILE).is_file() and _is_kept(run, source, choices):
+    if scene.is_dir():
+        return ImportedScene.read(scene)
+    if run is None or not is_importable(scene):
+        return None
+    blender, limits = settings[BlenderSettings], settings[LimitSettings]
+    folder, choices = run / SCENE_FOLDER, choices_of(blender, size, frames)
+    if (folder / SOURCE_FILE).is_file() and _is_kept(run, scene, choices):
         imported = ImportedScene.read(folder)
-        if settings.strict:
+        if blender.strict:
             check_strict(imported)
         return imported
-    check_source(source)
+    check_source(scene)
     if _has_begun(run):
         raise RunFolderError(f"{run} holds a run whose scene was not imported; choose another --out")
     check_place(run)
@@ -106,7 +86,7 @@ def imported_into(
     try:
         sweep(run)
         imported = import_file(
-            source, folder, choices, limits, monitor, program=settings.program, is_strict=settings.strict
+            scene, folder, choices, limits, monitor, program=blender.program, is_strict=blender.strict
         )
     finally:
         lock.release()

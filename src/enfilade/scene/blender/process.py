@@ -38,9 +38,7 @@ TAIL = 8  # lines of output in the message of a crash
 LONGEST_LINE = 4096
 
 
-def run_job(
-    blender: Blender, job: Mapping[str, Any], limits: LimitSettings, monitor: Monitor, script: Path = SCRIPT
-) -> None:
+def run_job(blender: Blender, job: Mapping[str, Any], limits: LimitSettings, monitor: Monitor) -> None:
     """Run a job of the importer; its result is in the job's folder ``out``.
 
     The process ends with this one. It has a home folder of its own, which is removed (after SIGKILL, by the
@@ -53,8 +51,6 @@ def run_job(
         Written as JSON for the script. ``task``, ``source`` and ``out`` count here.
     limits
     monitor
-    script
-        Which runs inside Blender.
 
     Raises
     ------
@@ -68,7 +64,7 @@ def run_job(
         job_file = home / "job.json"
         job_file.write_text(json.dumps(job), encoding="utf-8")
         own = [sys.executable, "-P", "-m", "enfilade.scene.blender.launcher"]
-        line = [*own, str(os.getpid()), str(limits.import_mb), str(home), *blender.command(script, job_file)]
+        line = [*own, str(os.getpid()), str(limits.import_mb), str(home), *blender.command(SCRIPT, job_file)]
         # No `with`: at its end it closes the pipe, which waits for the reader while another process holds it.
         process = subprocess.Popen(  # noqa: S603
             line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
