@@ -21,8 +21,8 @@ def noisy(chance, seed=0):
     return Shading(light[..., None].repeat(3, axis=2), np.full(WHERE.shape, chance / SPP, np.float32))
 
 
-def denoised(light, where=WHERE):
-    return denoise_light(GEOMETRY, light, where, quality="balanced", outlier=OUTLIER)
+def denoised(light, where=WHERE, **options):
+    return denoise_light(GEOMETRY, light, where, **({"quality": "balanced", "outlier": OUTLIER} | options))
 
 
 @pytest.mark.parametrize("chance", [2, 20, 100])
@@ -50,6 +50,22 @@ def test_one_outlier_does_not_tint_the_surface():
     around = np.abs(found - expected)[40:80, 60:100]
     assert around.max() < 0.5
     assert around.mean() < 0.1
+
+
+def test_the_light_of_outliers_is_kept_without_a_blob():
+    """One path in two thousand finds nearly half of the light: the mean stays, and the surface is even."""
+    hits = np.random.default_rng(1).random(WHERE.shape) < 1.0 / 2000.0
+    light = noisy(2)
+    light.color[:] += 1500.0 * hits[..., None]
+    light.variance[:] = 0.0  # as in the prepass: all that the denoiser loses is added again
+    kept, limited, added = (
+        denoised(light, outlier=outlier, is_excess_kept=is_kept)
+        for outlier, is_kept in ((16.0, True), (16.0, False), (4096.0, False))
+    )
+    assert kept.mean() == pytest.approx(light.color.mean(), rel=0.01)
+    assert limited.mean() < 0.8 * light.color.mean()
+    blocks = [image[:, :, 0].reshape(6, 20, 8, 20).mean(axis=(1, 3)) for image in (kept, added)]
+    assert blocks[0].std() < 0.5 * blocks[1].std()
 
 
 def test_a_highlight_does_not_brighten_the_dark_surface_around_it():

@@ -21,7 +21,12 @@ LEVELS = 5  # of the wavelet that smooths the correction: 32 pixels to each side
 
 
 def denoise_irradiance(
-    geometry: Geometry, image: IrradianceImage, quality: str, outlier: float = OUTLIER
+    geometry: Geometry,
+    image: IrradianceImage,
+    quality: str,
+    *,
+    outlier: float = OUTLIER,
+    is_excess_kept: bool = False,
 ) -> IrradianceImage:
     """An irradiance image whose layers are denoised apart; its variance is 0.
 
@@ -32,12 +37,19 @@ def denoise_irradiance(
     image
     quality
         Of the denoiser.
-    outlier
+    outlier, is_excess_kept
         As of :func:`denoise_light`.
     """
     direct, indirect = (
         Shading(
-            denoise_light(geometry, layer, image.is_known, quality=quality, outlier=outlier),
+            denoise_light(
+                geometry,
+                layer,
+                image.is_known,
+                quality=quality,
+                outlier=outlier,
+                is_excess_kept=is_excess_kept,
+            ),
             np.zeros_like(layer.variance),
             layer.dropped,
         )
@@ -46,7 +58,15 @@ def denoise_irradiance(
     return IrradianceImage(direct, indirect, image.is_known)
 
 
-def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: str, outlier: float) -> F32:
+def denoise_light(
+    geometry: Geometry,
+    light: Shading,
+    where: Mask,
+    *,
+    quality: str,
+    outlier: float,
+    is_excess_kept: bool = False,
+) -> F32:
     """Denoise light with normals as guides, and keep its mean along surfaces.
 
     The denoiser loses some percent of the light where samples are skewed, and adds a third to regions two
@@ -69,6 +89,8 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
         Of the denoiser.
     outlier
         Limit of the input of the correction, in units of the denoised value.
+    is_excess_kept
+        Whether light beyond that limit is distributed over the whole image, in proportion to the light there.
 
     Returns
     -------
@@ -101,6 +123,10 @@ def denoise_light(geometry: Geometry, light: Shading, where: Mask, *, quality: s
     correction = difference * share * squared / dr.maximum(squared + variance, 1e-20)
     corrected = clean + np.where(where[..., None], image(correction, *where.shape), np.float32(0))
     bounded: F32 = np.maximum(corrected, lowest)
+    if is_excess_kept:
+        excess = (light.color - limited).sum(axis=(0, 1), dtype=np.float64, where=where[..., None])
+        total = np.maximum(bounded.sum(axis=(0, 1), dtype=np.float64, where=where[..., None]), 1e-20)
+        bounded *= np.maximum(1.0 + excess / total, 0.0).astype(np.float32)
     return bounded
 
 

@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import Purpose
 
 SPP = 2
-OUTLIER = 4096.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
+OUTLIER = 16.0  # times the denoised irradiance: brighter estimates are limited where the mean is kept
 
 
 def trace_prepass(shot: ShotContext, frame: int) -> Output:
@@ -42,6 +42,8 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     image = IrradianceImage(direct, indirect, where)
     if (denoiser := shot.settings.denoiser) != "none":
         # Without noise: all of the light that the denoiser loses is added again, since many paths gather it.
-        image = denoise_irradiance(geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER)
+        image = denoise_irradiance(
+            geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
+        )
     facts = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped, "regions": regions}
     return Output({frame: image}, facts)
