@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from enfilade.camera import CameraPath
     from enfilade.comparison import SequenceDifference
     from enfilade.methods.base import Method
-    from enfilade.runs.job import Job
     from enfilade.runs.plan import Plan
     from enfilade.scene.blender.imported import ImportedScene
     from enfilade.scene.opener import Scene
@@ -80,11 +79,13 @@ def render(
         Some tasks failed again and again; the rest is done.
     """
     activate(device)
+    from enfilade.methods.opener import name_of
     from enfilade.runs.executor import Workers
     from enfilade.runs.render import render as render_job
+    from enfilade.runs.source import job_of
 
     monitor = monitor or Silence()
-    job = _job(scene, path, method, settings, Path(out), monitor)
+    job = job_of(scene, path, settings or {}, name_of(method), Path(out), monitor)
     return render_job(job, Path(out), monitor, Workers(executor, workers))
 
 
@@ -111,11 +112,14 @@ def plan(
         As of :func:`render`.
     """
     activate(device)
+    from enfilade.methods.opener import name_of
     from enfilade.runs.plan import plan as plan_job
+    from enfilade.runs.source import job_of
 
     monitor = monitor or Silence()
     with tempfile.TemporaryDirectory(prefix="enfilade-plan-") as run:
-        return plan_job(_job(scene, path, method, settings, Path(run), monitor), monitor)
+        job = job_of(scene, path, settings or {}, name_of(method), Path(run), monitor)
+        return plan_job(job, monitor)
 
 
 def import_scene(
@@ -245,37 +249,3 @@ def report(
     from enfilade.reports.page import write_report
 
     return write_report(Path(run), reference=reference, second_reference=second_reference, out=out)
-
-
-def _job(
-    scene: File | Scene,
-    path: File | CameraPath | None,
-    method: str | type[Method],
-    settings: Settings | Tables | None,
-    run: Path,
-    monitor: Monitor,
-) -> Job:
-    from enfilade.camera import CameraPath, load_path
-    from enfilade.errors import CameraPathError
-    from enfilade.methods.opener import name_of, open_method
-    from enfilade.runs.job import Job
-    from enfilade.runs.source import imported_scene
-    from enfilade.scene.opener import Scene
-    from enfilade.settings import SECTIONS, Settings
-
-    name = name_of(method)
-    kinds = list(dict.fromkeys([*SECTIONS, *open_method(name).settings]))
-    chosen = settings if isinstance(settings, Settings) else Settings.from_tables(settings or {}, kinds)
-    imported = None if isinstance(scene, Scene) else imported_scene(Path(scene), run, chosen, monitor)
-    if imported is not None:
-        scene, path = imported.scene_file, path or imported.checked_path()
-        if not isinstance(settings, Settings):
-            chosen = Settings.from_tables(imported.tables_under(settings or {}), kinds)
-    if path is None:
-        raise CameraPathError(f"{scene} needs a camera path: path is None")
-    return Job(
-        scene=scene if isinstance(scene, Scene) else Scene(Path(scene)),
-        path=path if isinstance(path, CameraPath) else load_path(Path(path)),
-        settings=chosen,
-        method=name,
-    )

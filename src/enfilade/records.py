@@ -201,7 +201,6 @@ class Halves:
 class Keyframe:
     """A frame that is traced whole."""
 
-    frame: int
     geometry: Geometry
     shading: Halves
 

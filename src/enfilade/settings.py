@@ -107,12 +107,25 @@ class Placement(Enum):
     EQUAL_FLOW = "equal-flow"
 
 
-class EyeMovement(Enum):
-    """Eye movements that the metric assumes (§3.3)."""
+class Pursuit(Enum):
+    """Eye movement while the image moves (§3.3).
+
+    PURSUIT
+        The eye follows the motion at each pixel as well as it can (Eq. 5). Segment splitting uses this.
+    NONE
+        It stands still: the image moves over the retina at its own velocity.
+    BOTH
+        Either may happen: each channel takes the larger sensitivity of the two.
+    """
 
     PURSUIT = "pursuit"
     NONE = "none"
     BOTH = "both"
+
+    @property
+    def hypotheses(self) -> tuple[Pursuit, ...]:
+        """The single eye movements to evaluate, of which the most sensitive counts."""
+        return (Pursuit.PURSUIT, Pursuit.NONE) if self is Pursuit.BOTH else (self,)
 
 
 class SampleFilter(Enum):
@@ -237,8 +250,8 @@ class MetricSettings(Section):
 
     table = "metric"
 
-    metering: EyeMovement = option(
-        EyeMovement.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
+    metering: Pursuit = option(
+        Pursuit.BOTH, "Eye movements that compare assumes: smooth pursuit, none, or the worse."
     )
     mask_slope: float = option(0.7, "Slope of visual masking.", least=0.0, most=1.0)
 

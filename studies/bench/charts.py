@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, INK, ORANGE, Figure, save, style_axes
 from studies.bench.configurations import BASELINES
 from studies.bench.measures import LEAST_ERROR, QUALITIES
 from studies.bench.ratios import Point, front
@@ -123,8 +123,5 @@ def _axes(ax: Any, *, is_more_better: bool) -> None:
         axis.set_minor_locator(NullLocator())
     ax.set_title("better ↑", loc="right", fontsize=8, color=INK)
     ax.set_xlabel("CPU s a frame", fontsize=8, color=INK)
-    ax.grid(color="#E4E4E4", linewidth=0.7)
-    ax.set_axisbelow(True)
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(colors=INK, labelsize=8)
+    style_axes(ax, text_pt=8)
     ax.margins(x=0.1, y=0.12)

@@ -14,7 +14,6 @@ from enfilade.comparison.measures import display_pair
 from enfilade.errors import SettingsError
 from enfilade.images import read_exr
 from enfilade.methods.base import FRAMES
-from enfilade.metric import Pursuit
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.runs.folder import RunFolder
@@ -110,7 +109,7 @@ def measure(
     dict
         Values of the windows by measure.
     """
-    pursuit = Pursuit(job.settings[MetricSettings].metering.value)
+    pursuit = job.settings[MetricSettings].metering
     viewing = job.viewing.cropped(windows[0].side, windows[0].side)
     exposure_ev = job.settings[ViewingSettings].exposure_ev
     others = [name for name in names if name != "cvvdp"]

@@ -20,6 +20,7 @@ from enfilade.reports.charts import (
     legend,
     new_figure,
     save,
+    style_axes,
 )
 
 DPI = 110
@@ -147,10 +148,7 @@ def _grid(
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, width_ratios=ratios)
     for ax in axes.ravel():
-        ax.grid(axis="y", color="#E4E4E4", linewidth=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(colors=INK, labelsize=8.5)
+        style_axes(ax, text_pt=8.5, grid="y")
     return figure, axes
 
 

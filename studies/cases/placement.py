@@ -94,4 +94,4 @@ def disoccluded_percent(walk: Walkthrough, segment: Segment, frame: int) -> floa
 def _unshaded(walk: Walkthrough, frame: int) -> Keyframe:
     geometry = walk.view(frame).geometry
     black = np.zeros((*geometry.depth.shape, 3), np.float32)
-    return Keyframe(frame, geometry, Halves(black, black))
+    return Keyframe(geometry, Halves(black, black))

@@ -120,9 +120,7 @@ def refined(case: Case, walk: Walkthrough, light: str) -> list[dict[str, Any]]:
     kept: LruCache[int, Keyframe] = LruCache(CACHED_KEYFRAMES)
 
     def keyframe(frame: int) -> Keyframe:
-        return kept.get(
-            frame, lambda: Keyframe(frame, walk.view(frame).geometry, trace_keyframe(walk, frame))
-        )
+        return kept.get(frame, lambda: Keyframe(walk.view(frame).geometry, trace_keyframe(walk, frame)))
 
     refinement, rows = Refinement(walk), []
     initial = [s for shot in case.analysis.segments() for s in shot]

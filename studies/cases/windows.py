@@ -161,7 +161,7 @@ class Windows:
         """Values of both keyframes, composited at a frame, and disoccluded pixels."""
         images = [values(self.traced(at)) for at in (segment.first, segment.last)]
         first, last = (
-            Keyframe(at, self.geometry(at), Halves(image, image))
+            Keyframe(self.geometry(at), Halves(image, image))
             for at, image in zip((segment.first, segment.last), images, strict=True)
         )
         return composite(

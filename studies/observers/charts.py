@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.reports.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save
+from enfilade.reports.charts import BLUE, GREEN, GREY, INK, VERMILION, Figure, save, style_axes
 
 DPI = 100
 PANEL_IN = (4.6, 3.4)
@@ -66,10 +66,7 @@ def _new(columns: int, *, rows: int = 1, width: float = 1.0) -> tuple[Figure, li
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax in axes:
-        ax.grid(color="#DDDDDD", linewidth=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(colors=INK, labelsize=9)
+        style_axes(ax, text_pt=9)
     return figure, list(axes)
 
 

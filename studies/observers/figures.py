@@ -11,7 +11,8 @@ from studies.observers.flicker import Pair
 from studies.observers.foley import Masking
 from studies.observers.modelfest import Thresholds
 from studies.observers.moving_texture import SCREENS, TEXTURES, Losses
-from studies.observers.sensitivity import Sensitivities, rms_db
+from studies.observers.sensitivity import Sensitivities
+from studies.observers.threshold import rms_db
 
 DARK = frozenset({"grass"})  # its mean luminance is a thirtieth of that of the others
 DIM = frozenset({"headset"})

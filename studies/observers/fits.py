@@ -7,8 +7,8 @@ that fits another data set best.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from enfilade.records import F64
 from enfilade.viewing import Viewing
 from studies.observers import foley, modelfest
 from studies.observers.mode import MODERN, Mode
+from studies.observers.threshold import rms_db
 from studies.progress import counted
 
 TRANSDUCERS = tuple((share, z) for share in (0.25, 0.5, 1.0) for z in (0.9, 1.1, 1.3, 1.5, 1.7))
@@ -53,10 +54,6 @@ class Fit:
     least: tuple[float, ...]
     most: tuple[float, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain values, for JSON."""
-        return asdict(self)
-
 
 def fit(
     name: str,
@@ -87,7 +84,7 @@ def fit(
     for index in range(count):
         others = np.delete(errors_db, index, axis=1)
         gain = others.mean(axis=1) if has_gain else np.zeros(len(candidates))
-        best = int(np.argmin(_rms(others - gain[:, None])))
+        best = int(np.argmin([rms_db(errors) for errors in others - gain[:, None]]))
         left_out_db[index] = errors_db[best, index] - gain[best]
         selected.append(candidates[best])
     errors = errors_db[candidates.index(chosen)]
@@ -95,22 +92,20 @@ def fit(
         name,
         data,
         chosen,
-        float(_rms(errors - errors.mean() if has_gain else errors)),
-        float(_rms(left_out_db)),
+        rms_db(errors - errors.mean() if has_gain else errors),
+        rms_db(left_out_db),
         *(tuple(float(end) for end in ends) for ends in (np.min(selected, axis=0), np.max(selected, axis=0))),
     )
 
 
-def _rms(errors: F64) -> F64:
-    return np.asarray(np.sqrt(np.mean(np.square(errors), axis=-1)))
-
-
-def _fit_across(name: str, data: str, chosen: float, errors_db: F64, others_db: F64) -> Fit:
+def _fit_across(
+    name: str, data: str, chosen: float, errors_db: Sequence[float], others_db: Sequence[float]
+) -> Fit:
     """Evaluate a data set with the aperture that fits another data set best."""
     best = int(np.argmin(others_db))
     selected = (APERTURES_DEG[best],)
-    chosen_db = float(errors_db[APERTURES_DEG.index(chosen)])
-    return Fit(name, data, (chosen,), chosen_db, float(errors_db[best]), selected, selected)
+    chosen_db = errors_db[APERTURES_DEG.index(chosen)]
+    return Fit(name, data, (chosen,), chosen_db, errors_db[best], selected, selected)
 
 
 def _modern_with(transducer: Transducer, aperture_sigma_deg: float = APERTURE_SIGMA_DEG) -> Mode:
@@ -145,7 +140,7 @@ def measure(monitor: Monitor) -> tuple[Fit, ...]:
         masked.append(foley.measure(mode, Silence()).error_db)
     apertures = tuple((sigma_deg,) for sigma_deg in APERTURES_DEG)
     transducer, aperture_deg = Transducer(), APERTURE_SIGMA_DEG
-    by_modelfest, by_foley = _rms(np.array(thresholds)), _rms(np.array(masked))
+    by_modelfest, by_foley = ([rms_db(errors) for errors in found] for found in (thresholds, masked))
     return (
         fit(
             "transducer: neighbour_fraction, semi_saturation",

@@ -17,7 +17,7 @@ from enfilade.records import F64
 from studies.observers.mode import Mode
 from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
-from studies.observers.threshold import threshold_contrast
+from studies.observers.threshold import rms_db, threshold_contrast
 from studies.progress import counted
 
 ANGLES_DEG = (0, 45, 90)  # between the bars of mask and target
@@ -58,7 +58,7 @@ class Masking:
     @property
     def rms_db(self) -> float:
         """Root of the mean square of the errors."""
-        return float(np.sqrt(np.mean(self.error_db**2)))
+        return rms_db(self.error_db)
 
 
 def sine(angle_deg: float = 0.0) -> F64:

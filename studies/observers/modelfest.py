@@ -18,7 +18,7 @@ from enfilade.records import F64
 from studies.observers.mode import Mode
 from studies.observers.screen import plane, screen
 from studies.observers.tables import read_columns
-from studies.observers.threshold import threshold_contrast
+from studies.observers.threshold import rms_db, threshold_contrast
 from studies.progress import counted
 
 PIXELS_PER_DEGREE = 120.0
@@ -77,7 +77,7 @@ class Thresholds:
     @property
     def rms_db(self) -> float:
         """Root of the mean square of the errors, after the gain."""
-        return float(np.sqrt(np.mean(self.error_db**2)))
+        return rms_db(self.error_db)
 
     @property
     def cross_validation_rms_db(self) -> float:
@@ -89,8 +89,7 @@ class Thresholds:
     def gabors_rms_db(self) -> float:
         """Root of the mean square of the errors of round Gabors up to 12 cpd, without a gain."""
         is_round = [n for n, (cpd, *sigma) in GABORS.items() if sigma[0] == sigma[1] and cpd <= HIGHEST_CPD]
-        errors_db = (self.metric_db - self.observers_db)[np.isin(self.number, is_round)]
-        return float(np.sqrt(np.mean(errors_db**2)))
+        return rms_db((self.metric_db - self.observers_db)[np.isin(self.number, is_round)])
 
 
 def _gauss(x: F64, y: F64, sigma_x: float, sigma_y: float) -> F64:

@@ -49,11 +49,6 @@ class Sensitivities:
         return error
 
 
-def rms_db(errors_db: F64) -> float:
-    """Root of the mean square of errors, dB."""
-    return float(np.sqrt(np.mean(errors_db**2)))
-
-
 def gratings(study: str) -> tuple[Grating, ...]:
     """Gratings of a study at 0.5 to 12 cpd, in the order of the table.
 

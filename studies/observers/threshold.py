@@ -20,6 +20,11 @@ MOST_DECREMENT = 0.98  # a target removes at most this share of the luminance
 FAINTEST_JND = 1e-12  # keeps the logarithm finite where nothing is visible
 
 
+def rms_db(errors_db: F64) -> float:
+    """Root of the mean square of errors, dB."""
+    return float(np.sqrt(np.mean(errors_db**2)))
+
+
 def response_jnd(observer: Aqm, test: F32, background: F32) -> float:
     """Response of the metric to an image: the maximum of the map, JND.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from enfilade.monitor import Monitor
@@ -45,7 +45,7 @@ class Validation:
             "missed": [figure.name for figure in self.missed],
             "failed": [figure.name for figure in self.failed],
             "modes": [mode.to_dict() for mode in self.modes],
-            "fits": [fit.to_dict() for fit in self.fits],
+            "fits": [asdict(fit) for fit in self.fits],
         }
 
 

@@ -104,7 +104,7 @@ def test_another_camera_path_is_told(tmp_path, poses, selected, is_said):
     test = write_run(tmp_path / "t", images, numbers, poses="a")
     reference = write_run(tmp_path / "r", images, numbers, selected=selected, poses=poses)
     notes = Notes()
-    compared(test, reference, notes)
+    compared(test, reference / "frames" / "*.exr", notes)
     said = [text for text in notes.said if "different camera paths" in text]
     assert len(said) == is_said
     assert all(str(test) in text and str(reference) in text for text in said)

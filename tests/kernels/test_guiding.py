@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from enfilade.arrays import Array3f, Float, lanes, opaque, rows
-from enfilade.kernels.guiding import OCTANTS, REGIONS, PathGuide
+from enfilade.kernels.guiding import OCTANTS, REGIONS, GuidedLobe, PathGuide
 from enfilade.kernels.random import one_sequence
 
 COUNT = 1 << 16
@@ -29,7 +29,7 @@ def cosine_directions(sampler):
 def sampled(guide):
     """Directions of the mixture with a cosine lobe along z, seen from the origin, and their density."""
     sampler = one_sequence(COUNT)
-    lobe = guide.at(dr.zeros(Array3f, COUNT), Array3f(0, 0, 1) + dr.zeros(Array3f, COUNT))
+    lobe = GuidedLobe(guide, dr.zeros(Array3f, COUNT), Array3f(0, 0, 1) + dr.zeros(Array3f, COUNT))
     direction, is_guided = lobe.sample(sampler.next_1d(), sampler.next_2d())
     direction = dr.select(is_guided, direction, cosine_directions(sampler))
     own = dr.maximum(direction.z, 0.0) / dr.pi

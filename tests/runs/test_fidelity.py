@@ -16,6 +16,7 @@ from enfilade.scene.blender.find import find_blender
 from enfilade.scene.blender.source import Choices
 from enfilade.settings import LimitSettings
 from support.fake_blender import write_program
+from support.toys import slide
 
 SIZE = (32, 24)
 
@@ -77,11 +78,9 @@ def test_objects_that_differ_are_found(imported, folder, program):
     assert differences_of(redder)[1].color_percent == pytest.approx(100 * 0.2 / 0.9575 / 3, rel=0.2)
 
 
-def test_frames_are_chosen_evenly(imported):
-    path = load_path(imported.path_file)
-    assert checked_numbers(path) == (11, 12, 13)
-    assert checked_numbers(path, 2) == (11, 13)
-    assert checked_numbers(path, 9) == (11, 12, 13)
+@pytest.mark.parametrize(("frames", "numbers"), [(2, (1, 2)), (3, (1, 2, 3)), (9, (1, 5, 9))])
+def test_frames_are_chosen_evenly(frames, numbers):
+    assert checked_numbers(slide(frames)) == numbers
 
 
 def test_a_frame_that_is_missing(imported, folder, program, monkeypatch):

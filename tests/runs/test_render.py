@@ -22,8 +22,8 @@ from enfilade.methods.base import Output, Pass, TaskId
 from enfilade.monitor import Silence
 from enfilade.runs.executor import Workers
 from enfilade.runs.folder import RunFolder
-from enfilade.runs.job import Job
-from enfilade.runs.render import Shard, prepare, render, render_shard, resume
+from enfilade.runs.job import Job, read_job
+from enfilade.runs.render import Shard, prepare, render, render_shard
 from enfilade.scene.opener import Scene
 from enfilade.settings import SECTIONS, OutputSettings, Settings, TraceSettings, VideoSettings, WarpSettings
 from support.toy_method import Light, Toy
@@ -51,7 +51,7 @@ def test_a_finished_run_is_not_done_again(job, run, tmp_path, whole, monkeypatch
     }
     monkeypatch.setattr("enfilade.runs.scheduler.open_executor", None)
     monitor = Recorder()
-    again = resume(run, monitor)
+    again = render(read_job(run), run, monitor)
     assert (monitor.done, monitor.said) == ([], [])
     assert {file: file.read_bytes() for file in before} == before
     assert (
@@ -160,10 +160,10 @@ def test_a_damaged_job_is_written_again(job, run, whole):
     prepare(job, run)
     (run / "job.json").write_text("{")
     with pytest.raises(RunFolderError, match=r"job\.json is damaged"):
-        resume(run, Silence())
+        render(read_job(run), run, Silence())
     render(job, run, Silence())
     assert digest(run) == whole
-    resume(run, Silence())
+    render(read_job(run), run, Silence())
 
 
 def test_an_edited_job_is_another_run(job, run):
@@ -171,7 +171,7 @@ def test_an_edited_job_is_another_run(job, run):
     text = (run / "job.json").read_text()
     (run / "job.json").write_text(text.replace('"seed": 0', '"seed": 1'))
     with pytest.raises(RunFolderError, match=r"settings\.trace\.seed: 0 there, 1 now"):
-        resume(run, Silence())
+        render(read_job(run), run, Silence())
     with pytest.raises(RunFolderError, match="is not that with which the run began"):
         render_shard(run, Shard("analysis"), Silence())
 
@@ -262,7 +262,7 @@ def test_shards_in_any_order_make_the_same_run(tmp_path, run, long_whole, count)
             again = Recorder()
             render_shard(run, Shard(name, number, count), again)
             assert again.done == []
-    summary = resume(run, Silence())
+    summary = render(read_job(run), run, Silence())
     assert digest(run) == long_whole
     assert (run / summary["video"]).exists()
     assert set(attempts(tmp_path).values()) == {1}
@@ -325,7 +325,7 @@ def test_a_shard_makes_damaged_files_of_earlier_passes_again(tmp_path, run, long
     monitor = Recorder()
     render_shard(run, Shard("frames", 1, 2), monitor)
     assert monitor.done.count("light") == 3
-    resume(run, Silence())
+    render(read_job(run), run, Silence())
     assert digest(run) == long_whole
 
 
@@ -337,7 +337,7 @@ def test_a_shard_with_a_task_that_fails_does_the_rest(tmp_path, run, long_whole)
         render_shard(run, Shard("light"), Silence())
     with pytest.raises(UnfinishedError, match=r"pass 'light' is not finished \(light 2\)"):
         render_shard(run, Shard("mean"), Silence())
-    assert resume(run, Silence())["frames"] == 20
+    assert render(read_job(run), run, Silence())["frames"] == 20
     assert digest(run) == long_whole
 
 

@@ -7,6 +7,7 @@ from enfilade.monitor import Silence
 from studies.observers import sensitivity
 from studies.observers.gratings import STIMULI
 from studies.observers.mode import MODERN, PAPER
+from studies.observers.threshold import rms_db
 
 
 def measured(study, mode, *chosen):
@@ -31,7 +32,7 @@ def test_every_study_has_its_stimulus():
 def test_the_error_is_that_of_the_threshold():
     found = sensitivity.Sensitivities(*np.ones((3, 2)), np.array([10.0, 10.0]), np.array([100.0, 1.0]))
     np.testing.assert_allclose(found.error_db, [20.0, -20.0])
-    assert sensitivity.rms_db(found.error_db) == pytest.approx(20.0)
+    assert rms_db(found.error_db) == pytest.approx(20.0)
 
 
 def test_a_drifting_grating_is_seen_worse_the_faster_it_is():

@@ -19,8 +19,9 @@ from studies.observers.gratings import STIMULI
 from studies.observers.mode import MODERN
 from studies.observers.modelfest import Thresholds
 from studies.observers.moving_texture import Losses, conditions
-from studies.observers.sensitivity import Sensitivities, rms_db
+from studies.observers.sensitivity import Sensitivities
 from studies.observers.tables import read_columns, read_textures
+from studies.observers.threshold import rms_db
 from studies.observers.validate import Validation
 
 

@@ -27,10 +27,10 @@ def traced_image(scene: AnalyticScene, camera: Camera, *, spp: int = 1, box: boo
     return Shading(got.color.reshape(*size, 3), got.variance.reshape(size), got.dropped)
 
 
-def keyframe_of(scene: AnalyticScene, camera: Camera, *, frame: int = 0, spp: int = 1) -> Keyframe:
+def keyframe_of(scene: AnalyticScene, camera: Camera, *, spp: int = 1) -> Keyframe:
     """A keyframe through the pixels' centres, both halves the same."""
     color = traced_image(scene, camera, spp=spp).color
-    return Keyframe(frame, geometry_of(scene, camera), Halves(color, color))
+    return Keyframe(geometry_of(scene, camera), Halves(color, color))
 
 
 def pixel_centres(camera: Camera) -> np.ndarray:

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-NOISE_SIGMAS = 4.0
 LEAST_SENSITIVITY = 1e-3
 
 
@@ -51,7 +50,7 @@ def fan_window(theta_deg, orientation):
     return 0.5 * (1 + math.cos(math.pi * away / 30)) if away < 30 else 0.0
 
 
-def channel_filter(shape, k, orientation, levels, *, power):
+def channel_filter(shape, k, orientation, levels):
     """One filter over the whole frequency plane; orientation None for the base."""
     height, width = shape
     plane = np.zeros(shape)
@@ -60,10 +59,7 @@ def channel_filter(shape, k, orientation, levels, *, power):
             ring = ring_window(math.hypot(fx, fy), k, levels)
             theta = math.degrees(cmath.phase(complex(fx, fy)))
             fan = 1.0 if orientation is None else fan_window(theta, orientation)
-            if power:
-                ring = math.sin(math.pi / 2 * ring)
-                fan = 1.0 if orientation is None else math.sin(math.pi / 2 * fan)
-            plane[row, column] = ring * fan
+            plane[row, column] = math.sin(math.pi / 2 * ring) * math.sin(math.pi / 2 * fan)
     return plane
 
 
@@ -105,7 +101,7 @@ def jnd_map(test, reference, *, centres_cpd, margin, padded_shape, velocity=None
     total = np.zeros((height, width))
     channels = [(k, o) for k in range(1, levels) for o in range(6)] + [(levels, None)]
     for k, orientation in channels:
-        window = channel_filter(padded_shape, k, orientation, levels, power=True)
+        window = channel_filter(padded_shape, k, orientation, levels)
         c_test, c_reference = (
             np.fft.ifft2(plane * window).real[margin : margin + height, margin : margin + width]
             for plane in planes

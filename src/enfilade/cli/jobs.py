@@ -10,7 +10,7 @@ import click
 from enfilade.cli.group import ending_on_sigterm
 from enfilade.cli.options import COMMON, assigned, tables_of
 from enfilade.errors import SettingsError
-from enfilade.settings import SECTIONS, BlenderSettings, Section, Settings
+from enfilade.settings import BlenderSettings, Section, Settings
 
 if TYPE_CHECKING:
     from enfilade.methods.base import Method
@@ -47,29 +47,24 @@ def job_of(
         A setting, the path or the selection of frames is wrong; a flag has no effect; the scene can't be
         imported.
     """
-    from enfilade.camera import load_path, parse_frames
+    from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
-    from enfilade.methods.opener import open_method
-    from enfilade.runs.job import Job
-    from enfilade.runs.source import imported_scene
-    from enfilade.scene.opener import Scene
+    from enfilade.methods.opener import open_method, sections_of
+    from enfilade.runs import source
+    from enfilade.scene.blender.source import is_importable
 
     opened = open_method(method)
-    kinds = tuple(dict.fromkeys([*SECTIONS, *opened.settings]))
+    kinds = sections_of(opened)
     tables = tables_of(ctx, kinds)
-    settings = Settings.from_tables(tables, kinds)
+    Settings.from_tables(tables, kinds)  # unknown settings are refused as such, not as without effect
     _check_effect(ctx, opened, scene)
     selected = None if frames is None else parse_frames(frames)
-    path = None if path_file is None else load_path(path_file, size=size, frames=selected, fps=fps)
-    span = (selected[0], selected[-1]) if selected and path is None else None
-    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
-        imported = imported_scene(scene, run, settings, monitor, size=size, frames=span)
-    if imported is not None:
-        scene, settings = imported.scene_file, Settings.from_tables(imported.tables_under(tables), kinds)
-        path = path or load_path(imported.checked_path(), size=size, frames=selected, fps=fps)
-    if path is None:
+    if path_file is None and not (scene.is_dir() or is_importable(scene)):
         raise click.UsageError("Missing option '--path'.", ctx)
-    return Job(scene=Scene(scene), path=path, settings=settings, method=method)
+    with ending_on_sigterm(), watch(quiet=quiet) as monitor:
+        return source.job_of(
+            scene, path_file, tables, method, run, monitor, size=size, frames=selected, fps=fps
+        )
 
 
 def _check_effect(ctx: click.Context, method: Method, scene: Path) -> None:

@@ -59,12 +59,13 @@ def command(
     workers = workers_of(**team)
     from enfilade.cli.progress import OpenJdMonitor, watch
     from enfilade.cli.render import show_run
-    from enfilade.runs.render import Shard, render_shard, resume
+    from enfilade.runs.job import read_job
+    from enfilade.runs.render import Shard, render, render_shard
 
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
         if pass_name is None:
-            summary = resume(run, monitor, workers)
+            summary = render(read_job(run), run, monitor, workers)
         else:
             render_shard(run, Shard(pass_name, int(match[1]), int(match[2])), monitor, workers)
     if pass_name is None:

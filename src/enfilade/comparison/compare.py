@@ -18,7 +18,7 @@ from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.result import FrameDifference, SequenceDifference
 from enfilade.errors import ImageError, InputError
 from enfilade.kernels.tone import srgb_encode
-from enfilade.metric import Aqm, Comparison, Pursuit, SequenceAqm
+from enfilade.metric import Aqm, Comparison, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
@@ -179,7 +179,7 @@ def compare(
 class _Comparer:
     def __init__(self, viewing: Viewing, options: CompareOptions, count: int) -> None:
         self._viewing = viewing
-        pursuit = Pursuit(options.metric.metering.value)
+        pursuit = options.metric.metering
         if options.mode == "paper":
             aqm = Aqm.paper(viewing, pursuit=pursuit, mask_slope=options.metric.mask_slope)
         else:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from enfilade.errors import ImageError
-from enfilade.files import read_json
 from enfilade.images import Sequence
+from enfilade.images.sequence import value_at
 
 DEFAULT_FPS = 30.0  # where neither sequence says its own: the paper's (§6)
 SEED = ("settings", "trace", "seed")  # in the identity of a run
@@ -73,13 +72,12 @@ def _check_same_frames(one: Side, other: Side) -> None:
 
 
 def note_on_paths(one: Side, other: Side) -> str:
-    """Remark on two run folders of different camera paths; empty where they are not."""
-    first, second = _path_of(one.source), _path_of(other.source)
+    """Remark on two runs of different camera paths; empty where they are not."""
+    paths = [value_at(side.sequence.identity, "path") for side in (one, other)]
+    poses, frames = ([value_at(path, key) for path in paths] for key in ("poses", "frames"))
     # Of all frames that were selected, so that those of others can't be compared. That is no reason to refuse
     # them: another host may round the same poses otherwise.
-    is_known = "poses" in first and "poses" in second
-    is_alike = first.get("poses") == second.get("poses")
-    if is_alike or not is_known or first.get("frames") != second.get("frames"):
+    if None in poses or poses[0] == poses[1] or frames[0] != frames[1]:
         return ""
     return (
         f"camera: {one.source} and {other.source} are of different camera paths (other poses in run.json): "
@@ -88,9 +86,10 @@ def note_on_paths(one: Side, other: Side) -> str:
 
 
 def note_on_seeds(one: Side, other: Side) -> str:
-    """Remark on run folders of one method and seed, whose noise is not independent; else empty."""
+    """Remark on runs of one method and seed, whose noise is not independent; else empty."""
     methods, seeds = (
-        [_identity_of(side.source, *keys) for side in (one, other)] for keys in (("method", "name"), SEED)
+        [value_at(side.sequence.identity, *keys) for side in (one, other)]
+        for keys in (("method", "name"), SEED)
     )
     if None in seeds or methods[0] != methods[1] or seeds[0] != seeds[1] or one.source == other.source:
         return ""
@@ -98,21 +97,6 @@ def note_on_seeds(one: Side, other: Side) -> str:
         f"noise: {one.source} and {other.source} are of one method and --seed {seeds[0]}: their noise is "
         "correlated, and they look more alike than they are; render one with another --seed"
     )
-
-
-def _path_of(source: Path | str) -> dict[str, Any]:
-    """The camera path as a run folder's ``run.json`` has it; nothing where there is none."""
-    found = _identity_of(source, "path")
-    return found if isinstance(found, dict) else {}
-
-
-def _identity_of(source: Path | str, *keys: str) -> Any:
-    """A part of the identity in a run folder's ``run.json``; None where there is none."""
-    file = Path(source) / "run.json"
-    found: Any = read_json(file) if file.is_file() else None
-    for key in ("identity", *keys):
-        found = found.get(key) if isinstance(found, dict) else None
-    return found
 
 
 def note_on_numbers(one: Side, other: Side) -> str:

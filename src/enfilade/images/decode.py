@@ -51,6 +51,7 @@ class VideoFile:
     exposure_ev: float | None = None  # frames are display-referred
     numbers: tuple[int, ...] | None = None
     starts: frozenset[int] | None = None
+    identity: None = None
     note: str = ""
 
     def __init__(self, file: Path) -> None:

@@ -38,6 +38,8 @@ class ImageFiles:
         Of the frames, rising; None if unknown.
     starts : frozenset of int or None
         Of a run: indices of frames that do not follow the one before. None if unknown.
+    identity : mapping or None
+        Of a run: everything on which its frames depend, as ``run.json`` has it. None if unknown.
     layer : str or None
         Of all OpenEXR files, see :func:`~enfilade.images.beauty.choose_layer`.
     width, height : int
@@ -56,6 +58,7 @@ class ImageFiles:
     exposure_ev: float | None = None
     numbers: tuple[int, ...] | None = None
     starts: frozenset[int] | None = None
+    identity: Any = None
     layer: str | None = None
 
     def __post_init__(self) -> None:

@@ -92,16 +92,17 @@ def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
 def _of_run(
     files: list[Path], folder: Path, numbers: tuple[int, ...] | None, layer: str | None
 ) -> ImageFiles:
-    """Images with the frame rate, exposure and shots of the run in a folder, if there is one."""
+    """Images with the frame rate, exposure, shots and identity of the run in a folder, if there is one."""
     run, job_file = folder / RUN_FILE, folder / JOB_FILE
-    identity = _at(read_json(run), "identity") if run.is_file() else None
+    identity = value_at(read_json(run), "identity") if run.is_file() else None
     job = read_json(job_file) if run.is_file() and job_file.is_file() else None
     return ImageFiles(
         files,
-        fps=_at(identity, "path", "fps"),
-        exposure_ev=_at(job, "settings", "viewing", "exposure_ev"),
+        fps=value_at(identity, "path", "fps"),
+        exposure_ev=value_at(job, "settings", "viewing", "exposure_ev"),
         numbers=numbers,
-        starts=None if numbers is None else _starts(numbers, _at(identity, "path")),
+        starts=None if numbers is None else _starts(numbers, value_at(identity, "path")),
+        identity=None if numbers is None else identity,
         layer=layer,
     )
 
@@ -159,7 +160,7 @@ def _numbers(files: list[Path]) -> tuple[int, ...] | None:
 
 def _starts(numbers: tuple[int, ...], path: Any) -> frozenset[int] | None:
     """Indices of a run's finished frames that begin a shot or follow an unfinished frame."""
-    selected, cuts = _at(path, "frames"), _at(path, "cuts")
+    selected, cuts = value_at(path, "frames"), value_at(path, "cuts")
     if selected is None or cuts is None:
         return None
     following = dict(pairwise(selected))
@@ -167,7 +168,8 @@ def _starts(numbers: tuple[int, ...], path: Any) -> frozenset[int] | None:
     return frozenset(i for i, (before, now) in steps if following.get(before) != now or now in cuts)
 
 
-def _at(value: Any, *keys: str) -> Any:
+def value_at(table: Any, *keys: str) -> Any:
+    """A value of nested tables; None where there is none."""
     for key in keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    return value
+        table = table.get(key) if isinstance(table, dict) else None
+    return table

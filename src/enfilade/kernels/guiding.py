@@ -45,12 +45,8 @@ class PathGuide:
     radiance: Any
     background: Any
 
-    def at(self, position: Any, normal: Any) -> GuidedLobe:
-        """The mixture at surface points, by position and normal in the hemisphere of the light (Array3f)."""
-        return GuidedLobe(self, position, normal)
-
     def cones(self, position: Any, normal: Any) -> list[Cone]:
-        """The cone of each sphere from surface points; arguments as of :meth:`at`."""
+        """The cone of each sphere from surface points; arguments as of :class:`GuidedLobe`."""
         found = []
         for k in range(REGIONS):
             to = dr.gather(Array3f, self.centers, UInt(k)) - position

@@ -6,6 +6,7 @@ import importlib
 
 from enfilade.errors import SettingsError
 from enfilade.methods.base import Method
+from enfilade.settings import SECTIONS, Section
 
 METHODS = {
     "decoupled": "enfilade.methods.decoupled.method:Decoupled",
@@ -39,6 +40,11 @@ def open_method(name: str) -> Method:
     if not (isinstance(kind, type) and issubclass(kind, Method)):
         raise SettingsError(f"{name!r} is not a method: it must be a subclass of enfilade.Method")
     return kind()
+
+
+def sections_of(method: Method) -> tuple[type[Section], ...]:
+    """Sections that settings of runs with a method may have: the built-in ones, and those of the method."""
+    return tuple(dict.fromkeys([*SECTIONS, *method.settings]))
 
 
 def name_of(kind: str | type[Method]) -> str:

@@ -5,12 +5,12 @@ Usable alone, with NumPy arrays of luminance: `Aqm` for images, `SequenceAqm` fo
 
 from enfilade.metric.aqm import Aqm
 from enfilade.metric.comparison import Comparison, Part
-from enfilade.metric.eye import Pursuit
 from enfilade.metric.halves import HalvesAqm, LuminanceHalves
 from enfilade.metric.modern import ModernMetric
 from enfilade.metric.paper import PaperMetric
 from enfilade.metric.sequence import SequenceAqm, sequence_score
 from enfilade.metric.transducer import Transducer
+from enfilade.settings import Pursuit
 
 __all__ = [
     "Aqm",

@@ -8,13 +8,13 @@ import numpy as np
 
 from enfilade.errors import InputError
 from enfilade.metric.comparison import Comparison
-from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import Pair, check_map, check_pair, fill_undefined
 from enfilade.metric.masking import MASK_SLOPE
 from enfilade.metric.modern import ModernMetric
 from enfilade.metric.paper import PaperMetric
 from enfilade.metric.sensitivity import coarse_velocity
 from enfilade.records import F32, Mask
+from enfilade.settings import Pursuit
 from enfilade.viewing import Viewing
 
 

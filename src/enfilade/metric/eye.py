@@ -7,38 +7,16 @@ map; None in the base band, which has no direction and takes the whole speed.
 
 from __future__ import annotations
 
-import enum
-
 import numpy as np
 
 from enfilade.records import F32
+from enfilade.settings import Pursuit
 
 EYE_DRIFT_DEG_S = 0.15  # §3.3, v_Min: drift of the eye that fixates
 PURSUIT_MAX_DEG_S = 80.0  # §3.3, v_Max: fastest smooth pursuit
 PURSUIT_EFFICIENCY = 0.82  # §3.3, no unit: gain of smooth pursuit
 
 SLOWEST_DEG_S = 1e-6  # keeps the direction of motion finite
-
-
-class Pursuit(enum.Enum):
-    """Eye movement while the image moves (§3.3).
-
-    PURSUIT
-        The eye follows the motion at each pixel as well as it can (Eq. 5). Segment splitting uses this.
-    NONE
-        It stands still: the image moves over the retina at its own velocity.
-    BOTH
-        Either may happen: each channel takes the larger sensitivity of the two.
-    """
-
-    PURSUIT = "pursuit"
-    NONE = "none"
-    BOTH = "both"
-
-    @property
-    def hypotheses(self) -> tuple[Pursuit, ...]:
-        """The single eye movements to evaluate, of which the most sensitive counts."""
-        return (Pursuit.PURSUIT, Pursuit.NONE) if self is Pursuit.BOTH else (self,)
 
 
 def retinal_speed(image_speed_deg_s: F32, pursuit: Pursuit) -> F32:

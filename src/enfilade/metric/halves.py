@@ -22,13 +22,13 @@ from enfilade.metric.channels import ChannelBank, uniform_part
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.cortex import Band
 from enfilade.metric.csf import spatiovelocity_sensitivity
-from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import check_pair, fill_undefined
 from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elevation
 from enfilade.metric.paper import adapt
 from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.sensitivity import SensitivityTable, coarse_velocity
 from enfilade.records import F32, Mask
+from enfilade.settings import Pursuit
 from enfilade.viewing import Viewing
 
 # dB, on all sensitivities. The one fitted number: the mean of ModelFest's 41 targets, and no other data

@@ -13,7 +13,7 @@ from enfilade.metric.channels import ChannelBank
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.cortex import Band, Complex64
 from enfilade.metric.direction import MotionDirection
-from enfilade.metric.eye import EYE_DRIFT_DEG_S, Pursuit
+from enfilade.metric.eye import EYE_DRIFT_DEG_S
 from enfilade.metric.inputs import Pair
 from enfilade.metric.pooling import Pool
 from enfilade.metric.pyramid import Pyramid
@@ -21,6 +21,7 @@ from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.metric.transducer import Transducer, energy_difference
 from enfilade.metric.transient import FlickerWeight
 from enfilade.records import F32, F64
+from enfilade.settings import Pursuit
 from enfilade.viewing import Viewing
 
 CHANNEL_EXPONENT = 1.0  # no unit, of energies: contrasts add with exponent 2, without ripple between channels

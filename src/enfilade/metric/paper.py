@@ -12,7 +12,6 @@ from enfilade.metric.amplitude import contrast_gain, response
 from enfilade.metric.channels import ChannelBank
 from enfilade.metric.comparison import Comparison
 from enfilade.metric.csf import spatiovelocity_sensitivity
-from enfilade.metric.eye import Pursuit
 from enfilade.metric.inputs import Pair
 from enfilade.metric.masking import MASK_SLOPE, check_mask_slope, threshold_elevation
 from enfilade.metric.noise import response_variance
@@ -20,6 +19,7 @@ from enfilade.metric.pooling import POOLING_EXPONENT, Pool, raised
 from enfilade.metric.pyramid import Pyramid
 from enfilade.metric.sensitivity import ChannelSensitivity, SensitivityTable
 from enfilade.records import F32, F64, Mask
+from enfilade.settings import Pursuit
 from enfilade.viewing import Viewing
 
 

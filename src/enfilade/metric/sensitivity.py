@@ -12,7 +12,6 @@ import numpy.typing as npt
 from enfilade.metric.cortex import ORIENTATIONS_DEG, Band
 from enfilade.metric.eye import (
     EYE_DRIFT_DEG_S,
-    Pursuit,
     channel_speed,
     held_smear,
     retinal_velocity,
@@ -20,6 +19,7 @@ from enfilade.metric.eye import (
 )
 from enfilade.metric.pyramid import Pyramid, double, halve, halved_shape
 from enfilade.records import F32, F64, Mask
+from enfilade.settings import Pursuit
 
 Indices: TypeAlias = npt.NDArray[np.int32]
 

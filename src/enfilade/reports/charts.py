@@ -25,7 +25,8 @@ from enfilade.files import whole_file
 
 __all__ = [
     "BLUE", "GREEN", "GREY", "INK", "ORANGE", "PALETTE", "PROVENANCE_COLORS", "SKY", "SVG_AXES", "VERMILION",
-    "Figure", "Panel", "Series", "draw", "legend", "new_figure", "pixels", "save", "save_picture", "svg",
+    "Figure", "Panel", "Series", "draw", "legend", "new_figure", "pixels", "save", "save_picture",
+    "style_axes", "svg",
 ]  # fmt: skip
 
 BLUE, ORANGE, GREEN, VERMILION, SKY, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#BBBBBB"
@@ -106,7 +107,8 @@ def new_figure(title: str, headings: Sequence[str]) -> tuple[Figure, list[Any]]:
     for letter, heading, ax in zip("abcdef", headings, axes, strict=False):
         ax.set_title(f"({letter}) {heading}", loc="left", fontsize=10, color=INK)
         ax.margins(x=0.01)
-        _style(ax, text_pt=9)
+        style_axes(ax, text_pt=9, grid="y")
+        _mark_frames(ax)
     axes[-1].set_xlabel("frame")
     return figure, list(axes)
 
@@ -146,7 +148,8 @@ def svg(panel: Panel, span: tuple[float, float]) -> str:
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": panel.name}):
         figure = Figure(figsize=(SVG_WIDTH / 72.0, SVG_HEIGHT / 72.0), dpi=72)
         ax = figure.add_axes(SVG_AXES)
-        _style(ax, text_pt=SVG_TEXT)
+        style_axes(ax, text_pt=SVG_TEXT, grid="y")
+        _mark_frames(ax)
         draw(ax, panel)
         ax.set_xlim(span)
         ax.yaxis.set_major_locator(MaxNLocator(4))
@@ -177,12 +180,16 @@ def save_picture(values: npt.NDArray[np.uint8], file: Path) -> Path:
     return file
 
 
-def _style(ax: Any, *, text_pt: float) -> None:
-    ax.grid(axis="y", color=RULE, linewidth=0.6)
+def style_axes(ax: Any, *, text_pt: float, grid: str = "both") -> None:
+    """Give axes the look of all charts: a light grid along ``x``, ``y`` or both, no frame, dark numbers."""
+    ax.grid(axis=grid, color=RULE, linewidth=0.6)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set_color(RULE)
-    ax.tick_params(color=RULE, labelcolor=INK, labelsize=text_pt, length=3)
+    ax.tick_params(which="both", color=RULE, labelcolor=INK, labelsize=text_pt, length=3)
+
+
+def _mark_frames(ax: Any) -> None:
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
 
 

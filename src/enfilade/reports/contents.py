@@ -13,7 +13,7 @@ from enfilade.reports.film import Film
 from enfilade.reports.panels import quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
-from enfilade.reports.tables import TRACED_COLUMNS, percent, psnr_text, seconds, spoken
+from enfilade.reports.tables import percent, psnr_text, rays_columns, seconds, time_rows, traced_columns
 from enfilade.scene.blender.imported import ImportedScene
 from enfilade.scene.blender.notes import TITLES, NoteGroup, grouped
 from enfilade.settings import SECTIONS, Section
@@ -103,12 +103,11 @@ def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Tables of rays by kind, where the method counts them, and of pixels by provenance (Table 1)."""
     tables, rays = [], summary["rays"]
     if rays:
-        columns = [(spoken(kind), f"{count:.2f}") for kind, count in rays.items()]
-        columns.append(("total", f"{sum(rays.values()):.2f}"))
         text = "Rays of all tasks so far, divided by the number of pixels of the whole path."
-        tables.append({"title": "Rays per pixel and frame", "columns": columns, "text": text})
+        title = "Rays per pixel and frame"
+        tables.append({"title": title, "columns": rays_columns(summary), "text": text})
     if summary["per_frame"]:
-        columns = [(title, percent(summary["traced_percent"][key])) for key, title in TRACED_COLUMNS.items()]
+        columns = traced_columns(summary)
         if rays:
             columns[-1] = ("reused", percent(100.0 - summary["traced_percent"]["total"]))
         title = "Pixels by provenance, %" if rays else "Pixels traced, %"
@@ -119,20 +118,10 @@ def _effort(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _stages(run: ReportedRun) -> list[dict[str, str]]:
     """Rows of Table 2, with the number of tasks of the stages that are passes."""
-    times, tasks = run.summary["time_s"], Counter(line["pass"] for line in run.lines)
-    rows = [(name, tasks.get(name), of["wall_s"], of["cpu_s"]) for name, of in times["stages"].items()]
-    rows.append(("total", sum(tasks.values()), times["total_s"], times["cpu_s"]))
-    return [
-        {
-            "name": spoken(name),
-            "tasks": "" if count is None else str(count),
-            "wall": seconds(wall),
-            "cpu": seconds(cpu),
-            "per_frame": seconds(wall / run.summary["frames"]),
-            "percent": percent(100.0 * wall / max(times["total_s"], 1e-9)),
-        }
-        for name, count, wall, cpu in rows
-    ]
+    tasks = Counter(line["pass"] for line in run.lines)
+    counts = [*(tasks.get(name, "") for name in run.summary["time_s"]["stages"]), tasks.total()]
+    rows = time_rows(run.summary)
+    return [{**row, "tasks": str(count)} for row, count in zip(rows, counts, strict=True)]
 
 
 def _difference(

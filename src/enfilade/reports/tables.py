@@ -1,4 +1,4 @@
-"""Tables of a run and a comparison for a terminal, and their number formats."""
+"""Tables of a run and a comparison: their figures as text, for a terminal and for the page."""
 
 from __future__ import annotations
 
@@ -27,7 +27,46 @@ def run_tables(summary: Mapping[str, Any]) -> list[Table]:
     summary
         See :func:`~enfilade.runs.statistics.statistics`.
     """
-    return [_rays_table(summary) if summary["rays"] else _traced_table(summary), _time_table(summary)]
+    if summary["rays"]:
+        title, columns = "Rays per pixel and frame", rays_columns(summary)
+    else:
+        title, columns = "Pixels traced, percent (Table 1)", traced_columns(summary)
+    effort = _table(title, ("method", *(name for name, _ in columns)))
+    effort.add_row(summary["method"], *(figure for _, figure in columns))
+    time = _table("Time (Table 2)", ("stage", "wall", "CPU", "wall per frame", "%"))
+    *stages, total = time_rows(summary)
+    for stage in stages:
+        time.add_row(*stage.values())
+    time.add_section()
+    time.add_row(*total.values())
+    return [effort, time]
+
+
+def rays_columns(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Rays per pixel and frame, by kind and in total: title and figure of each column."""
+    total = sum(summary["rays"].values())
+    return [(spoken(kind), f"{count:.2f}") for kind, count in (*summary["rays"].items(), ("total", total))]
+
+
+def traced_columns(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Table 1, pixels traced by reason and in total, percent: title and figure of each column."""
+    return [(title, percent(summary["traced_percent"][key])) for key, title in TRACED_COLUMNS.items()]
+
+
+def time_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Table 2, time by stage and in total: name, wall, CPU, wall per frame and percent of each row."""
+    times = summary["time_s"]
+    total = {"wall_s": times["total_s"], "cpu_s": times["cpu_s"]}
+    return [
+        {
+            "name": spoken(name),
+            "wall": seconds(spent["wall_s"]),
+            "cpu": seconds(spent["cpu_s"]),
+            "per_frame": seconds(spent["wall_s"] / summary["frames"]),
+            "percent": percent(100.0 * spent["wall_s"] / max(times["total_s"], 1e-9)),
+        }
+        for name, spent in (*times["stages"].items(), ("total", total))
+    ]
 
 
 def result_line(found: Mapping[str, Any]) -> str:
@@ -82,35 +121,6 @@ def seconds(value: float) -> str:
     if value >= 100.0:
         return f"{value / 60.0:.1f} min"
     return f"{value:.2f} s" if value >= 0.1 else f"{1000.0 * value:.1f} ms"
-
-
-def _rays_table(summary: Mapping[str, Any]) -> Table:
-    rays = summary["rays"]
-    table = _table("Rays per pixel and frame", ("method", *map(spoken, rays), "total"))
-    table.add_row(summary["method"], *(f"{count:.2f}" for count in (*rays.values(), sum(rays.values()))))
-    return table
-
-
-def _traced_table(summary: Mapping[str, Any]) -> Table:
-    table = _table("Pixels traced, percent (Table 1)", ("method", *TRACED_COLUMNS.values()))
-    table.add_row(summary["method"], *(percent(summary["traced_percent"][key]) for key in TRACED_COLUMNS))
-    return table
-
-
-def _time_table(summary: Mapping[str, Any]) -> Table:
-    times = summary["time_s"]
-    total = max(times["total_s"], 1e-9)
-    table = _table("Time (Table 2)", ("stage", "wall", "CPU", "wall per frame", "%"))
-    for name, spent in times["stages"].items():
-        wall = spent["wall_s"]
-        per_frame = seconds(wall / summary["frames"])
-        table.add_row(
-            spoken(name), seconds(wall), seconds(spent["cpu_s"]), per_frame, percent(100.0 * wall / total)
-        )
-    table.add_section()
-    sums = (seconds(times[key]) for key in ("total_s", "cpu_s", "per_frame_s"))
-    table.add_row("total", *sums, percent(100.0))
-    return table
 
 
 def _difference(row: Mapping[str, Any], visible: float) -> list[str]:

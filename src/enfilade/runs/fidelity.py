@@ -84,9 +84,9 @@ class ImportCheck:
     imported: Cost
 
 
-def checked_numbers(path: CameraPath, count: int = FRAMES) -> tuple[int, ...]:
-    """Numbers of some frames, evenly from the first to the last."""
-    indices = np.linspace(0, len(path) - 1, min(count, len(path))).round().astype(int)
+def checked_numbers(path: CameraPath) -> tuple[int, ...]:
+    """Numbers of the frames that are checked by default, evenly from the first to the last."""
+    indices = np.linspace(0, len(path) - 1, min(FRAMES, len(path))).round().astype(int)
     return tuple(path.numbers[i] for i in indices)
 
 

@@ -20,11 +20,10 @@ from enfilade.files import read_json, write_json
 from enfilade.images import check_encodable
 from enfilade.images.view import view_identity
 from enfilade.methods.base import Method
-from enfilade.methods.opener import open_method
+from enfilade.methods.opener import open_method, sections_of
 from enfilade.renderer import Renderer, why_inseparable
 from enfilade.scene.opener import Scene
 from enfilade.settings import (
-    SECTIONS,
     LimitSettings,
     OutputSettings,
     Settings,
@@ -163,7 +162,7 @@ class Job:
         return {
             "scene": self.scene.to_json(),
             "method": self.method,
-            "settings": self.settings.to_tables(dict.fromkeys([*SECTIONS, *self.opened_method().settings])),
+            "settings": self.settings.to_tables(sections_of(self.opened_method())),
             "path": {
                 "size": [path.width, path.height],
                 "fps": path.fps,
@@ -195,11 +194,10 @@ class Job:
             for pose, fov, (x, y) in zip(poses, path["fov_deg"], points, strict=True)
         )
         numbers = tuple(int(number) for number in path["numbers"])
-        kinds = list(dict.fromkeys([*SECTIONS, *open_method(table["method"]).settings]))
         return Job(
             scene=Scene.from_json(table["scene"]),
             path=CameraPath(cameras, numbers, float(path["fps"]), frozenset(path["cuts"])),
-            settings=Settings.from_tables(table["settings"], kinds),
+            settings=Settings.from_tables(table["settings"], sections_of(open_method(table["method"]))),
             method=table["method"],
         )
 

@@ -93,17 +93,6 @@ def prepare(job: Job, folder: Path, *, has_preflight: bool = False) -> None:
     _created(job, folder, has_preflight=has_preflight).close()
 
 
-def resume(folder: Path, monitor: Monitor, workers: Workers | None = None) -> dict[str, Any]:
-    """Do all tasks that are left of a run; see :func:`render`.
-
-    Raises
-    ------
-    RunFolderError
-        It holds no run.
-    """
-    return render(read_job(folder), folder, monitor, workers)
-
-
 @dataclass(frozen=True)
 class Shard:
     """One of several parts of a pass.

@@ -1,10 +1,13 @@
-"""A file that Blender imports as the scene of a run: imported once, into the run folder."""
+"""The job of a run, whose scene Blender may import: once, into the run folder."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from enfilade.errors import RunFolderError, SceneError
+from enfilade.camera import CameraPath, load_path
+from enfilade.errors import CameraPathError, RunFolderError, SceneError
 from enfilade.files import sweep
 from enfilade.monitor import Monitor
 from enfilade.runs.identity import RUN_FILE, SCENE_FOLDER, check_place
@@ -15,6 +18,67 @@ from enfilade.scene.blender.importer import check_strict, import_file
 from enfilade.scene.blender.notes import NoteKind, grouped
 from enfilade.scene.blender.source import SOURCE_FILE, Choices, Source, check_source, is_importable
 from enfilade.settings import BlenderSettings, LimitSettings, Settings
+
+if TYPE_CHECKING:
+    from enfilade.runs.job import Job
+    from enfilade.scene.opener import Scene
+
+
+def job_of(
+    scene: Scene | Path | str,
+    path: CameraPath | Path | str | None,
+    settings: Settings | Mapping[str, Mapping[str, Any]],
+    method: str,
+    run: Path | None,
+    monitor: Monitor,
+    *,
+    size: tuple[int, int] | None = None,
+    frames: tuple[int, ...] | None = None,
+    fps: float | None = None,
+) -> Job:
+    """The job of a scene; an imported scene has a camera path and settings for what is not given.
+
+    Parameters
+    ----------
+    scene
+        A scene or its file; or a file that Blender imports, or a folder, see :func:`imported_scene`.
+    path
+        A camera path or its file; None: that of the imported scene.
+    settings
+        Tables, which win over those of the imported scene; or settings, which replace these.
+    method
+        A built-in method's name, or ``module:Class``.
+    run
+        The run folder; None: no file is imported.
+    monitor
+    size, frames, fps
+        Of a path that is read, see :func:`~enfilade.camera.load_path`.
+
+    Raises
+    ------
+    InputError
+        A setting or the path is wrong, there is no path, or the scene can't be imported.
+    """
+    # Imported here: an import alone needs no Dr.Jit.
+    from enfilade.methods.opener import open_method, sections_of
+    from enfilade.runs.job import Job
+    from enfilade.scene.opener import Scene
+
+    kinds = sections_of(open_method(method))
+    chosen = settings if isinstance(settings, Settings) else Settings.from_tables(settings, kinds)
+    if isinstance(path, Path | str):
+        path = load_path(path, size=size, frames=frames, fps=fps)
+    if not isinstance(scene, Scene):
+        span = (frames[0], frames[-1]) if frames and path is None else None
+        imported = imported_scene(Path(scene), run, chosen, monitor, size=size, frames=span)
+        if imported is not None:
+            path = path or load_path(imported.checked_path(), size=size, frames=frames, fps=fps)
+            if not isinstance(settings, Settings):
+                chosen = Settings.from_tables(imported.tables_under(settings), kinds)
+        scene = Scene(Path(scene) if imported is None else imported.scene_file)
+    if path is None:
+        raise CameraPathError(f"{scene.file} needs a camera path: path is None")
+    return Job(scene, path, chosen, method)
 
 
 def choices_of(

@@ -214,7 +214,7 @@ def test_a_share_of_the_foreground_is_not_moved_into_the_open_background():
 
     def keyframe(camera):
         color = traced_image(scene, camera, spp=64, box=True).color
-        return Keyframe(0, geometry_of(scene, camera), Halves(color, color))
+        return Keyframe(geometry_of(scene, camera), Halves(color, color))
 
     before, after = (warp_keyframe(keyframe(at(x)), middle, SETTINGS) for x in (-0.15, 0.15))
     geometry = geometry_of(scene, middle)

@@ -61,7 +61,7 @@ def refined(change, *, spp, seed, limit=10.0):
 
     @cache
     def keyframe(frame):
-        return Keyframe(frame, walk.view(frame).geometry, trace_keyframe(walk, frame))
+        return Keyframe(walk.view(frame).geometry, trace_keyframe(walk, frame))
 
     return Refinement(walk).refine(Segment(0, FRAMES - 1), keyframe)
 

@@ -353,7 +353,7 @@ def test_sample_positions_are_exact():
     camera = camera_at((0, 0, 4))
     keyframe = keyframe_of(wall(), camera)
     ramp = np.repeat(pixel_centres(camera)[..., :1], 3, axis=-1).astype(np.float32)
-    keyframe = Keyframe(0, keyframe.geometry, Halves(ramp, ramp))
+    keyframe = Keyframe(keyframe.geometry, Halves(ramp, ramp))
     target = beside(camera, (0.137, 0.071, -0.4))
     got = warp_keyframe(keyframe, target, SETTINGS)
     depth, _ = first_hits(wall(), target.eye, ray_directions(target))

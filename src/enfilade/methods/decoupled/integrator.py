@@ -156,7 +156,7 @@ class Integrator:
         path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         # Pad the paths: a few are often as many as some mesh has vertices, which would be another signature.
         count = dr.width(path.lane)
-        return Samples(self._reflected(cache, compact(path, path.lane), on_miss, count))
+        return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 
     def specular_radiance_at_edges(
         self,
@@ -185,18 +185,13 @@ class Integrator:
         missing = compact(path, dr.compress(is_missing))
         if not dr.width(missing.lane):
             return Samples(tuple(found))
-        traced = self._reflected(cache, missing, count=dr.width(path.lane))
+        traced = self._reflected(cache, missing, dr.width(path.lane))
         return Samples(tuple(have + more for have, more in zip(found, traced, strict=True)))
 
     def _reflected(
-        self,
-        cache: IrradianceCache,
-        path: Path,
-        on_miss: OnMiss | None = None,
-        count: int | None = None,
+        self, cache: IrradianceCache, path: Path, count: int, on_miss: OnMiss | None = None
     ) -> tuple[Any, ...]:
         """Radiance of both specular AOVs by lane, of `count` lanes, from camera paths."""
-        count = count or dr.width(path.lane)
         light, deferred = Contributions(SPECULAR_AOVS * count), _Deferred()  # one AOV after the other
 
         # Bounce off the visible surface: all paths, then the other branch at interfaces.

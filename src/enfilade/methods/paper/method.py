@@ -140,7 +140,7 @@ class _Context:
 
     def keyframe_of(self, frame: int, shading: Callable[[], Halves]) -> Keyframe:
         """A keyframe with its shading."""
-        return self.keyframes.get(frame, lambda: Keyframe(frame, self.walk.view(frame).geometry, shading()))
+        return self.keyframes.get(frame, lambda: Keyframe(self.walk.view(frame).geometry, shading()))
 
 
 def _refined(task: Task, context: _Context) -> Output:

@@ -73,20 +73,18 @@ class Lobes:
             bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(_base(bsdf, is_front=False))), UInt),
         )
         self._turned = bsdf_table(scene, _is_turned)
-        self._own_albedo = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
         self._rough_ior = bsdf_table(scene, _rough_ior, Float)
         self._narrow = bsdf_table(scene, _is_narrow)
         self._coated = bsdf_table(scene, lambda bsdf: _classes(bsdf) <= COATED)
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
-        self._has_own_albedo = bool(dr.any(self._own_albedo))
         self._specular_albedo = self._mean_specular_albedo(scene)
 
     @property
     def state(self) -> Any:
         """Arrays that the methods read."""
-        albedos = self._own_albedo, self._bases, self._turned, self._masked, self._specular_albedo
+        albedos = self._bases, self._turned, self._masked, self._specular_albedo
         interfaces = self._clear, self._rough_ior, self._narrow, self._coated
         return self._whole, self._lambertian, self._sides, interfaces, albedos
 
@@ -128,9 +126,9 @@ class Lobes:
         inner.wi = dr.select(_number(base) != _number(bsdf), along_normal, si.wi)
 
         # Evaluate the diffuse component, or the reflectance where a BSDF does not tell it apart.
-        is_own = is_diffuse & _of(self._own_albedo, si, base)
+        is_own = is_diffuse & _of(self._whole, si, base)
         albedo = dr.pi * base.eval(self._diffuse, inner, along_normal, is_diffuse & ~is_own)
-        if self._has_own_albedo:
+        if self._has_whole:
             own = base.eval_diffuse_reflectance(inner, is_own)
             for name, scale in NOT_DIFFUSE.items():
                 has_it = is_own & base.has_attribute(name, is_own)

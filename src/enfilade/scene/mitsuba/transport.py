@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from enfilade.arrays import Array3f, Bool, UInt
-from enfilade.kernels.guiding import PathGuide
+from enfilade.kernels.guiding import GuidedLobe, PathGuide
 from enfilade.records import MIN_DIFFUSE_ALBEDO
 from enfilade.renderer import Bounce, Branch, BsdfSample, Rays, ShadingPoint
 from enfilade.scene.mitsuba.lobes import Lobes
@@ -192,7 +192,7 @@ class LightTransport:
         """
         si = point.native
         bsdf = si.bsdf()
-        mixture = guide.at(point.position, point.surfaces.normal)
+        mixture = GuidedLobe(guide, point.position, point.surfaces.normal)
         numbers = sampler.fork(GUIDE_SALT)
         direction, is_guided = mixture.sample(numbers.next_1d(), numbers.next_2d())
         is_guided &= active
