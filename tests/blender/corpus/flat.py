@@ -4,10 +4,9 @@
 import math
 import random
 
-import bpy
 import numpy as np
 
-from corpus.stage import aim, box, camera, fill, image, light, new_file, node_of, shader, world
+from corpus.stage import aim, box, camera, fill, image, light, new_file, node_of, shader, sphere, world
 
 ROOMS, ROOM_M, HEIGHT_M = 3, 5.0, 2.7
 
@@ -71,12 +70,7 @@ def _room(x, paints, chance):
         soft = box("chair", place, (0.5, 0.5, 0.6), chance.choice(paints)).modifiers.new("Soft", "SUBSURF")
         soft.levels, soft.render_levels = 1, 6
     for bowl in range(20):
-        bpy.ops.mesh.primitive_uv_sphere_add(
-            radius=0.09, segments=128, ring_count=64, location=(x + 1.0 + 0.15 * bowl, 1.2, 0.9)
-        )
-        bpy.ops.object.shade_smooth()
-        bpy.context.object.name = "bowl"
-        bpy.context.object.data.materials.append(chance.choice(paints))
+        sphere("bowl", (x + 1.0 + 0.15 * bowl, 1.2, 0.9), 0.09, chance.choice(paints), 128)
     light("POINT", "Bulb", (x + 2.5, 1.0, 2.2), 60.0, shadow_soft_size=0.08)
 
 

@@ -12,12 +12,15 @@ from corpus.stage import (
     cube,
     fill,
     finish,
+    group,
     image,
+    instance,
     new_file,
     node_of,
     plane,
     principled,
     save,
+    scattering,
     shader,
     sphere,
     stage,
@@ -33,14 +36,10 @@ def instances(folder):
     brown = principled("chair", (0.7, 0.3, 0.1, 1), Roughness=0.5)
     chair = cube("Chair", (0.0, 0.0, 0.25), 0.5, brown)
     knob = sphere("Knob", (0.0, 0.0, 0.65), 0.15, principled("knob", Metallic=1.0, Roughness=0.2))
-    group = bpy.data.collections.new("Chairs")
-    for obj in (chair, knob):
-        bpy.context.scene.collection.objects.unlink(obj)
-        group.objects.link(obj)
+    chairs = group("Chairs", (chair, knob))
     for i in range(6):
-        empty = add(f"copy {i}", None, (-2.0 + 0.8 * i, -0.5 + 0.3 * (i % 2), 0.0))
-        empty.instance_type, empty.instance_collection = "COLLECTION", group
-        empty.rotation_euler, empty.scale = (0.0, 0.0, 0.4 * i), (1.0 if i % 2 else -0.7, 0.7, 0.7 + 0.1 * i)
+        copy = instance(f"copy {i}", chairs, (-2.0 + 0.8 * i, -0.5 + 0.3 * (i % 2), 0.0), 0.4 * i)
+        copy.scale = (1.0 if i % 2 else -0.7, 0.7, 0.7 + 0.1 * i)
 
 
 def modifiers(folder):
@@ -83,7 +82,7 @@ def geometry_nodes(folder):
     pebble = sphere("Pebble", (0.0, 0.0, -5.0), 0.12, principled("pebble", (0.6, 0.2, 0.5, 1), Roughness=0.4))
     pebble.hide_render = True
     ground = plane("Ground", (0.0, 0.0, 0.05), 3.0, principled("ground", Roughness=0.9))
-    tree, start, points, end = _scattering("Scatter", density=8.0)
+    tree, start, points, end = scattering("Scatter", density=8.0)
     info = tree.nodes.new("GeometryNodeObjectInfo")
     info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = pebble, True
     copies, join = tree.nodes.new("GeometryNodeInstanceOnPoints"), tree.nodes.new("GeometryNodeJoinGeometry")
@@ -95,18 +94,6 @@ def geometry_nodes(folder):
     ground.modifiers.new("Scatter", "NODES").node_group = tree
 
 
-def _scattering(name, density):
-    """A tree of geometry nodes that distributes points on a surface; its input, points and output."""
-    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    for way in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
-    points.inputs["Density"].default_value = density
-    tree.links.new(start.outputs[0], points.inputs["Mesh"])
-    return tree, start, points, end
-
-
 def instances_of_meshes(folder):
     """Geometry nodes that make what they scatter, with the surface that they scatter it on and without."""
     stage()
@@ -116,7 +103,7 @@ def instances_of_meshes(folder):
     lent.hide_render = True
     for x, has_surface in ((-1.1, True), (1.1, False)):
         ground = plane("Pedestal", (x, 0.0, 0.4), 1.6, principled("pedestal", Roughness=0.9))
-        tree, start, points, end = _scattering("Cubes", density=6.0)
+        tree, start, points, end = scattering("Cubes", density=6.0)
         box, painted = tree.nodes.new("GeometryNodeMeshCube"), tree.nodes.new("GeometryNodeSetMaterial")
         box.inputs["Size"].default_value = (0.2, 0.2, 0.2)
         painted.inputs["Material"].default_value = red
@@ -219,9 +206,9 @@ def library(folder):
     for x in (-1.2, 1.2):
         empty = add(f"place {x}", None, (x, 0.0, 0.45))
         empty.instance_type = "COLLECTION"
-        group = bpy.data.collections.new(f"linked {x}")
-        group.objects.link(wanted.objects[0])
-        empty.instance_collection = group
+        linked = bpy.data.collections.new(f"linked {x}")
+        linked.objects.link(wanted.objects[0])
+        empty.instance_collection = linked
 
 
 def two_slots(folder):

@@ -3,10 +3,24 @@
 
 import random
 
-import bpy
 import numpy as np
 
-from corpus.stage import add, aim, box, camera, fill, image, light, new_file, node_of, shader, world
+from corpus.stage import (
+    aim,
+    box,
+    camera,
+    fill,
+    group,
+    image,
+    instance,
+    light,
+    new_file,
+    node_of,
+    scattering,
+    shader,
+    sphere,
+    world,
+)
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 18.0, 8.0, 3.0
 PATTERNS = (  # procedural: kind of node, and its scales
@@ -103,7 +117,9 @@ def _desks(paints, chance):
             for i in range(10)
         ),
         *(
-            _ball("sweet", (0.42 + 0.05 * (i % 3), -0.1 + 0.05 * (i // 3), 0.79), 0.03, paints[4 + i % 10])
+            sphere(
+                "sweet", (0.42 + 0.05 * (i % 3), -0.1 + 0.05 * (i // 3), 0.79), 0.03, paints[4 + i % 10], 48
+            )
             for i in range(6)
         ),
     ]
@@ -112,10 +128,10 @@ def _desks(paints, chance):
     for cushion in (seat, back):
         soft = cushion.modifiers.new("Soft", "SUBSURF")
         soft.levels, soft.render_levels = 1, 6
-    group = _group("Desk", [*parts, seat, back])
+    desk = group("Desk", [*parts, seat, back])
     for i in range(24):
         place = (1.2 + 1.5 * (i % 12), 3.4 + 2.6 * (i // 12), 0.0)
-        _instance(f"desk {i}", group, place, chance.uniform(-0.2, 0.2))
+        instance(f"desk {i}", desk, place, chance.uniform(-0.2, 0.2))
     for i in range(40):
         size = (chance.uniform(0.04, 0.3), 0.24, chance.uniform(0.15, 0.32))
         place = (1.0 + 0.4 * i, 0.22, 1.2 + size[2] / 2 + 0.5 * (i % 2))
@@ -127,33 +143,20 @@ def _desks(paints, chance):
 
 def _plants(paints):
     """Eight pots; leaves are scattered over a sphere by geometry nodes."""
-    leaf = _ball("leaf", (0.0, 0.0, -5.0), 0.06, paints[23])
+    leaf = sphere("leaf", (0.0, 0.0, -5.0), 0.06, paints[23], 48)
     leaf.scale, leaf.hide_render = (1.0, 0.5, 0.1), True
     for i in range(8):
         x = 2.0 + 2.1 * i
         box("pot", (x, 7.4, 0.2), (0.35, 0.35, 0.4), paints[6 + i])
-        crown = _ball("crown", (x, 7.4, 0.85), 0.4, paints[24])
+        crown = sphere("crown", (x, 7.4, 0.85), 0.4, paints[24], 48)
         crown.modifiers.new("Leaves", "NODES").node_group = _scatter(leaf)
 
 
 def _scatter(leaf):
     """Instances of an object on the points of a surface, in place of the surface."""
-    tree = bpy.data.node_groups.new("Leaves", "GeometryNodeTree")
-    for side in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
-    start, end, points, info, copies = (
-        tree.nodes.new(kind)
-        for kind in (
-            "NodeGroupInput",
-            "NodeGroupOutput",
-            "GeometryNodeDistributePointsOnFaces",
-            "GeometryNodeObjectInfo",
-            "GeometryNodeInstanceOnPoints",
-        )
-    )
-    points.inputs["Density"].default_value = 20.0
+    tree, _, points, end = scattering("Leaves", density=20.0)
+    info, copies = (tree.nodes.new(f"GeometryNode{kind}") for kind in ("ObjectInfo", "InstanceOnPoints"))
     info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = leaf, True
-    tree.links.new(start.outputs[0], points.inputs["Mesh"])
     tree.links.new(points.outputs["Points"], copies.inputs["Points"])
     tree.links.new(points.outputs["Rotation"], copies.inputs["Rotation"])
     tree.links.new(info.outputs["Geometry"], copies.inputs["Instance"])
@@ -180,26 +183,3 @@ def _lamps():
         ),
     )
     fill(tree, tree.nodes["Background"], {0: texture})
-
-
-def _ball(name, place, radius, material):
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, segments=48, ring_count=24, location=place)
-    obj = bpy.context.object
-    obj.name = name
-    bpy.ops.object.shade_smooth()
-    obj.data.materials.append(material)
-    return obj
-
-
-def _group(name, objects):
-    group = bpy.data.collections.new(name)
-    for obj in objects:
-        bpy.context.scene.collection.objects.unlink(obj)
-        group.objects.link(obj)
-    return group
-
-
-def _instance(name, group, place, turn):
-    empty = add(name, None, place)
-    empty.instance_type, empty.instance_collection = "COLLECTION", group
-    empty.rotation_euler = (0.0, 0.0, turn)

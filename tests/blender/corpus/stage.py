@@ -54,6 +54,35 @@ def add(name, data, location=(0.0, 0.0, 0.0)):
     return obj
 
 
+def group(name, objects):
+    """A collection of objects, which leave the scene."""
+    value = bpy.data.collections.new(name)
+    for obj in objects:
+        bpy.context.scene.collection.objects.unlink(obj)
+        value.objects.link(obj)
+    return value
+
+
+def instance(name, collection, location, turn):
+    """An instance of a collection, turned about z."""
+    empty = add(name, None, location)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    empty.rotation_euler = (0.0, 0.0, turn)
+    return empty
+
+
+def scattering(name, density):
+    """A tree of geometry nodes that distributes points on a surface; its input, points and output."""
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    for side in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    points = tree.nodes.new("GeometryNodeDistributePointsOnFaces")
+    points.inputs["Density"].default_value = density
+    tree.links.new(start.outputs[0], points.inputs["Mesh"])
+    return tree, start, points, end
+
+
 def light(kind, name, location, energy, target=(0.0, 0.0, 0.0), **settings):
     data = bpy.data.lights.new(name, kind)
     data.energy = energy
@@ -92,8 +121,10 @@ def box(name, location, size, material):
     return obj
 
 
-def sphere(name, location, radius, material):
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=64, ring_count=32)
+def sphere(name, location, radius, material, segments=64):
+    bpy.ops.mesh.primitive_uv_sphere_add(
+        radius=radius, location=location, segments=segments, ring_count=segments // 2
+    )
     obj = finish(name, material)
     bpy.ops.object.shade_smooth()
     return obj
