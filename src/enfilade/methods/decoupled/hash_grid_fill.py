@@ -30,17 +30,17 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
+    random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
     is_sharp = np.isin(geometry.surface, SHARP).ravel()
     with_virtual = replace(cache, hash_grid=virtual.upload())
     for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):
-        specular = shot.estimate(  # the same random numbers for pixels that have none in common
-            frame,
+        specular = shot.estimate(
             camera,
             pixels,
             lambda rays, sampler, known=known: shot.integrator.specular_radiance(
                 known, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
             ),
-            Purpose.HASH_GRID,
+            random,
             pixel_filter=PixelFilter.BOX,
             layers=SPECULAR_AOVS,
         )
@@ -49,13 +49,12 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
-        frame,
         camera,
         np.ones(camera.width * camera.height, np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
             cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
         ),
-        Purpose.SEEN_HASH_GRID,
+        walk.random(frame, Purpose.SEEN_HASH_GRID),
         pixel_filter=PixelFilter.GAUSSIAN,
         layers=1,
     )
@@ -63,13 +62,12 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Gather at the diffuse pixels of the prepass image.
     gathered = shot.estimate(
-        frame,
         geometry.camera,
         geometry.has_diffuse,
         lambda rays, sampler: shot.integrator.final_gather(
             cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
         ),
-        Purpose.PREPASS_HASH_GRID,
+        walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )
     gathered.add(GATHER_SPP)
 

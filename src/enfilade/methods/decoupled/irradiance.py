@@ -36,11 +36,10 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     whole = walk.path.cameras[frame]
     camera, pixel_angle = irradiance_camera(whole), light_camera(whole).pixel_angle
     estimate = shot.estimate(
-        frame,
         camera,
         where,
         lambda rays, sampler: shot.integrator.final_gather(cache, rays, sampler, pixel_angle=pixel_angle),
-        Purpose.IRRADIANCE,
+        walk.random(frame, Purpose.IRRADIANCE),
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)

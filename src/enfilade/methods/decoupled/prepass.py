@@ -27,7 +27,6 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     )
     guide = upload_guide(regions)
     estimate = shot.estimate(
-        frame,
         geometry.camera,
         where,
         lambda rays, sampler: Samples(
@@ -35,7 +34,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
                 renderer.intersect(rays, opaque_only=True), sampler, path_depth=2, guide=guide
             )
         ),
-        Purpose.PREPASS,
+        walk.random(frame, Purpose.PREPASS),
     )
     estimate.add(SPP)
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)

@@ -31,7 +31,7 @@ from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry, Mask
-from enfilade.renderer import LobeRenderer, PixelFilter, Purpose
+from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey
 from enfilade.settings import DecoupledSettings, LimitSettings
 
 ACCUMULATED = 4  # keyframes to each side that are averaged with one
@@ -99,23 +99,22 @@ class ShotContext:
 
     def estimate(
         self,
-        frame: int,
         camera: Camera,
         where: Mask,
         radiance: Radiance,
-        purpose: Purpose,
+        random: RandomKey,
         *,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
         layers: int = 2,
     ) -> Estimate:
-        """An estimate of the pixels of a mask, with the random numbers of a frame and purpose."""
+        """An estimate of the pixels of a mask."""
         return Estimate(
             camera,
             np.flatnonzero(where).astype(np.uint32),
             radiance,
             chunk=self.walk.settings[LimitSettings].paths_in_flight,
             pixel_filter=pixel_filter,
-            random=self.walk.random(frame, purpose),
+            random=random,
             layers=layers,
         )
 

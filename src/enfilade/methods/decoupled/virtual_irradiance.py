@@ -83,7 +83,7 @@ def _gather(
 
     is_gathered = np.zeros(virtual.shape_index.shape, np.bool_)
     is_gathered.flat[pixels] = True
-    estimate = shot.estimate(frame, camera, is_gathered, radiance, Purpose.VIRTUAL_IMAGES)
+    estimate = shot.estimate(camera, is_gathered, radiance, shot.walk.random(frame, Purpose.VIRTUAL_IMAGES))
     estimate.add(SPP)
 
     # Denoise it together with what the prepass images show, whose pixels would be black among these; a
