@@ -46,7 +46,7 @@ class Check:
         return not self.remedy
 
     def to_dict(self) -> dict[str, Any]:
-        """Fields and verdict, for JSON."""
+        """Fields and `is_ok`, for JSON."""
         return {**asdict(self), "is_ok": self.is_ok}
 
 

@@ -292,7 +292,7 @@ class Renderer(Protocol):
             Flat indices ``y * width + x``.
         random
             The random numbers of a path depend on this key, the pixel and the index of the path alone: not on
-            the list, the chunk size or the worker.
+            the list, the size of batches or the worker.
         spp
             Paths traced for a pixel.
         pixel_filter

@@ -153,7 +153,7 @@ class SamplingSettings(Section):
 
     table = "sampling"
 
-    spp: int = option(64, "Paths traced for a pixel.", least=1, most=1_048_576)
+    spp: int = option(64, "Paths a pixel, of the methods paper and reference.", least=1, most=1_048_576)
 
 
 @dataclass(frozen=True)
@@ -317,7 +317,7 @@ class DecoupledSettings(Section):
 
     quality: float = option(
         10.0,
-        "Noise that may remain, on a scale of its own; lower is better and costs more.",
+        "Noise that decoupled may leave, on a scale of its own; lower is better and costs more.",
         least=0.5,
         most=100.0,
     )
@@ -337,7 +337,8 @@ class DecoupledSettings(Section):
     )
     denoiser: str = option(
         "balanced",
-        "Quality of Open Image Denoise on irradiance images; none: a wavelet filter, on specular AOVs, too.",
+        "Quality of Open Image Denoise on decoupled's irradiance images; none: a wavelet filter, on specular "
+        "AOVs, too.",
         choices=("none", "fast", "balanced", "high"),
     )
 

@@ -93,12 +93,12 @@ class Denoised(Method):
         if order != "before":
             color = self._denoised(walk, frame, color)
         if order == "none":
-            return Output({frame: Frame(color, _traced_everywhere(color))}, traced.facts)
+            return Output({frame: Frame(color, _traced_everywhere(color))}, traced.metadata)
         history = History(color, np.ones(color.shape[:2], np.float32))
         if task.needs:
             before = task.needs[0].frame
             history = accumulate(color, walk.view(frame), inputs.record("history", before), walk.view(before))
-        return Output({frame: history}, traced.facts)
+        return Output({frame: history}, traced.metadata)
 
     def _denoised(self, walk: Walkthrough, frame: int, color: F32) -> F32:
         """An image of a frame, denoised."""
@@ -109,7 +109,7 @@ class Denoised(Method):
             walk.path.cameras[frame],
             seed=walk.settings[TraceSettings].seed,
             frame=walk.path.numbers[frame],
-            chunk=walk.settings[LimitSettings].paths_in_flight,
+            paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
             is_followed=settings.guides == "followed",
         )
         return denoise(color, albedo, normal, quality=settings.quality)

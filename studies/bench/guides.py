@@ -36,7 +36,7 @@ class Guides:
             self._extend = recorded(self._extend_kernel, lambda: renderer.state)
 
     def images(
-        self, camera: Camera, *, seed: int, frame: int, chunk: int, is_followed: bool = False
+        self, camera: Camera, *, seed: int, frame: int, paths_in_flight: int, is_followed: bool = False
     ) -> tuple[F32, F32]:
         """Albedo and normal of an image, through a box filter.
 
@@ -45,8 +45,8 @@ class Guides:
         camera
         seed, frame
             Of the random numbers.
-        chunk
-            Rays in flight; no result depends on it.
+        paths_in_flight
+            Rays traced at once; no result depends on it.
         is_followed
             Whether rays continue through mirrors and clear glass, as Open Image Denoise recommends, with a
             :class:`LobeRenderer`; otherwise they end at the first surface.
@@ -71,7 +71,7 @@ class Guides:
                 "take first-hit"
             )
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-        step = max(chunk // RAYS, 1)
+        step = max(paths_in_flight // RAYS, 1)
         random = RandomKey(seed, frame, Purpose.GUIDE)
         batches = []
         for first in range(0, len(pixels), step):

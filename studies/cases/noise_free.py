@@ -21,7 +21,7 @@ from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneFacts
 SUN = (0.36, 0.48, 0.8)  # direction of the light, world space
 AMBIENT = 0.3  # share of the light that is the same from all directions
 OFFSET = 1e-4  # of the distance: start of reflected and transmitted rays
-CHUNK = 4_194_304  # rays in flight
+PATHS_IN_FLIGHT = 4_194_304  # rays in flight
 
 
 class NoiseFreeRenderer:
@@ -65,7 +65,7 @@ class NoiseFreeRenderer:
             pixels,
             self._radiance,
             spp=1 if pixel_filter is PixelFilter.CENTRE else spp,
-            chunk=CHUNK,
+            paths_in_flight=PATHS_IN_FLIGHT,
             pixel_filter=pixel_filter,
             random=random,
         )

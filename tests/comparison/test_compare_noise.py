@@ -1,4 +1,4 @@
-"""Two references measure their noise: floor, verdict, and PSNR without it."""
+"""Two references measure their noise: floor, significance, and PSNR without it."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_a_test_without_error_is_within_the_noise(sequence, references):
     floor = found.to_dict()["noise_floor"]
     # The noise of the mean of both is half their difference from each other; the transducer bends it.
     assert found.score == pytest.approx(0.5 * floor["score_jnd"], rel=0.15)
-    assert floor["verdict"] == "below"
+    assert floor["significance"] == "below"
     assert "a test without any error scores about half of it" in found.noise_note
     assert len(floor["per_frame_jnd"]) == FRAMES
     assert floor["score_jnd"] == compared(references[0], references[1], flow="none").score
@@ -51,20 +51,20 @@ def test_a_test_without_error_is_within_the_noise(sequence, references):
 
 def test_a_test_as_noisy_as_the_references_is_undecided(sequence, references):
     found = against(sequence("third", noisy(3)), references)
-    assert found.noise_floor.verdict(found.score) == "undecided"
+    assert found.noise_floor.significance(found.score) == "undecided"
     assert ", undecided" in found.meaning
     assert f"{found.noise_floor.score:.2f} JND" in found.noise_note
 
 
 def test_a_strong_error_stands_out(sequence, references):
     found = against(sequence("bad", noisy(3, sigma=5.0 * SIGMA)), references)
-    assert found.to_dict()["noise_floor"]["verdict"] == "above"
+    assert found.to_dict()["noise_floor"]["significance"] == "above"
     assert "undecided" not in found.meaning
 
 
 def test_verdicts_are_a_third_of_the_floor_apart():
     floor = NoiseFloor((30.0, 30.0), percent_visible=90.0, squared_error=0.01)
-    assert [floor.verdict(s) for s in (19.9, 20.1, 30.0, 39.9, 40.1)] == [
+    assert [floor.significance(s) for s in (19.9, 20.1, 30.0, 39.9, 40.1)] == [
         "below", "undecided", "undecided", "undecided", "above",
     ]  # fmt: skip
 

@@ -28,7 +28,7 @@ def traced(
     camera,
     pixels=None,
     *,
-    chunk=1 << 20,
+    paths_in_flight=1 << 20,
     spp=4,
     seed=7,
     frame=3,
@@ -37,7 +37,7 @@ def traced(
 ):
     if pixels is None:
         pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
-    return AnalyticRenderer(scene, chunk=chunk).trace(
+    return AnalyticRenderer(scene, paths_in_flight=paths_in_flight).trace(
         camera, pixels, RandomKey(seed, frame, purpose), spp=spp, pixel_filter=at
     )
 
@@ -48,10 +48,10 @@ def test_random_numbers_depend_on_the_pixel_alone(at):
     pixels = np.random.default_rng(5).permutation(1200).astype(np.uint32)
     whole = traced(scene, camera, spp=70, at=at)  # two passes
     shuffled = traced(scene, camera, pixels, spp=70, at=at)
-    chunked = traced(scene, camera, pixels[::2], chunk=1024, spp=70, at=at)
+    batched = traced(scene, camera, pixels[::2], paths_in_flight=1024, spp=70, at=at)
     np.testing.assert_array_equal(shuffled.color, whole.color[pixels])
-    np.testing.assert_array_equal(chunked.color, whole.color[pixels[::2]])
-    np.testing.assert_array_equal(chunked.variance, whole.variance[pixels[::2]])
+    np.testing.assert_array_equal(batched.color, whole.color[pixels[::2]])
+    np.testing.assert_array_equal(batched.variance, whole.variance[pixels[::2]])
 
 
 def test_other_seeds_frames_and_purposes_are_other_numbers():
@@ -127,7 +127,7 @@ def test_rays_of_centred_pixels_pass_through_their_centre():
             camera,
             pixels,
             radiance,
-            chunk=64,  # of several in each call
+            paths_in_flight=64,  # of several in each call
             pixel_filter=pixel_filter,
             random=RandomKey(7, 3, Purpose.FILL),
             centred=centred,
@@ -154,7 +154,7 @@ def test_the_luminance_is_that_of_all_layers_together(kind, layers):
 
     options = {"pixel_filter": PixelFilter.BOX} if kind is Estimate else {}
     random = RandomKey(7, 3, Purpose.FILL)
-    whole = kind(camera, pixels, radiance, chunk=1 << 20, random=random, layers=layers, **options)
+    whole = kind(camera, pixels, radiance, paths_in_flight=1 << 20, random=random, layers=layers, **options)
     whole.add(6)
     mean, variance = (np.array(of) for of in whole.luminance)
     np.testing.assert_allclose(mean, luminance(sum(of.color for of in whole.shadings)), rtol=1e-6)

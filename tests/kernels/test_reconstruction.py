@@ -44,18 +44,22 @@ def noise(rays, sampler):
     return Array3f(dr.select(phase - dr.floor(phase) > 0.5, 1.0, 0.0))
 
 
-def opened(radiance, where=None, *, chunk=1 << 20, seed=1, **options):
+def opened(radiance, where=None, *, paths_in_flight=1 << 20, seed=1, **options):
     where = np.ones((HEIGHT, WIDTH), bool) if where is None else where
     pixels = np.flatnonzero(where).astype(np.uint32)
     key = RandomKey(seed, 0, Purpose.DIFFUSE)
-    return ReconstructedEstimate(CAMERA, pixels, radiance, chunk=chunk, random=key, **options)
+    return ReconstructedEstimate(
+        CAMERA, pixels, radiance, paths_in_flight=paths_in_flight, random=key, **options
+    )
 
 
 def filtered(radiance, *, spp, seed=1):
     """The same by filter importance sampling."""
     pixels = np.arange(WIDTH * HEIGHT, dtype=np.uint32)
     key = RandomKey(seed, 0, Purpose.DIFFUSE)
-    found = Estimate(CAMERA, pixels, radiance, chunk=1 << 20, pixel_filter=PixelFilter.GAUSSIAN, random=key)
+    found = Estimate(
+        CAMERA, pixels, radiance, paths_in_flight=1 << 20, pixel_filter=PixelFilter.GAUSSIAN, random=key
+    )
     found.add(spp)
     return found
 
@@ -158,13 +162,13 @@ def test_pixels_without_paths_have_the_background():
     np.testing.assert_allclose(estimate.shading.color[:, 0], 0.5 + 0.5 * share, rtol=1e-5)
 
 
-def test_neither_chunks_nor_calls_change_the_result():
+def test_neither_batches_nor_calls_change_the_result():
     whole = opened(half_plane(11.3, 0.3))
     whole.add(32)
-    chunked = opened(half_plane(11.3, 0.3), chunk=640)
-    chunked.add(32)
-    np.testing.assert_array_equal(whole.shading.color, chunked.shading.color)
-    np.testing.assert_array_equal(whole.shading.variance, chunked.shading.variance)
+    batched = opened(half_plane(11.3, 0.3), paths_in_flight=640)
+    batched.add(32)
+    np.testing.assert_array_equal(whole.shading.color, batched.shading.color)
+    np.testing.assert_array_equal(whole.shading.variance, batched.shading.variance)
     divided = opened(half_plane(11.3, 0.3))
     divided.add(8)
     divided.add(24)

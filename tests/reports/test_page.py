@@ -250,14 +250,14 @@ def test_wide_pictures_are_scaled(runs, monkeypatch):
 def test_names_are_text_and_not_markup(runs, tmp_path):
     folder = shutil.copytree(runs / "run", tmp_path / "<img src=x onerror=alert(1)>")
     identity = {"method": {"name": "<b>", "revision": 1}}
-    for run in (folder, synthetic_run(tmp_path / "b", facts={"rays": {"<img>": 1}}, **identity)):
+    for run in (folder, synthetic_run(tmp_path / "b", metadata={"rays": {"<img>": 1}}, **identity)):
         _, text, _ = written(run, tmp_path)
         assert "<img" not in text.partition('id="data">')[0]
         assert "<b>" not in text.partition("<dd>")[2].partition("</dd>")[0]
 
 
 def test_methods_without_rays_or_layers(tmp_path):
-    folder = synthetic_run(tmp_path / "run", facts={"dropped": 2}, layers=["RGB"])
+    folder = synthetic_run(tmp_path / "run", metadata={"dropped": 2}, layers=["RGB"])
     notes, text, data = written(folder, tmp_path)
     assert list(series_of(text, data)) == ["velocity", "traced", "time"]
     assert [layer["name"] for layer in data["layers"]] == ["result"]

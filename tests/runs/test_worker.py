@@ -55,27 +55,27 @@ def test_a_video_needs_no_scene(opened, monkeypatch):
 
 
 class Talkative(Method):
-    """A method of facts."""
+    """A method whose tasks return given metadata."""
 
     name = "talkative"
     passes = (Pass("frames"),)
-    facts: dict
+    metadata: dict
 
     def tasks(self, _analysis):
         return ()
 
     def run(self, _task, _inputs, _walk):
-        return Output(facts=self.facts)
+        return Output(metadata=self.metadata)
 
 
 @pytest.mark.parametrize(
-    ("facts", "words"),
+    ("metadata", "words"),
     [({"files": {}}, "names of the ledger's own: files"), ({"x": np.float32("nan")}, "not JSON compliant")],
 )
-def test_facts_that_the_ledger_can_not_keep(opened, monkeypatch, facts, words):
+def test_metadata_that_the_ledger_can_not_keep(opened, monkeypatch, metadata, words):
     job, run = opened
     method = Talkative()
-    method.facts = facts
+    method.metadata = metadata
     monkeypatch.setattr(Job, "opened_method", lambda _: method)
     with pytest.raises(ValueError, match=words):
         Worker(job, run).do(Task("frames", 0))
@@ -91,7 +91,7 @@ class Undeclared(Method):
         return ()
 
     def run(self, _task, inputs, _walk):
-        return Output(facts=inputs.facts("mean", 0))
+        return Output(metadata=inputs.metadata("mean", 0))
 
 
 def test_a_pass_reads_what_it_declares(opened, monkeypatch):
@@ -105,9 +105,9 @@ def test_facts_of_another_process_are_found_even_if_its_files_are_lost(opened):
     job, run = opened
     worker = Worker(job, RunFolder.read(run.folder))
     with pytest.raises(KeyError, match="mean 1 is not finished"):
-        worker._inputs.facts("mean", 0)
+        worker._inputs.metadata("mean", 0)
     lost = {"mean/0001.exr": {"bytes": 1, "sha256": ""}}
     run.finish({"pass": "mean", "frame": 1, "mean": 0.5, "files": lost, "cost": {}})
-    assert worker._inputs.facts("mean", 0)["mean"] == 0.5
+    assert worker._inputs.metadata("mean", 0)["mean"] == 0.5
     with pytest.raises(KeyError, match="no finished task has written"):
         worker._inputs.record("light", 0)

@@ -117,7 +117,7 @@ def test_random_numbers_depend_on_the_pixel_alone(corner, monkeypatch, at):
     shuffled = traced(renderer, camera, order, spp=70, at=at)
     assert shuffled.color.tobytes() == whole.color[order].tobytes()
     assert shuffled.variance.tobytes() == whole.variance[order].tobytes()
-    monkeypatch.setattr(renderer, "_chunk", 1024)
+    monkeypatch.setattr(renderer, "_paths_in_flight", 1024)
     few = traced(renderer, camera, order[:37], spp=70, at=at)
     assert few.color.tobytes() == whole.color[order[:37]].tobytes()
 

@@ -107,7 +107,7 @@ def test_sharp_and_soft_light_add_up_to_all_direct_light(tmp_path, name, veils, 
 
     camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 24, 16)
     estimate = Estimate(
-        camera, np.arange(camera.width * camera.height, dtype=np.uint32), both, chunk=1 << 18,
+        camera, np.arange(camera.width * camera.height, dtype=np.uint32), both, paths_in_flight=1 << 18,
         pixel_filter=PixelFilter.BOX, random=RandomKey(3, 1, Purpose.DIFFUSE), layers=2,
     )  # fmt: skip
     estimate.add(256)
@@ -175,7 +175,7 @@ def test_veiled_light_is_that_of_the_path_tracer(tmp_path, name, veils, integrat
     pixels = np.arange(camera.width * camera.height, dtype=np.uint32)
     key = RandomKey(5, 1, Purpose.DIFFUSE)
     ours = estimate(
-        camera, pixels, radiance, spp=spp, chunk=1 << 18, pixel_filter=PixelFilter.BOX, random=key
+        camera, pixels, radiance, spp=spp, paths_in_flight=1 << 18, pixel_filter=PixelFilter.BOX, random=key
     )
     key = RandomKey(6, 1, Purpose.REFERENCE)
     theirs = renderer.trace(camera, pixels, key, spp=spp, pixel_filter=PixelFilter.BOX)

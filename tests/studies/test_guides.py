@@ -11,7 +11,7 @@ from studies.bench.guides import Guides
 from support.analytic import AnalyticRenderer
 from support.example_scenes import room, room_walk
 
-CHUNK = 1 << 20
+PATHS_IN_FLIGHT = 1 << 20
 MIRROR = """<scene version="3.0.0">
 <shape type="rectangle" id="mirror">
   <transform name="to_world"><scale value="2"/></transform>
@@ -27,7 +27,7 @@ MIRROR = """<scene version="3.0.0">
 
 def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
     renderer, camera = AnalyticRenderer(room()), room_walk(1).cameras[0]
-    albedo, normal = Guides(renderer).images(camera, seed=0, frame=1, chunk=CHUNK)
+    albedo, normal = Guides(renderer).images(camera, seed=0, frame=1, paths_in_flight=PATHS_IN_FLIGHT)
     seen = find_geometry(renderer, camera)
     inner = np.zeros(seen.shape_index.shape, bool)
     same = seen.shape_index[1:-1, 1:-1]
@@ -37,8 +37,8 @@ def test_inside_of_surfaces_they_are_those_of_the_g_buffer():
     is_flat = inner & (seen.shape_index != 6)  # the ball's normal changes within a pixel
     assert np.abs(normal - seen.normal)[is_flat].max() < 1e-4
     assert np.median(np.abs(albedo - seen.albedo)[inner]) < 0.01
-    # Neither chunks nor anything but the seed change them.
-    again = Guides(renderer).images(camera, seed=0, frame=1, chunk=5000)
+    # Neither batches nor anything but the seed change them.
+    again = Guides(renderer).images(camera, seed=0, frame=1, paths_in_flight=5000)
     np.testing.assert_array_equal(albedo, again[0])
     np.testing.assert_array_equal(normal, again[1])
 
@@ -55,7 +55,7 @@ def test_a_mirror_shows_the_reflected_surface_to_rays_that_continue(
     renderer = Scene(file).open(Settings())
     camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 30.0, 32, 24)
     albedo, normal = Guides(renderer).images(
-        camera, seed=0, frame=frame, chunk=CHUNK, is_followed=is_followed
+        camera, seed=0, frame=frame, paths_in_flight=PATHS_IN_FLIGHT, is_followed=is_followed
     )
     for pick in (np.min, np.max):
         assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx(reflectance, abs=1e-3)

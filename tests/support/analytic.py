@@ -43,13 +43,13 @@ class AnalyticRenderer:
     Parameters
     ----------
     scene
-    chunk
-        Paths in flight at once; changes no result.
+    paths_in_flight
+        Paths traced at once; changes no result.
     """
 
-    def __init__(self, scene: AnalyticScene, *, chunk: int = 1 << 20) -> None:
+    def __init__(self, scene: AnalyticScene, *, paths_in_flight: int = 1 << 20) -> None:
         self._scene = scene
-        self._chunk = chunk
+        self._paths_in_flight = paths_in_flight
         self._classes = UInt([SurfaceClass.NONE, *(shape.material.surface for shape in scene.shapes)])
 
     def describe(self) -> SceneFacts:
@@ -88,7 +88,7 @@ class AnalyticRenderer:
             pixels,
             self._noisy,
             spp=spp,
-            chunk=self._chunk,
+            paths_in_flight=self._paths_in_flight,
             pixel_filter=pixel_filter,
             random=random,
         )
@@ -160,10 +160,10 @@ class _Hit:
     position: Any
 
 
-def load(file: Path, *, max_depth: int = 0, chunk: int = 1 << 20) -> AnalyticRenderer:
+def load(file: Path, *, max_depth: int = 0, paths_in_flight: int = 1 << 20) -> AnalyticRenderer:
     """Renderer of a scene that :func:`support.analytic_scene.write_scene` wrote."""
     del max_depth  # paths have one bounce
-    return AnalyticRenderer(read_scene(file), chunk=chunk)
+    return AnalyticRenderer(read_scene(file), paths_in_flight=paths_in_flight)
 
 
 def _intersect(shape: Plane | Quad | Sphere, origin: Any, direction: Any) -> tuple[Any, Any]:

@@ -21,13 +21,13 @@ class InMemory:
         statistics = tuple(analyze(walk, frame) for frame in range(len(walk.path)))
         self.analysis = Analysis(walk.path, walk.settings, statistics)
         self.records: dict[TaskId, Any] = {}
-        self.task_facts: dict[TaskId, dict[str, Any]] = {}
+        self.task_metadata: dict[TaskId, dict[str, Any]] = {}
 
     def record(self, pass_name: str, frame: int) -> Any:
         return self.records[TaskId(pass_name, frame)]
 
-    def facts(self, pass_name: str, frame: int) -> dict[str, Any]:
-        return self.task_facts[TaskId(pass_name, frame)]
+    def metadata(self, pass_name: str, frame: int) -> dict[str, Any]:
+        return self.task_metadata[TaskId(pass_name, frame)]
 
     def frames_of(self, pass_name: str) -> list[int]:
         """Frames that have a record of a pass."""
@@ -35,11 +35,11 @@ class InMemory:
 
     def total(self, key: str) -> Any:
         """Sum of a fact over all tasks."""
-        return sum(facts.get(key, 0) for facts in self.task_facts.values())
+        return sum(metadata.get(key, 0) for metadata in self.task_metadata.values())
 
     def rays(self) -> int:
         """Rays of all kinds and tasks."""
-        return sum(sum(facts.get("rays", {}).values()) for facts in self.task_facts.values())
+        return sum(sum(metadata.get("rays", {}).values()) for metadata in self.task_metadata.values())
 
     @property
     def colors(self) -> np.ndarray:
@@ -54,13 +54,13 @@ def run_passes(method: Method, walk: Walkthrough) -> InMemory:
     tasks = sorted(method.tasks(results.analysis), key=lambda task: (order.index(task.pass_name), task.frame))
     assert len({task.id for task in tasks}) == len(tasks)
     for task in tasks:
-        assert all(need in results.task_facts for need in task.needs), task
+        assert all(need in results.task_metadata for need in task.needs), task
         output = method.run(task, results, walk)
         for frame, record in output.records.items():
             assert isinstance(record, method.passes[order.index(task.pass_name)].record), task
             assert TaskId(task.pass_name, frame) not in results.records, task
             results.records[TaskId(task.pass_name, frame)] = record
-        results.task_facts[task.id] = dict(output.facts)
+        results.task_metadata[task.id] = dict(output.metadata)
     return results
 
 

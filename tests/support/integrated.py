@@ -36,13 +36,13 @@ def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **
 
 
 def estimated(
-    radiance, camera, spp, *, layers=1, chunk=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None
+    radiance, camera, spp, *, layers=1, paths_in_flight=1 << 20, pixel_filter=PixelFilter.CENTRE, pixels=None
 ):
     estimate = Estimate(
         camera,
         pixels_of(camera)[:pixels],
         radiance,
-        chunk=chunk,
+        paths_in_flight=paths_in_flight,
         pixel_filter=pixel_filter,
         random=RandomKey(2, 0, Purpose.DIFFUSE),
         layers=layers,
@@ -66,10 +66,17 @@ def standard_errors(ours: Shading, reference: Shading, where=slice(None)) -> flo
     return float(difference / np.sqrt(variance[where].sum()))
 
 
-def assert_same_in_chunks(renderer, irradiance: IrradianceCache) -> None:
-    """The image is the same with all samples at once, and in chunks of which the last is smaller."""
+def assert_same_in_batches(renderer, irradiance: IrradianceCache) -> None:
+    """The image is the same with all samples at once, and in batches of which the last is smaller."""
     one, many = (
-        shaded(renderer, irradiance, front_camera(24, 18), 4, chunk=chunk, pixel_filter=PixelFilter.GAUSSIAN)
-        for chunk in (1 << 20, 600)
+        shaded(
+            renderer,
+            irradiance,
+            front_camera(24, 18),
+            4,
+            paths_in_flight=paths_in_flight,
+            pixel_filter=PixelFilter.GAUSSIAN,
+        )
+        for paths_in_flight in (1 << 20, 600)
     )
     np.testing.assert_array_equal(one.color, many.color)

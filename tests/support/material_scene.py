@@ -110,7 +110,7 @@ def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> li
         lambda rays, sampler: integrator_of(renderer).specular_radiance(
             IrradianceCache(), rays, sampler, pixel_angle=PIXEL_ANGLE
         ),
-        chunk=1 << 20,
+        paths_in_flight=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(2, 0, Purpose.SPECULAR),
         layers=2,
@@ -127,7 +127,7 @@ def traced_irradiance(
         camera,
         pixels_of(camera),
         lambda rays, sampler: Samples(renderer.estimate_diffuse(renderer.intersect(rays), sampler)),
-        chunk=1 << 20,
+        paths_in_flight=1 << 20,
         pixel_filter=PixelFilter.CENTRE,
         random=RandomKey(3, 0, Purpose.IRRADIANCE),
         layers=2,

@@ -117,7 +117,9 @@ def synthetic_plan(count=60, *, method="paper"):
     }
 
 
-def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=None, layers=None, **identity):
+def synthetic_run(
+    folder, *, noise=0.0, finished=None, has_video=True, metadata=None, layers=None, **identity
+):
     """Write the run folder of a user's method with the passes ``probe`` and ``frames``.
 
     Parameters
@@ -126,7 +128,7 @@ def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=Non
         Standard deviation of the result, whose mean does not depend on it.
     finished
         Numbers of the finished frames; by default all.
-    facts
+    metadata
         Of each task of ``probe``, in place of its rays.
     layers
         Of the files; by default all.
@@ -148,7 +150,7 @@ def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=Non
         analysis = [{"speed_deg_s": 0.5 * number} for number in FRAMES]
         _finish(run, "analysis", FRAMES[0], {"frames": analysis})
         for number in FRAMES if finished is None else finished:
-            _finish(run, "probe", number, facts or {"rays": {"probe_rays": 2 * SIZE[0] * SIZE[1]}})
+            _finish(run, "probe", number, metadata or {"rays": {"probe_rays": 2 * SIZE[0] * SIZE[1]}})
             made = _layers(number, random.normal(0.0, noise, (SIZE[1], SIZE[0], 1)))
             kept = made if layers is None else {name: made[name] for name in layers}
             file = run.stem("frames", number).with_suffix(".exr")
@@ -162,9 +164,9 @@ def synthetic_run(folder, *, noise=0.0, finished=None, has_video=True, facts=Non
     return folder
 
 
-def _finish(run, name, number, facts, files=()):
+def _finish(run, name, number, metadata, files=()):
     cost = {"gbuffer": {"wall_s": 0.25, "cpu_s": 0.5}, name: {"wall_s": 0.5, "cpu_s": 1.0}}
-    run.finish({"pass": name, "frame": number, **facts, "files": run.record_of(files), "cost": cost})
+    run.finish({"pass": name, "frame": number, **metadata, "files": run.record_of(files), "cost": cost})
 
 
 def _layers(number, noise):

@@ -78,7 +78,7 @@ class Toy(Method):
                 return Output(
                     {task.frame: Light(np.mean(values, axis=0), len(shot))}, {"mean": np.mean(values)}
                 )
-        mean = inputs.facts("mean", shot.start)["mean"]
+        mean = inputs.metadata("mean", shot.start)["mean"]
         value = inputs.record("mean", shot.start).value + inputs.record("light", task.frame).value - mean
         color = np.repeat(value[..., None], 3, axis=2) * np.float32(walk.settings[ToySettings].gain)
         return Output({task.frame: Frame(color, np.full(value.shape, Provenance.REUSED, np.uint8))})

@@ -14,10 +14,10 @@ from enfilade.records import F32, Shading, SurfaceClass
 from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
 
 
-def load(file: Path, *, max_depth: int, chunk: int) -> Wall:
+def load(file: Path, *, max_depth: int, paths_in_flight: int) -> Wall:
     """For ``Scene(file, renderer="support.wall:load")``."""
     del max_depth
-    return Wall(file, chunk)
+    return Wall(file, paths_in_flight)
 
 
 class Wall:

@@ -37,7 +37,7 @@ class NoiseFloor:
         """The floor, JND, pooled over the frames."""
         return sequence_score(self.frame_scores)
 
-    def verdict(self, score: float) -> Literal["above", "undecided", "below"]:
+    def significance(self, score: float) -> Literal["above", "undecided", "below"]:
         """Whether a score against the mean of both references stands out from their noise.
 
         Parameters
@@ -57,9 +57,9 @@ class NoiseFloor:
         return "below" if score < self.score else "above"
 
     def sentence(self, score: float) -> str:
-        """The floor and the verdict on a score."""
+        """The floor and the significance of a score."""
         floor = f"reference noise: one reference against the other scores {self.score:.2f} JND"
-        match self.verdict(score):
+        match self.significance(score):
             case "undecided":
                 return (
                     f"{floor}; the score of {score:.2f} JND is less than a third of that apart from "
@@ -74,13 +74,13 @@ class NoiseFloor:
                 return f"{floor}; the score of {score:.2f} JND stands out from it"
 
     def to_dict(self, score: float) -> dict[str, Any]:
-        """The floor as plain values, fit for JSON, with the verdict on a score."""
+        """The floor as plain values, fit for JSON, with the significance of a score."""
         ratio = psnr_db(self.squared_error)
         return {
             "score_jnd": self.score,
             "percent_visible": self.percent_visible,
             "psnr_db": ratio if math.isfinite(ratio) else None,
-            "verdict": self.verdict(score),
+            "significance": self.significance(score),
             "per_frame_jnd": list(self.frame_scores),
         }
 

@@ -130,7 +130,7 @@ class SequenceDifference:
     def meaning(self) -> str:
         """The score in words, whether it is undecided, and the frame with the largest visible difference."""
         words = IDENTICAL if self.is_identical else words_of(self.score)
-        if self.noise_floor is not None and self.noise_floor.verdict(self.score) == "undecided":
+        if self.noise_floor is not None and self.noise_floor.significance(self.score) == "undecided":
             words += ", undecided"
         worst = max(self.frames, key=lambda f: f.largest_jnd)
         if not any(f.percent_visible for f in self.frames):

@@ -18,7 +18,7 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, RandomKey
 
-SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no chunk size changes a rounding
+SPP_PER_SUM = 64  # paths of a pixel summed in float32; fixed, so that no size of a batch changes a rounding
 GAUSSIAN_SIGMA_PX, GAUSSIAN_RADIUS_PX = 0.5, 1.5  # PixelFilter.GAUSSIAN
 
 Radiance = Callable[..., Any]
@@ -50,9 +50,9 @@ class Estimate:
         Flat indices ``y * width + x``.
     radiance
         Maps camera rays (:class:`Rays` of any length of direction) and their :class:`PaddedSobolSampler` to
-        the radiance along them, an Array3f or :class:`Samples`. Called once for each chunk.
-    chunk
-        Paths in flight at once. It changes no random number.
+        the radiance along them, an Array3f or :class:`Samples`. Called once for each batch.
+    paths_in_flight
+        Paths traced at once. It changes no random number.
     pixel_filter
         Distribution of the camera rays over the image.
     random
@@ -69,7 +69,7 @@ class Estimate:
         pixels: npt.NDArray[np.uint32],
         radiance: Radiance,
         *,
-        chunk: int,
+        paths_in_flight: int,
         pixel_filter: PixelFilter,
         random: RandomKey,
         layers: int = 1,
@@ -78,7 +78,7 @@ class Estimate:
         self._camera = camera
         self._pixels = pixels
         self._radiance = radiance
-        self._chunk = chunk
+        self._paths_in_flight = paths_in_flight
         self._filter = pixel_filter
         self._centred = centred
         self._random = random
@@ -101,7 +101,7 @@ class Estimate:
         chosen = np.flatnonzero(everyone).astype(np.uint32)
         for first in range(self._next, self._next + spp, SPP_PER_SUM):
             count = min(SPP_PER_SUM, self._next + spp - first)
-            step = max(self._chunk // count, 1)
+            step = max(self._paths_in_flight // count, 1)
             for start in range(0, len(chosen), step):
                 # Generate camera rays, `count` neighbouring lanes a pixel.
                 part = chosen[start : start + step]
@@ -208,7 +208,7 @@ def estimate(
     radiance: Radiance,
     *,
     spp: int,
-    chunk: int,
+    paths_in_flight: int,
     pixel_filter: PixelFilter,
     random: RandomKey,
 ) -> Shading:
@@ -219,7 +219,9 @@ def estimate(
     Shading
         Of shape (N,), over the finite samples of each pixel.
     """
-    whole = Estimate(camera, pixels, radiance, chunk=chunk, pixel_filter=pixel_filter, random=random)
+    whole = Estimate(
+        camera, pixels, radiance, paths_in_flight=paths_in_flight, pixel_filter=pixel_filter, random=random
+    )
     whole.add(spp)
     return whole.shading
 

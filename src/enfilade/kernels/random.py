@@ -1,4 +1,4 @@
-"""Random numbers as a function of seed, frame, purpose, pixel and path: not of order, chunk or worker.
+"""Random numbers as a function of seed, frame, purpose, pixel and path: not of order, batch or worker.
 
 A counter-based generator (Philox, Salmon et al. 2011) turns this key into the scrambling of a Sobol sequence
 for each pixel.

@@ -43,7 +43,7 @@ class ReconstructedEstimate(Estimate):
 
     Parameters
     ----------
-    camera, pixels, radiance, chunk, random, layers
+    camera, pixels, radiance, paths_in_flight, random, layers
         As of :class:`Estimate`.
     background : sequence of (H, W, 3) float32
         One a layer: values of pixels that have no paths. None: such pixels do not contribute.
@@ -55,7 +55,7 @@ class ReconstructedEstimate(Estimate):
         pixels: npt.NDArray[np.uint32],
         radiance: Radiance,
         *,
-        chunk: int,
+        paths_in_flight: int,
         random: RandomKey,
         layers: int = 1,
         background: Sequence[F32] | None = None,
@@ -64,7 +64,7 @@ class ReconstructedEstimate(Estimate):
             camera,
             pixels,
             radiance,
-            chunk=chunk,
+            paths_in_flight=paths_in_flight,
             pixel_filter=PixelFilter.BOX,
             random=random,
             layers=layers,

@@ -68,10 +68,10 @@ class Pass:
     ----------
     name : str
     record : type or None
-        Class of the records that its tasks write, one file a frame; None for passes that have facts only.
+        Class of the records that its tasks write, one file a frame; None for passes that have metadata only.
     reads : tuple of str
-        Passes whose records or facts its tasks read: earlier ones, or the pass itself, of whose tasks those
-        must be in ``needs``. Others are refused.
+        Passes whose records or metadata its tasks read: earlier ones, or the pass itself, of whose tasks
+        those must be in ``needs``. Others are refused.
     is_barrier : bool
         Whether its tasks begin when all tasks of earlier passes of the same shot are finished.
     is_shared : bool
@@ -93,13 +93,13 @@ class Output:
     ----------
     records : mapping of int to record
         By frame, as index on the path.
-    facts : mapping
+    metadata : mapping
         Values fit for JSON, for the ledger and for later passes. The report adds up ``rays`` (by kind) and
         ``dropped``, samples that were left out since they were not finite.
     """
 
     records: Mapping[int, Any] = field(default_factory=dict)
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Inputs(Protocol):
@@ -120,8 +120,8 @@ class Inputs(Protocol):
         """
         ...
 
-    def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
-        """The facts of the task of a pass.
+    def metadata(self, pass_name: str, frame: int) -> Mapping[str, Any]:
+        """The metadata of the task of a pass.
 
         Raises
         ------

@@ -19,7 +19,7 @@ from enfilade.scene.blender.notes import TITLES, NoteGroup, grouped
 from enfilade.settings import SECTIONS, Section
 
 SYMBOLS = {"bar": "■", "line": "━", "dashed": "╌", "triangle": "▼", "square": "□", "circle": "●"}  # of series
-VERDICTS = {  # of the noise floor
+SIGNIFICANCE = {  # of the noise floor
     "above": "above it",
     "undecided": "undecided",
     "below": "below it; without any error it would be about half of it",
@@ -141,8 +141,8 @@ def _difference(
     if floor := found["noise_floor"]:
         rows[0] = ("frames compared", str(found["frames"]), "with the mean of two references")
         visible = f"{percent(floor['percent_visible'])} % of pixels above 1 JND"
-        verdict = f"{visible}; the score is {VERDICTS[floor['verdict']]}"
-        rows.insert(2, ("noise floor", f"{floor['score_jnd']:.2f} JND", verdict))
+        comment = f"{visible}; the score is {SIGNIFICANCE[floor['significance']]}"
+        rows.insert(2, ("noise floor", f"{floor['score_jnd']:.2f} JND", comment))
     if reference is not None and summary["video"] and reference["video"]:
         own, other = (of["time_s"]["cpu_s"] / of["frames"] for of in (summary, reference))
         rows += [

@@ -72,40 +72,40 @@ class Worker:
         ------
         EnfiladeError
         """
-        facts: Mapping[str, Any] = {"video": self._job.video_identity}
+        metadata: Mapping[str, Any] = {"video": self._job.video_identity}
         files: list[Path] = []
         with self._stopwatch.timed(task.pass_name):
             match task.pass_name:
                 case ANALYSIS.name:
                     frames = range(task.frame, min(task.frame + ANALYZED_FRAMES, len(self._job.path)))
-                    facts = {"frames": [to_table(analyze(self._walk, frame)) for frame in frames]}
+                    metadata = {"frames": [to_table(analyze(self._walk, frame)) for frame in frames]}
                 case CLIPS.name:
                     files = [write_clip(self._run, self._job, task.frame)]
                 case VIDEO.name:
                     files = [write_video(self._run, self._job)]
                 case _:
                     self._inputs.begin(task.pass_name)
-                    facts, files = self._write(task, self._method.run(task, self._inputs, self._walk))
+                    metadata, files = self._write(task, self._method.run(task, self._inputs, self._walk))
         release_memory()
-        if taken := RESERVED.intersection(facts):
-            raise ValueError(f"these facts have names of the ledger's own: {', '.join(sorted(taken))}")
+        if taken := RESERVED.intersection(metadata):
+            raise ValueError(f"metadata have names of the ledger's own: {', '.join(sorted(taken))}")
         number = self._job.path.numbers[task.frame]
-        line = {"pass": task.pass_name, "frame": number, **facts, "files": self._run.record_of(files)}
+        line = {"pass": task.pass_name, "frame": number, **metadata, "files": self._run.record_of(files)}
         return plain({**line, "cost": self._stopwatch.take()})
 
     def _write(self, task: Task, output: Output) -> tuple[Mapping[str, Any], list[Path]]:
-        """Write the records of a task; returns its facts and the files."""
-        facts, files = output.facts, []
+        """Write the records of a task; returns its metadata and the files."""
+        metadata, files = output.metadata, []
         with self._stopwatch.timed("files"):
             for frame, record in output.records.items():
                 stem = self._run.stem(task.pass_name, self._job.path.numbers[frame])
                 if task.pass_name == FRAMES:
                     files.append(write_frame(stem, record, self._walk.view(frame), self._job))
-                    facts = {**facts, "provenance": record.counts, "is_black": not record.color.any()}
+                    metadata = {**metadata, "provenance": record.counts, "is_black": not record.color.any()}
                 else:
                     files.append(write_record(stem, record))
                     self._inputs.keep(task.pass_name, frame, record)
-        return facts, files
+        return metadata, files
 
     @cached_property
     def _walk(self) -> Walkthrough:
@@ -115,7 +115,7 @@ class Worker:
 
 
 class _Inputs:
-    """Records and facts of earlier passes, from the run folder."""
+    """Records and metadata of earlier passes, from the run folder."""
 
     def __init__(self, job: Job, run: RunFolder, passes: Iterable[Pass], stopwatch: Stopwatch) -> None:
         self._job = job
@@ -138,7 +138,7 @@ class _Inputs:
         self._check_reader(pass_name)
         return self._records.get((pass_name, frame), lambda: self._read(pass_name, frame))
 
-    def facts(self, pass_name: str, frame: int) -> Mapping[str, Any]:
+    def metadata(self, pass_name: str, frame: int) -> Mapping[str, Any]:
         """See :class:`enfilade.methods.base.Inputs`."""
         self._check_reader(pass_name)
         number = self._job.path.numbers[frame]

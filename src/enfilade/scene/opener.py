@@ -1,8 +1,8 @@
 """A scene, and the renderer that reads it.
 
 Mitsuba reads ``.xml`` scenes. A renderer of your own is named by an import path, ``module:function``. The
-function is called with the scene's file, ``max_depth`` and ``chunk`` (paths in flight), and returns a
-:class:`enfilade.renderer.Renderer`. Worker processes must be able to import the module, too.
+function is called with the scene's file, ``max_depth`` and ``paths_in_flight`` (paths traced at once), and
+returns a :class:`enfilade.renderer.Renderer`. Worker processes must be able to import the module, too.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Scene:
         """
         options = {
             "max_depth": settings[TraceSettings].max_depth,
-            "chunk": settings[LimitSettings].paths_in_flight,
+            "paths_in_flight": settings[LimitSettings].paths_in_flight,
         }
         if self.renderer:
             opened: Renderer = _imported(self.renderer)(self.file, **options)

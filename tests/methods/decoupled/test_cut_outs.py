@@ -83,7 +83,7 @@ def test_irradiance_on_sheer_surfaces_is_cached(tmp_path, monkeypatch):
         return output
 
     monkeypatch.setattr(method, "run", run_and_count)
-    rays = run_passes(method, walk).facts("shading", MIDDLE)["rays"]["camera"]
+    rays = run_passes(method, walk).metadata("shading", MIDDLE)["rays"]["camera"]
     assert max(counts["shading"]) < 0.02 * rays
     assert min(counts["hash_grid"]) > 0
 

@@ -15,7 +15,7 @@ from enfilade.methods.decoupled.paths import compact, spawn
 from support.integrated import (
     EMPTY,
     LUMINANCE,
-    assert_same_in_chunks,
+    assert_same_in_batches,
     cache_of,
     estimated,
     gathered,
@@ -242,6 +242,6 @@ def test_other_scenes_may_be_open(tmp_path):
         np.testing.assert_array_equal(lobes(renderer), alone)
 
 
-def test_chunks_change_no_byte(diffuse):
-    # The number of lanes of a recorded kernel is padded, also that of the last chunk.
-    assert_same_in_chunks(diffuse[0], cache_of(*diffuse[1]))
+def test_batches_change_no_byte(diffuse):
+    # The number of lanes of a recorded kernel is padded, also that of the last batch.
+    assert_same_in_batches(diffuse[0], cache_of(*diffuse[1]))

@@ -1,4 +1,4 @@
-"""The integrator on every material: energy, irradiance, AOVs, the same bytes in chunks."""
+"""The integrator on every material: energy, irradiance, AOVs, the same bytes in batches."""
 
 import drjit as dr
 import numpy as np
@@ -12,7 +12,7 @@ from enfilade.records import Shading
 from support.integrated import (
     EMPTY,
     LUMINANCE,
-    assert_same_in_chunks,
+    assert_same_in_batches,
     cache_of,
     estimated,
     gathered,
@@ -206,6 +206,6 @@ def test_no_diffuse_reflection_where_a_bsdf_has_none(materials):
     assert albedo["translucent"] == pytest.approx(0.6 * (1.0 - 1.6 / 2.0), abs=1e-6)
 
 
-def test_chunks_change_no_byte(materials):
-    # The number of lanes of a recorded kernel is padded, also that of the last chunk.
-    assert_same_in_chunks(materials[0], EMPTY)
+def test_batches_change_no_byte(materials):
+    # The number of lanes of a recorded kernel is padded, also that of the last batch.
+    assert_same_in_batches(materials[0], EMPTY)

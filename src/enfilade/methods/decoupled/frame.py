@@ -150,7 +150,7 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
         lambda rays, sampler: shot.integrator.diffuse_radiance(
             cache, rays, sampler, pixel_angle=light_camera(camera).pixel_angle
         ),
-        chunk=walk.settings[LimitSettings].paths_in_flight,
+        paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
         random=walk.random(frame, Purpose.DIFFUSE),
     )
     estimate.add(settings.min_spp)

@@ -74,5 +74,5 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
     paths, dropped = paths + seen.paths + gathered.paths, dropped + seen.dropped + gathered.dropped
-    facts = {"rays": {"hash_grid": paths}, "dropped": dropped}
-    return Output({frame: entries}, facts | {"entries": len(entries.keys)})
+    metadata = {"rays": {"hash_grid": paths}, "dropped": dropped}
+    return Output({frame: entries}, metadata | {"entries": len(entries.keys)})

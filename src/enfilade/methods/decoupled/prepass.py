@@ -44,5 +44,5 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         image = denoise_irradiance(
             geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
         )
-    facts = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped, "regions": regions}
-    return Output({frame: image}, facts)
+    metadata = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped, "regions": regions}
+    return Output({frame: image}, metadata)

@@ -112,7 +112,7 @@ class ShotContext:
             camera,
             np.flatnonzero(where).astype(np.uint32),
             radiance,
-            chunk=self.walk.settings[LimitSettings].paths_in_flight,
+            paths_in_flight=self.walk.settings[LimitSettings].paths_in_flight,
             pixel_filter=pixel_filter,
             random=random,
             layers=layers,
@@ -155,7 +155,7 @@ class ShotContext:
         )
 
     def _path_guide(self, keyframe: int) -> PathGuide | None:
-        regions = self.inputs.facts("prepass", keyframe)["regions"]
+        regions = self.inputs.metadata("prepass", keyframe)["regions"]
         return self._path_guides.get(keyframe, lambda: upload_guide(regions))
 
     def _filled_up(
@@ -261,7 +261,7 @@ class ShotContext:
         if self._disocclusions is None:
             places = {number: index for index, number in enumerate(self.walk.path.numbers)}
             self._disocclusions = {
-                s.first: [places[n] for n in self.inputs.facts("disocclusion", s.first)["images"]]
+                s.first: [places[n] for n in self.inputs.metadata("disocclusion", s.first)["images"]]
                 for s in self.segments
             }
         return self._disocclusions

@@ -174,7 +174,7 @@ class _FrameRays:
             self.geometry.camera,
             np.flatnonzero(pixels).astype(np.uint32),
             radiance,
-            chunk=self._chunk,
+            paths_in_flight=self._paths_in_flight,
             pixel_filter=PixelFilter.GAUSSIAN,
             random=self.shot.walk.random(self.frame, Purpose.SPECULAR),
             layers=SPECULAR_AOVS,
@@ -197,7 +197,7 @@ class _FrameRays:
             self.geometry.camera,
             np.flatnonzero(pixels).astype(np.uint32),
             radiance,
-            chunk=self._chunk,
+            paths_in_flight=self._paths_in_flight,
             random=self.shot.walk.random(self.frame, Purpose.SPECULAR_EDGES),
             layers=SPECULAR_AOVS,
             background=[*colors, *black],
@@ -208,5 +208,5 @@ class _FrameRays:
         return light_camera(self.geometry.camera).pixel_angle
 
     @property
-    def _chunk(self) -> int:
+    def _paths_in_flight(self) -> int:
         return self.shot.walk.settings[LimitSettings].paths_in_flight

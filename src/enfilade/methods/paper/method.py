@@ -160,8 +160,8 @@ def _refined(task: Task, context: _Context) -> Output:
     for result in results:
         if result.is_split and result.middle is not None:
             keyframe(result.middle)  # not traced yet where its halves have no in-betweens to compare
-    facts = [result.to_table(walk.path.numbers) for result in results]
-    return Output(inserted, {"segments": facts, "dropped": sum(s.dropped for s in inserted.values())})
+    tables = [result.to_table(walk.path.numbers) for result in results]
+    return Output(inserted, {"segments": tables, "dropped": sum(s.dropped for s in inserted.values())})
 
 
 def _inbetween(task: Task, context: _Context) -> Output:
@@ -179,7 +179,7 @@ def _inbetween(task: Task, context: _Context) -> Output:
     if frame in keyframes_of(segments):
         return _completed(frame, inputs.record("keyframes", frame))
     initial = next(s for s in segments if s.first < frame < s.last)
-    tables = inputs.facts("segments", initial.first)["segments"]
+    tables = inputs.metadata("segments", initial.first)["segments"]
     results = [SegmentResult.from_table(table, walk.path.numbers) for table in tables]
     if any(result.is_split and result.middle == frame for result in results):
         return _completed(frame, inputs.record("segments", frame))

@@ -62,8 +62,8 @@ class MitsubaRenderer:
         A scene in Mitsuba's XML format.
     max_depth
         Longest path, in edges; 0: that of the scene's integrator.
-    chunk
-        Paths in flight.
+    paths_in_flight
+        Paths traced at once.
 
     Raises
     ------
@@ -71,12 +71,12 @@ class MitsubaRenderer:
         The file is missing, malformed, or refused by Mitsuba.
     """
 
-    def __init__(self, file: Path, *, max_depth: int = 0, chunk: int = 1 << 20) -> None:
+    def __init__(self, file: Path, *, max_depth: int = 0, paths_in_flight: int = 1 << 20) -> None:
         self._device = active()
         mi.set_variant(self._device.variant)
         self._merged = merge_meshes(load_scene(file))
         self._scene = scene = self._merged.scene
-        self._chunk = chunk
+        self._paths_in_flight = paths_in_flight
         self._integrator = scene_integrator(scene, max_depth)
         self._continued = [shortened(self._integrator, depth) for depth in range(1, MAX_PATH_DEPTH + 1)]
         # The medium around the camera is that of the scene's sensor; poses are those of the camera path.
@@ -116,9 +116,15 @@ class MitsubaRenderer:
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
     ) -> Shading:
         """Path trace a list of pixels; see :meth:`enfilade.renderer.Renderer.trace`."""
-        radiance, chunk = self._radiance, self._chunk
+        radiance, paths_in_flight = self._radiance, self._paths_in_flight
         return estimate(
-            camera, pixels, radiance, spp=spp, chunk=chunk, pixel_filter=pixel_filter, random=random
+            camera,
+            pixels,
+            radiance,
+            spp=spp,
+            paths_in_flight=paths_in_flight,
+            pixel_filter=pixel_filter,
+            random=random,
         )
 
     @property
