@@ -1,11 +1,9 @@
-"""The cost of restartable runs, and the gain of workers.
+"""The cost of restartable runs: memory and open files of a long run, and the time of a task besides its work.
 
-    python benchmarks/orchestration.py [length overhead workers ray] [--frames 2000]
+    python benchmarks/orchestration.py [length overhead] [--frames 2000]
 
 length     a long run: memory and open files on the way; the time to continue it, and to refuse another run
 overhead   the cost of a task besides its work, in process and in worker processes
-workers    two workers of one thread against one, on a Mitsuba scene
-ray        a local Ray cluster against worker processes, on tasks of more than 5 s
 
 The exit code is 1 if a limit is missed. On a busy machine the times say more about the machine.
 """
@@ -13,7 +11,6 @@ The exit code is 1 if a limit is missed. On a busy machine the times say more ab
 import argparse
 import dataclasses
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -27,14 +24,13 @@ from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Silence
 
 TESTS = str(Path(__file__).parents[1] / "tests")  # whose toys the commands render
+sys.path.insert(0, TESTS)
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [TESTS, os.environ.get("PYTHONPATH")]))
 TASKS = 1000
 MOST_OVERHEAD_S = 0.01  # 1 % of a task of 1 s
 LIMITED_FRAMES = 1000  # up to which the next two limits hold
 MOST_CONTINUE_S, MOST_REFUSE_S = 2.0, 1.0
-MOST_GROWTH = 1.1  # of memory from the second tenth of a run to the last but one
-LEAST_GAIN = 1.7  # of two workers over one
-MOST_RAY = 1.1  # times as long as worker processes take
+MOST_GROWTH_KIB = 16.0  # of memory a frame, from the second tenth of a run to the last but one
 SAMPLE_S = 0.25
 RENDER = """
 import sys
@@ -80,7 +76,7 @@ class Clock(Silence):
 
 def main() -> int:
     """Measure and print; returns the exit code."""
-    kinds = {"length": length, "overhead": overhead, "workers": gain, "ray": ray}
+    kinds = {"length": length, "overhead": overhead}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("kinds", nargs="*", choices=[*kinds, []], default=list(kinds))
     parser.add_argument("--frames", type=int, default=2000)
@@ -112,8 +108,10 @@ def length(folder: Path, frames: int) -> Iterator[str]:
         if here := [s for s in found if tenth * most / 10 <= s[0] <= (tenth + 1) * most / 10]:
             memory.append(max(m for _, m, _ in here))
             print(f"  {tenth + 1:2}  {memory[-1]:7.1f}  {max(f for _, _, f in here):3}")
-    if (growth := memory[-2] / memory[1]) > MOST_GROWTH:
-        yield f"memory grows {growth:.2f} times, limit {MOST_GROWTH}"
+    growth = 1024.0 * (memory[-2] - memory[1]) / (0.7 * frames)
+    print(f"memory grows by {growth:.1f} KiB a frame")
+    if growth > MOST_GROWTH_KIB:
+        yield f"memory grows by {growth:.1f} KiB a frame, limit {MOST_GROWTH_KIB}"
     start_s = seconds_of([sys.executable, "-c", "import enfilade.runs.render"])
     for what, seed, limit_s in (("continued", "0", MOST_CONTINUE_S), ("refused", "1", MOST_REFUSE_S)):
         seconds = seconds_of([*line, seed]) - start_s
@@ -159,51 +157,6 @@ def overhead(folder: Path, _frames: int) -> Iterator[str]:
         print(f"overhead, {name}: {1000 * seconds:.2f} ms a task")
         if seconds > MOST_OVERHEAD_S:
             yield f"{name}: a task costs {seconds:.4f} s, limit {MOST_OVERHEAD_S}"
-
-
-def gain(folder: Path, _frames: int) -> Iterator[str]:
-    """The same frames by one worker and by two, each of one thread."""
-    line = mitsuba(folder, 256, "20-35")
-    one, two = (frame_seconds(folder, line, "processes", count) for count in (1, 2))
-    print(f"workers: one {one:.1f} s, two {two:.1f} s, gain {one / two:.2f}")
-    if one / two < LEAST_GAIN:
-        yield f"two workers gain {one / two:.2f}, limit {LEAST_GAIN}"
-
-
-def ray(folder: Path, _frames: int) -> Iterator[str]:
-    """The same long tasks by worker processes and by Ray."""
-    line = mitsuba(folder, 512, "20-27")
-    processes, cluster = (frame_seconds(folder, line, name, 2) for name in ("processes", "ray"))
-    ratio = cluster / processes
-    print(f"ray: {cluster:.1f} s, worker processes {processes:.1f} s, overhead {100 * (ratio - 1):.1f} %")
-    if ratio > MOST_RAY:
-        yield f"Ray takes {ratio:.2f} times as long as processes, limit {MOST_RAY}"
-
-
-def mitsuba(folder: Path, spp: int, frames: str) -> list[str]:
-    """Command of a run that traces every frame of ROOM."""
-    from studies.scenes import write_scene
-
-    files = write_scene("room", folder / "room", preset="small")
-    line = [sys.executable, "-m", "enfilade", "render", str(files.scene), "--path", str(files.path)]
-    flags = ["--size", "160x120", "--frames", frames, "--method", "reference", "--spp", str(spp)]
-    return [*line, *flags, "--device", "cpu", "--quiet", "--threads", "1"]
-
-
-def frame_seconds(folder: Path, line: list[str], executor: str, workers: int) -> float:
-    """Wall time from the first frame of a run to its last, without the start and the video."""
-    out = folder / "run"
-    shutil.rmtree(out, ignore_errors=True)
-    flags = ["--out", str(out), "--executor", executor, "--workers", str(workers)]
-    moments: dict[int, float] = {}
-    with subprocess.Popen([*line, *flags], stdout=subprocess.DEVNULL) as process:
-        while process.poll() is None:
-            moments.setdefault(sum(1 for _ in (out / "frames").glob("*.exr")), time.perf_counter())
-            time.sleep(0.02)
-    if process.returncode:
-        raise RuntimeError(f"exit code {process.returncode}")
-    first, last = min(count for count in moments if count >= workers), max(moments)
-    return (moments[last] - moments[first]) / (last - first) * last
 
 
 if __name__ == "__main__":
