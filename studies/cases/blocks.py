@@ -92,7 +92,7 @@ def _refinement(results: Values, extent: Extent, _folder: Path, _figures: Path) 
 
 
 def _shares(results: Values, extent: Extent, _folder: Path, _figures: Path) -> Block:
-    keys = ("slow", "specular", "occlusion", "keyframes", "total")
+    keys = ("slow", "specular", "disoccluded", "keyframe", "total")
     rows = [
         (scene, source, *(f"{table[key]:.1f}" for key in keys))
         for scene, result in results.items()

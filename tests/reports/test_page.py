@@ -92,7 +92,7 @@ def test_charts_and_tables_have_the_figures_of_the_run(runs, page_file):
     text = page_file.read_text()
     summary = statistics(RunFolder.read(runs / "run"))
     assert "finished</span> all 10 frames and the video" in text
-    for name in ("slow", "specular", "occlusion", "keyframes"):
+    for name in ("slow", "specular", "disoccluded", "keyframe"):
         assert f"<td>{percent(summary['traced_percent'][name])}</td>" in text
     for stage in ("gbuffer", "analysis", "probe", "frames", "video"):
         assert f'<th scope="row">{stage}</th>' in text

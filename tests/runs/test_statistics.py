@@ -38,8 +38,8 @@ def test_statistics_of_a_running_run(run):
     assert found["traced_percent"] == {
         "slow": 5.0,
         "specular": 3.0,
-        "occlusion": 2.0,
-        "keyframes": 50.0,
+        "disoccluded": 2.0,
+        "keyframe": 50.0,
         "total": 60.0,
     }
     table = found["time_s"]

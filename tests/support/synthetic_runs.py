@@ -34,8 +34,8 @@ def synthetic_summary(count=120, *, spacing=20, method="paper"):
         "traced_percent": {
             "slow": 20.0,
             "specular": 7.9,
-            "occlusion": 0.43,
-            "keyframes": 5.8,
+            "disoccluded": 0.43,
+            "keyframe": 5.8,
             "total": 34.13,
         },
         "time_s": {
@@ -110,7 +110,7 @@ def synthetic_plan(count=60, *, method="paper"):
         "tasks": {"keyframes": 4, "frames": count},
         "seconds": 512.25,
         "cpu_seconds": 1000.0,
-        "traced_percent": {"slow": 15.0, "specular": 7.5, "occlusion": 1.5, "keyframes": 7.5, "total": 31.5},
+        "traced_percent": {"slow": 15.0, "specular": 7.5, "disoccluded": 1.5, "keyframe": 7.5, "total": 31.5},
         "rays": {"final_gather": 12.0, "camera": 3.0} if method == "decoupled" else {},
         "excerpt_frames": 9,
         "excerpt_size": [365, 274],

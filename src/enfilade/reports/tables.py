@@ -9,13 +9,6 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-TRACED_COLUMNS = {  # titles of the columns of Table 1, by key of the summary
-    "slow": "slow",
-    "specular": "specular",
-    "occlusion": "disoccluded",
-    "keyframes": "keyframes",
-    "total": "total",
-}
 WORST_FRAMES = 8  # of a comparison
 
 
@@ -50,7 +43,7 @@ def rays_columns(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def traced_columns(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Table 1, pixels traced by reason and in total, percent: title and figure of each column."""
-    return [(title, percent(summary["traced_percent"][key])) for key, title in TRACED_COLUMNS.items()]
+    return [(name, percent(share)) for name, share in summary["traced_percent"].items()]
 
 
 def time_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:

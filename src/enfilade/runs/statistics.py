@@ -9,12 +9,7 @@ from enfilade.methods.base import FRAMES
 from enfilade.runs.delivery import ANALYSIS, VIDEO
 from enfilade.runs.folder import RunFolder
 
-TRACED_PROVENANCE = {
-    "slow": "slow",
-    "specular": "specular",
-    "occlusion": "disoccluded",
-    "keyframes": "keyframe",
-}
+TRACED = ("slow", "specular", "disoccluded", "keyframe")  # of `records.Provenance`, in the order of Table 1
 
 
 def statistics(run: RunFolder) -> dict[str, Any]:
@@ -24,7 +19,7 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     -------
     dict
         ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``traced_percent``: pixels traced,
-        percent of those of the finished frames, by reason. ``time_s``: wall and CPU seconds, in total, by
+        percent of those of the finished frames, by provenance. ``time_s``: wall and CPU seconds, in total, by
         frame of the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of
         the pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
         frame of the path, by kind; ``rays_per_frame``: of each frame. ``segments``: the metric's result for
@@ -34,10 +29,7 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
     per_frame = _per_frame(path, lines, speeds_deg_s(path, lines))
-    traced_percent = {
-        name: sum(row[provenance] for row in per_frame) / max(len(per_frame), 1)
-        for name, provenance in TRACED_PROVENANCE.items()
-    }
+    traced_percent = {name: sum(row[name] for row in per_frame) / max(len(per_frame), 1) for name in TRACED}
     rays = _rays(path, lines)
     kinds = dict.fromkeys(kind for row in rays for kind in row if kind != "frame")
     stages = add_costs(line.get("cost", {}) for line in lines)
@@ -89,7 +81,7 @@ def _per_frame(
     rows = []
     for index, number in enumerate(path["frames"]):
         if number in counts:
-            row = {name: 100.0 * counts[number][name] / pixels for name in TRACED_PROVENANCE.values()}
+            row = {name: 100.0 * counts[number][name] / pixels for name in TRACED}
             speed = speed_deg_s.get(index)
             rows.append({"frame": number, "velocity_deg_s": speed, **row, "traced": sum(row.values())})
     return rows
