@@ -9,7 +9,7 @@ from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
-from enfilade.methods.decoupled import Decoupled, prepass
+from enfilade.methods.decoupled import Decoupled, guiding, prepass
 from enfilade.methods.decoupled.guiding import find_regions, upload_guide
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.renderer import Purpose, RandomKey
@@ -43,7 +43,7 @@ def opened_room(folder, *shapes, sky="", **settings):
 def regions_in(renderer):
     geometry = find_geometry(renderer, camera())
     probe = Integrator(renderer).kernels.probe
-    return find_regions(renderer.photons, probe, geometry, RandomKey(0, 0, Purpose.GUIDING))
+    return find_regions(renderer.photons, probe, geometry, RandomKey(0, 0, Purpose.GUIDING))[0]
 
 
 def test_the_shade_is_found(tmp_path):
@@ -84,8 +84,13 @@ def test_final_gathering_is_guided(tmp_path, monkeypatch):
 
     def noise():
         walk = walk_of(path, renderer, decoupled={"denoiser": "none", "irradiance_spp": 32})
-        return run_passes(Decoupled(), walk).record("irradiance", 0).indirect.variance.mean()
+        results = run_passes(Decoupled(), walk)
+        guide_paths = results.metadata("prepass", 0)["rays"]["path_guide"]
+        return results.record("irradiance", 0).indirect.variance.mean(), guide_paths
 
-    guided = noise()
-    monkeypatch.setattr(prepass, "find_regions", lambda *_: [])
-    assert guided < 0.5 * noise()
+    guided, guide_paths = noise()
+    assert guide_paths >= guiding.PIXELS * (guiding.PATHS + guiding.MORE_PATHS)
+    monkeypatch.setattr(prepass, "find_regions", lambda *_: ([], 0))
+    plain, guide_paths = noise()
+    assert guided < 0.5 * plain
+    assert guide_paths == 0

@@ -80,7 +80,7 @@ def find_regions(
     probe: Callable[[PathGuide, Path], Probes],
     geometry: Geometry,
     random: RandomKey,
-) -> list[list[float]]:
+) -> tuple[list[list[float]], int]:
     """Find the regions of a guide from a keyframe.
 
     Groups of photons in voxels of several sizes are proposed, and the light from there is estimated.
@@ -96,12 +96,14 @@ def find_regions(
 
     Returns
     -------
-    list of [x, y, z, radius, radiance in eight octants]
+    regions : list of [x, y, z, radius, radiance in eight octants]
         Followed by the background; empty if no guide is of use.
+    traced : int
+        Number of paths.
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
     if not len(pixels) or len(photons.flux) < MIN_PHOTONS:
-        return []
+        return [], 0
 
     # Take pixels at equal distances in the image.
     pixels = pixels[np.linspace(0, len(pixels) - 1, PIXELS).astype(np.int64)]
@@ -115,6 +117,7 @@ def find_regions(
         return probe(guide, spawn(rays, samplers(lane, lanes(path), random), spread=0.0))
 
     # Propose regions of several sizes, the largest first: small ones cover a part of what is bright.
+    traced = 0
     corner, extent = photons.position.min(axis=0), max(float(np.ptp(photons.position, axis=0).max()), 1e-9)
     for halvings in HALVINGS:
         count = 2**halvings + 1  # along each axis
@@ -123,11 +126,12 @@ def find_regions(
         if guide := upload_guide(proposed):
             for paths in (PATHS, MORE_PATHS):
                 regions, noise = _measured(probed(guide, paths), proposed)
+                traced += PIXELS * paths
                 if noise > MAX_NOISE:
                     break
             else:
-                return regions
-    return []
+                return regions, traced
+    return [], traced
 
 
 def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:

@@ -22,7 +22,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     """Path trace the prepass image of a keyframe."""
     walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
     where = geometry.has_diffuse
-    regions = find_regions(
+    regions, guide_paths = find_regions(
         renderer.photons, shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
     guide = upload_guide(regions)
@@ -44,5 +44,5 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         image = denoise_irradiance(
             geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
         )
-    metadata = {"rays": {"prepass": estimate.paths}, "dropped": image.direct.dropped, "regions": regions}
-    return Output({frame: image}, metadata)
+    rays = {"prepass": estimate.paths, "path_guide": guide_paths}
+    return Output({frame: image}, {"rays": rays, "dropped": image.direct.dropped, "regions": regions})
