@@ -36,7 +36,7 @@ class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
     name = "decoupled"
-    revision = 31
+    revision = 32
     needs_lobes = True
     settings = (TraceSettings, ViewingSettings, KeyframeSettings, DecoupledSettings)
     passes = (

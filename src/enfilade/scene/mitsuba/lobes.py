@@ -79,6 +79,8 @@ class Lobes:
         self._coated = bsdf_table(scene, lambda bsdf: _classes(bsdf) <= COATED)
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
+        self._mixed = bsdf_table(scene, _mixes_delta_lobes)
+        self._has_mixed = bool(dr.any(self._mixed))
         self._specular_albedo = self._mean_specular_albedo(scene)
 
     @property
@@ -86,7 +88,7 @@ class Lobes:
         """Arrays that the methods read."""
         albedos = self._bases, self._turned, self._masked, self._specular_albedo
         interfaces = self._clear, self._rough_ior, self._narrow, self._coated
-        return self._whole, self._lambertian, self._sides, interfaces, albedos
+        return self._whole, self._lambertian, self._sides, self._mixed, interfaces, albedos
 
     def has_specular(self, si: Any, bsdf: Any) -> Any:
         """Whether there are specular lobes, null interactions included."""
@@ -214,8 +216,8 @@ class Lobes:
             is_reflected = branch == int(Branch.REFLECTED)
             is_first = is_reflected ^ is_whole
             first = dr.select(is_clear | is_rough, dr.select(is_first, 0.0, ALMOST_ONE), first)
-        sample, weight = bsdf.sample(self._specular, si, first, second, ~is_whole)
-        whole, whole_weight = bsdf.sample(self._all, si, first, second, is_whole)
+        sample, weight = self._sampled(self._specular, si, bsdf, first, second, ~is_whole)
+        whole, whole_weight = self._sampled(self._all, si, bsdf, first, second, is_whole)
         kind = dr.select(is_whole, whole.sampled_type, sample.sampled_type)
         is_null = mi.has_flag(kind, mi.BSDFFlags.Null) & (~is_whole | by_bsdf)
         is_delta = mi.has_flag(kind, mi.BSDFFlags.Delta) & (~is_whole | by_bsdf)  # null interactions, too
@@ -241,6 +243,26 @@ class Lobes:
             of_branch = dr.select(is_reflected, of_branch, 1.0 - of_branch)
             weight *= dr.select(is_clear, sample.pdf, dr.select(is_rough, of_branch, 1.0))
         return wo, pdf, weight, is_delta, is_null
+
+    def _sampled(
+        self, context: Any, si: Any, bsdf: Any, first: Any, second: Any, active: Any
+    ) -> tuple[Any, Any]:
+        """A sample of a BSDF and its weight; of a delta lobe in a blend without the blend's other BSDF.
+
+        Mitsuba's `blendbsdf` mixes value and density of its other BSDF into samples of either, even of delta
+        lobes, whose density is a probability: light is lost or added. What it mixes in is what it evaluates
+        in that direction.
+        """
+        sample, weight = bsdf.sample(context, si, first, second, active)
+        if self._has_mixed:
+            is_mixed = active & _of(self._mixed, si, bsdf)
+            is_mixed &= mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+            value, pdf = bsdf.eval_pdf(context, si, sample.wo, is_mixed)
+            own = sample.pdf - pdf
+            alone = dr.maximum((weight * sample.pdf - value) / own, 0.0)
+            weight = dr.select(is_mixed, dr.select(own > 0.0, alone, 0.0), weight)
+            sample.pdf = dr.select(is_mixed, own, sample.pdf)
+        return sample, weight
 
     def _mean_specular_albedo(self, scene: Any) -> Any:
         """Table of :meth:`specular_albedo`, estimated where random rays through the scene hit; Float."""
@@ -350,6 +372,11 @@ def _is_narrow(bsdf: Any) -> bool:
         all(_constant(bsdf, name) <= SHARP_ALPHA for name in names)
         for names in (("alpha",), ("alpha_u", "alpha_v"))
     )
+
+
+def _mixes_delta_lobes(bsdf: Any) -> bool:
+    """Whether a BSDF is or contains a blend of BSDFs, and has delta lobes."""
+    return "BlendBSDF" in _classes(bsdf) and has_lobe(bsdf.flags(), "Delta")
 
 
 def _is_turned(bsdf: Any) -> bool:
