@@ -15,7 +15,7 @@ import numpy as np
 
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import Limits
-from enfilade_blender.mesh_data import read_mesh
+from enfilade_blender.mesh_data import AttributeNames, read_mesh
 from enfilade_blender.notes import Notes
 from enfilade_blender.ply import Mesh
 from enfilade_blender.records import Evaluated, Lamp, Placed, Selection
@@ -39,6 +39,7 @@ SETTINGS = {  # of a render of nothing
     "use_sequencer": False,
     "use_freestyle": False,  # it draws with EEVEE, and its modules run scripts
 }
+UV_NODES = ("UVMAP", "NORMAL_MAP", "TANGENT")  # that name a UV map
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 RAYS_OF_LAMPS = ("diffuse", "glossy", "transmission")
 
@@ -126,7 +127,8 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         elif obj.type == "LIGHT":
             _note_linking(obj, notes)
             _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
-            result.lamps.append(Lamp(_name(instance), obj.data.original, matrix))
+            lamp = Lamp(_name(instance), obj.data.original, matrix, is_visible=obj.visible_camera)
+            result.lamps.append(lamp)
         elif obj.type in NOT_CARRIED:
             what = f"{NOT_CARRIED[obj.type]} can't be exported"
             notes.add("not-carried", obj.name, "Object", what, "it is missing from the picture")
@@ -168,14 +170,16 @@ def _too_many(limits: Limits, name: str) -> ExportError:
     return ExportError(what, name, advice)
 
 
-def _attributes_of_materials() -> frozenset[str]:
+def _attributes_of_materials() -> AttributeNames:
     """Names of the attributes of meshes that nodes read."""
     trees = [*(material.node_tree for material in bpy.data.materials), *bpy.data.node_groups]
-    nodes = [node for tree in trees if tree is not None for node in tree.nodes if node.type == "ATTRIBUTE"]
-    return frozenset(node.attribute_name for node in nodes if node.attribute_type == "GEOMETRY")
+    nodes = [node for tree in trees if tree is not None for node in tree.nodes]
+    colours = {n.attribute_name for n in nodes if n.type == "ATTRIBUTE" and n.attribute_type == "GEOMETRY"}
+    colours |= {node.layer_name for node in nodes if node.type == "VERTEX_COLOR"}
+    return AttributeNames(frozenset(colours), frozenset(n.uv_map for n in nodes if n.type in UV_NODES))
 
 
-def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: frozenset[str]) -> Placed | None:
+def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: AttributeNames) -> Placed | None:
     obj, pointer = instance.object, instance.object.data.as_pointer()
     _note_object(instance, notes)
     if pointer not in meshes:

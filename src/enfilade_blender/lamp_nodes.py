@@ -34,9 +34,9 @@ class LampNodes:
         tree = lamp.data.node_tree if lamp.data.use_nodes else None
         if tree is None:
             return 1.0, 1.0, 1.0
-        outputs = [node for node in tree.nodes if node.type == "OUTPUT_LIGHT" and node.is_active_output]
+        output = tree.get_output_node("CYCLES")
         graph = Graph(lamp.name, self._notes)
-        shader = graph.shader(outputs[0].inputs["Surface"], ()) if outputs else Nothing()
+        shader = Nothing() if output is None else graph.shader(output.inputs["Surface"], ())
         r, g, b = self._emitted(shader, lamp, graph)
         return float(r), float(g), float(b)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's lights as emitters of Mitsuba.
 
-Cycles' lamps do not block light, and the camera does not see them. enfilade's camera does not see emitters
-whose BSDF has the id of lamps, either; shadow rays pass them, those to suns, spots and points with
-volumetric path tracers alone.
+Cycles' lamps do not block light, and the camera sees those only that are made visible to it. enfilade's
+camera does not see emitters whose BSDF has the id of lamps, either; shadow rays pass them, those to suns,
+spots and points with volumetric path tracers alone. Visible ones are black surfaces that emit.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from enfilade_blender.scene_xml import LAMP, Element, Identifiers, plugin, refer
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
+BLACK = (0.0, 0.0, 0.0)
 SIZES = ("shadow_soft_size", "size", "size_y", "angle", "spot_size", "spot_blend")  # of lamps
 DELTA = ("point", "spot", "directional")  # emitters that shadow rays alone reach
 
@@ -152,7 +153,7 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
         emitter.append(_vector("position", place, tag="point"))
         return [emitter]
     light = plugin("emitter", "area", radiance=_scaled(colour, sphere_radiance(1.0, radius)))
-    shape = plugin("shape", "sphere", light, reference(LAMP), radius=radius)
+    shape = plugin("shape", "sphere", light, _surface(lamp), radius=radius)
     shape.append(_vector("center", place, tag="point"))
     shape.set("id", identifiers.unique(name))
     return [shape]
@@ -170,9 +171,14 @@ def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     matrix = axes @ FORWARD
     matrix[:3, 2] /= max(np.linalg.norm(matrix[:3, 2]), 1e-12)
     light = plugin("emitter", "area", radiance=radiance)
-    shape = plugin("shape", "disk" if is_round else "rectangle", light, reference(LAMP), to_world=matrix)
+    shape = plugin("shape", "disk" if is_round else "rectangle", light, _surface(lamp), to_world=matrix)
     shape.set("id", identifiers.unique(lamp.name))
     return shape
+
+
+def _surface(lamp: Lamp) -> Element:
+    """The BSDF of a lamp's shape."""
+    return plugin("bsdf", "diffuse", reflectance=BLACK) if lamp.is_visible else reference(LAMP)
 
 
 def _area_size(data: Any) -> tuple[float, float]:
@@ -194,6 +200,11 @@ def _spot(lamp: Lamp, colour: Colour, notes: Notes) -> Element:
 
 def _note_unusual(lamp: Lamp, notes: Notes) -> None:
     data = lamp.data
+    if lamp.is_visible and (data.type == "AREA" or (data.type == "POINT" and data.shadow_soft_size > TINY)):
+        what, effect = "a lamp that the camera sees is an emitting surface", "it casts shadows"
+        notes.add("approximated", lamp.name, "Ray visibility", what, effect)
+    elif lamp.is_visible and data.type == "SPOT":
+        notes.add("not-carried", lamp.name, "Ray visibility", "it has no shape", "the camera does not see it")
     if data.type == "AREA" and getattr(data, "spread", math.pi) < math.pi - 1e-3:
         what, effect = "its spread is left out", "light reaches all directions"
         notes.add("not-carried", lamp.name, "Spread", what, effect)

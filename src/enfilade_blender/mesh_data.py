@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.ply import F32, Mesh
 
 KINDS = {  # attributes that nodes read: name, type and number of their values
+    "FLOAT_COLOR": ("color", np.float32, 4),
+    "BYTE_COLOR": ("color", np.float32, 4),
     "FLOAT": ("value", np.float32, 1),
     "INT": ("value", np.int32, 1),
     "BOOLEAN": ("value", np.bool_, 1),
@@ -21,7 +22,14 @@ KINDS = {  # attributes that nodes read: name, type and number of their values
 }
 
 
-def read_mesh(data: Any, owner: str, notes: Notes, names: Collection[str] = ()) -> Mesh:
+class AttributeNames(NamedTuple):
+    """Names of attributes that materials read as colours, and as UV maps."""
+
+    colours: frozenset[str] = frozenset()
+    uvs: frozenset[str] = frozenset()
+
+
+def read_mesh(data: Any, owner: str, notes: Notes, names: AttributeNames) -> Mesh:
     """Triangles of an evaluated mesh, with normals, UV maps, colours and other attributes.
 
     Triangles with a vertex that is not finite, which Mitsuba refuses, are left out with a note.
@@ -33,7 +41,8 @@ def read_mesh(data: Any, owner: str, notes: Notes, names: Collection[str] = ()) 
         Name of its object, for notes.
     notes
     names
-        Of the attributes that materials read.
+        Of the attributes that materials read. UV maps are read in any case, unless they have another domain
+        or type than Blender's own, as those of geometry nodes may.
     """
     data.calc_loop_triangles()
     count = len(data.loop_triangles)
@@ -52,17 +61,23 @@ def read_mesh(data: Any, owner: str, notes: Notes, names: Collection[str] = ()) 
         size = len(data.loops) if per_corner else len(data.vertices)
         colour = _get(attribute.data, "color", np.float32, size * 4).reshape(-1, 4)
         colours[attribute.name] = colour[loops if per_corner else corners[loops]].reshape(-1, 3, 4)
-    # Nodes show a number as a grey, and a vector as a colour.
+    # Read other attributes. Nodes show a number as a grey, and a vector as a colour.
     others = {}
     at = {"POINT": corners[loops], "CORNER": loops, "FACE": polygons.repeat(3)}
     for attribute in data.attributes:
         name, kind = attribute.name, KINDS.get(attribute.data_type)
-        if name in names and name not in uvs and name not in colours and kind and attribute.domain in at:
-            value, dtype, axes = kind
+        if name in uvs or name in colours or not kind or attribute.domain not in at:
+            continue
+        value, dtype, axes = kind
+        if name in names.colours or (name in names.uvs and value == "vector"):
             values = _get(attribute.data, value, dtype, len(attribute.data) * axes).reshape(-1, axes)
-            colour = np.tile(np.float32([0.0, 0.0, 0.0, 1.0]), (len(values), 1))
-            colour[:, : 3 if axes == 1 else axes] = values
-            others[name] = colour[at[attribute.domain]].reshape(-1, 3, 4)
+            corner = at[attribute.domain]
+            if name in names.uvs and value == "vector":
+                uvs[name] = values[corner, :2]
+            if name in names.colours:
+                colour = np.tile(np.float32([0.0, 0.0, 0.0, 1.0]), (len(values), 1))
+                colour[:, : 3 if axes == 1 else axes] = values
+                others[name] = colour[corner].reshape(-1, 3, 4)
     active_uv = next((layer.name for layer in data.uv_layers if layer.active_render), "")
     active_colour = data.color_attributes.render_color_index if colours else -1
     triangles = corners[loops].reshape(-1, 3)

@@ -24,6 +24,10 @@ IMPORTERS: dict[str, Callable[..., Any]] = {
     ".usdc": lambda file: bpy.ops.wm.usd_import(filepath=file),
     ".usdz": lambda file: bpy.ops.wm.usd_import(filepath=file),
 }
+ALPHA_OF_FILES = {  # modes by the endings of files
+    ".exr": "PREMUL",
+    **dict.fromkeys((".png", ".webp", ".tga", ".bmp", ".jpg", ".jpeg"), "STRAIGHT"),
+}
 IMAGE_FILES = ("FILE", "SEQUENCE", "MOVIE", "TILED")  # sources of images that are read from the disk
 
 
@@ -54,7 +58,10 @@ def open_source(job: Job, notes: Notes) -> Selection:
         raise ExportError(
             f"Blender can't open it: {reason}", str(job.source), "open it in Blender, and save it again"
         ) from error
+    _note_newer(notes)
     _detach_images(job, notes)
+    _settle_alpha()
+    _show_in_viewports()
     if suffix != ".blend":
         _take_camera(notes)
     return _select(job)
@@ -129,9 +136,34 @@ def _detach_images(job: Job, notes: Notes) -> None:
         image.buffers_free()
 
 
+def _note_newer(notes: Notes) -> None:
+    """Note a file of a later Blender, of whose data this one may know a part only."""
+    file, own = tuple(bpy.data.version[:2]), tuple(bpy.app.version[:2])
+    if bpy.data.filepath and file > own:
+        what = "the file is of Blender {}.{}, it was read by {}.{}".format(*file, *own)
+        notes.add(
+            "not-carried", "the file", "Version", what, "parts may be missing; give a newer blender.program"
+        )
+
+
+def _settle_alpha() -> None:
+    """Alpha modes as Cycles has them: the type of an image's file decides whether alpha is straight."""
+    for image in bpy.data.images:
+        mode = ALPHA_OF_FILES.get(Path(image.filepath).suffix.lower())
+        is_file = image.source in ("FILE", "TILED") and not image.packed_files
+        if is_file and mode is not None and image.alpha_mode in ALPHA_OF_FILES.values():
+            image.alpha_mode = mode
+
+
+def _show_in_viewports() -> None:
+    """Show all in viewports, on whose scene alone Blender writes the values of animations and drivers."""
+    for item in (*bpy.data.objects, *bpy.data.collections):
+        item.hide_viewport = False
+
+
 def _check_libraries(job: Job) -> None:
     for library in bpy.data.libraries:
-        file = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
+        file = Path(bpy.path.abspath(library.filepath)).resolve()
         if not _is_allowed(file, job):
             raise ExportError(
                 f"it links the library {file}, outside the allowed folders",

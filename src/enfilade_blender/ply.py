@@ -141,6 +141,9 @@ def joined(meshes: list[Mesh]) -> Mesh:
         uvs={name: np.concatenate([mesh.uvs[name] for mesh in meshes]) for name in first.uvs},
         colours={name: np.concatenate([mesh.colours[name] for mesh in meshes]) for name in first.colours},
         materials=np.concatenate([mesh.materials for mesh in meshes]),
+        generated=None
+        if first.generated is None
+        else np.concatenate([mesh.generated for mesh in meshes if mesh.generated is not None]),
     )
 
 

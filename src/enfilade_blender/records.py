@@ -98,12 +98,16 @@ class Placed:
 
 @dataclass(eq=False)
 class Lamp:
-    """A light of the scene: its data, its matrix (4, 4) float64, and the factor (RGB) of its nodes."""
+    """A light of the scene: its data, its matrix (4, 4) float64, and the factor (RGB) of its nodes.
+
+    `is_visible` says whether the camera sees its shape.
+    """
 
     name: str
     data: Any
     matrix: np.ndarray
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    is_visible: bool = False
 
 
 @dataclass(eq=False)

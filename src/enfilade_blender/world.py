@@ -89,10 +89,7 @@ def _plain(world: Any, notes: Notes) -> tuple[float, float, float] | None:
     if not world.use_nodes or world.node_tree is None:
         r, g, b = world.color
         return float(r), float(g), float(b)
-    output = next(
-        (node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output),
-        None,
-    )
+    output = world.node_tree.get_output_node("CYCLES")
     if output is None:
         return 0.0, 0.0, 0.0
     shader = Graph(world.name, notes).shader(output.inputs["Surface"], ())

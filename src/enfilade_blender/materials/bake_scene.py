@@ -199,6 +199,8 @@ def _data(mesh: Mesh) -> Any:
     for name, rgba in mesh.colours.items():
         attribute = data.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
         attribute.data.foreach_set("color", np.ascontiguousarray(rgba, np.float32).ravel())
+    if mesh.active_colour:
+        data.color_attributes.render_color_index = list(mesh.colours).index(mesh.active_colour)
     data.update(calc_edges=True)
     data.normals_split_custom_set(mesh.normals.reshape(-1, 3))
     return data

@@ -53,12 +53,10 @@ class Graph:
         self._owner, self._notes = owner, notes
 
     def surface(self, tree: Any) -> Shader:
-        """Shader of the tree's active output."""
-        outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
-        outputs = [node for node in outputs if node.target in ("ALL", "CYCLES")] or outputs
-        if not outputs:
+        """Shader of the output that Cycles takes."""
+        output = tree.get_output_node("CYCLES")
+        if output is None:
             return Nothing()
-        output = next((node for node in outputs if node.is_active_output), outputs[0])
         for name, effect in (
             ("Volume", "the object is without it"),
             ("Displacement", "the surface is smooth"),

@@ -192,6 +192,7 @@ LIGHTS = (
         "mapped",
         "a factor; falloff is quadratic",
     ),
+    ("Point or area that the camera sees", "approximated", "a black surface that emits, and casts shadows"),
     ("Area that is a portal", "mapped", "left out: it emits nothing"),
     ("World of one colour", "mapped", "`constant`"),
     ("World of nodes: HDRI, sky", "baked", "`envmap`"),
@@ -247,6 +248,7 @@ OBJECTS = (
         "not carried",
         "left out",
     ),
+    ("File of a newer Blender than the one that reads it", "not carried", "what that one does not know"),
     ("Missing fonts and caches, drivers that need Python", "not carried", "as Blender shows them without"),
 )
 

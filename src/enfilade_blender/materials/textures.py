@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any, TypeGuard
 
@@ -30,6 +29,14 @@ from enfilade_blender.notes import Notes
 from enfilade_blender.scene_xml import Element, Identifiers, colour, plugin
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+LINEAR = (".exr", ".hdr")  # of these, which Mitsuba does not decode
+JPEG = b"\xff\xd8\xff"
+SIGNATURES = (
+    b"\x89PNG",
+    JPEG,
+    b"\x76\x2f\x31\x01",
+    b"#?",
+)  # first bytes of such files
 CMYK_DEPTH = 32  # bits of a pixel of a JPEG file, which Mitsuba reads with 8 and 24
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "clamp", "MIRROR": "mirror"}
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])  # Mitsuba's first row is at v = 0
@@ -235,16 +242,20 @@ class Textures:
 
         source = Path(bpy.path.abspath(image.filepath, library=image.library))
         suffix = source.suffix.lower()
-        is_cmyk = suffix in (".jpg", ".jpeg") and image.depth == CMYK_DEPTH
-        if image.source != "FILE" or image.is_dirty or suffix not in READABLE or is_cmyk:
+        is_encoded = suffix in LINEAR and image.colorspace_settings.name not in RAW_SPACES
+        if image.source != "FILE" or image.is_dirty or suffix not in READABLE or is_encoded:
             return ""
-        file = f"textures/{self._names.unique(file_stem(name))}{suffix}"
         if image.packed_file is not None:
-            (self._folder / file).write_bytes(image.packed_file.data)
+            data = image.packed_file.data
         elif source.is_file():
-            shutil.copyfile(source, self._folder / file)
+            data = source.read_bytes()
         else:
             return ""
+        is_cmyk = data.startswith(JPEG) and image.depth == CMYK_DEPTH
+        if not data.startswith(SIGNATURES) or is_cmyk:
+            return ""
+        file = f"textures/{self._names.unique(file_stem(name))}{suffix}"
+        (self._folder / file).write_bytes(data)
         return file
 
 

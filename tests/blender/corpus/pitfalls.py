@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A file whose data has other values than a first look at it tells, and one with nested libraries."""
+
+import bpy
+import numpy as np
+
+from corpus.stage import (
+    add,
+    cube,
+    fill,
+    image,
+    light,
+    new_file,
+    node_of,
+    picture,
+    plane,
+    principled,
+    save,
+    shader,
+    stage,
+    tiles,
+    world,
+)  # fmt: skip
+
+
+def pitfalls(folder):
+    stage(lit=False)
+    _world_of_two_engines()
+    _copies_with_normals()
+    _hidden_in_viewports()
+    _material_of_two_engines()
+    _attributes_of_geometry()
+    _named_by_default()
+    _image_of_another_kind(folder)
+    light("AREA", "Panel", (0.0, 2.9, 2.0), 50.0, target=(0.0, 0.0, 2.0)).visible_camera = True
+
+
+def nested_libraries(folder):
+    """A file that links a library in a folder, which links one in a folder below that."""
+    rooms, assets = folder / "rooms", folder / "rooms" / "assets"
+    assets.mkdir(parents=True, exist_ok=True)
+    new_file()
+    cube("Chair", (0.0, 0.0, 0.5), 0.5, principled("wood")).data.name = "chair"
+    chair = save(assets, "chair")
+    new_file()
+    save(rooms, "room")  # paths can be relative to a file only
+    add("Seat", _linked(chair, "meshes", "chair"))
+    room = save(rooms, "room")
+    stage()
+    save(folder, "nested_libraries")
+    bpy.context.scene.collection.objects.link(_linked(room, "objects", "Seat"))
+
+
+def _linked(file, kind, name):
+    with bpy.data.libraries.load(str(file), link=True, relative=True) as (_, wanted):
+        setattr(wanted, kind, [name])
+    return getattr(wanted, kind)[0]
+
+
+def _world_of_two_engines():
+    value = world((0.0, 0.3, 0.0))
+    nodes = value.node_tree.nodes
+    nodes["World Output"].target = "CYCLES"
+    red, end = node_of(value.node_tree, "Background"), nodes.new("ShaderNodeOutputWorld")
+    red.inputs[0].default_value = 1.0, 0.0, 0.0, 1.0
+    end.target = "EEVEE"
+    value.node_tree.links.new(red.outputs[0], end.inputs[0])
+    nodes.active = end
+
+
+def _copies_with_normals():
+    """Copies of a mesh with a modifier and a normal map."""
+    flat = image("flat", lambda x, _: np.full((*x.shape, 3), (0.5, 0.5, 1.0)), 16, space="Non-Color")
+    mapped, tree, bsdf = shader("mapped", "BsdfPrincipled")
+    fill(tree, bsdf, {"Normal": node_of(tree, "NormalMap", Color=flat)})
+    stud = cube("Stud", (0.0, 0.0, 0.0), 0.1, mapped)
+    stud.modifiers.new("smooth", "SUBSURF").render_levels = 1
+    grid = plane("Grid", (0.0, -1.0, 0.2), 1.0, principled("grid"))
+    stud.parent, grid.instance_type = grid, "VERTS"
+
+
+def _hidden_in_viewports():
+    """A lamp and a material with animated values, which viewports do not show."""
+    lamp = light("POINT", "Hidden", (0.0, -2.0, 3.0), 10.0, shadow_soft_size=0.0)
+    fading, _, bsdf = shader("fading", "BsdfDiffuse")
+    box = cube("Fading", (2.0, 0.0, 0.25), 0.5, fading)
+    for frame, energy, colour in ((1, 10.0, (1, 0, 0, 1)), (9, 90.0, (0, 0, 1, 1))):
+        lamp.data.energy, bsdf.inputs["Color"].default_value = energy, colour
+        lamp.data.keyframe_insert("energy", frame=frame)
+        bsdf.inputs["Color"].keyframe_insert("default_value", frame=frame)
+    lamp.hide_viewport = box.hide_viewport = True
+
+
+def _material_of_two_engines():
+    both, tree, _ = shader("both", "BsdfDiffuse", Color=(0.0, 1.0, 0.0, 1.0))
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    output.target = "CYCLES"
+    red, end = node_of(tree, "BsdfDiffuse", Color=(1.0, 0.0, 0.0, 1.0)), node_of(tree, "OutputMaterial")
+    tree.links.new(red.outputs[0], end.inputs["Surface"])
+    tree.nodes.active = end
+    cube("Both", (-2.0, 0.0, 0.25), 0.5, both)
+
+
+def _attributes_of_geometry():
+    """A UV map of points, and colours of faces, as geometry nodes store them."""
+    wrapped, tree, bsdf = shader("wrapped", "BsdfDiffuse")
+    where, texture = node_of(tree, "UVMap"), picture(tree, image("squares", tiles, 32))
+    where.uv_map = "of points"
+    tree.links.new(where.outputs["UV"], texture.inputs["Vector"])
+    fill(tree, bsdf, {"Color": texture})
+    board = plane("Wrapped", (-1.0, -2.0, 0.1), 0.5, wrapped)
+    attribute = board.data.attributes.new("of points", "FLOAT2", "POINT")
+    attribute.data.foreach_set("vector", [0.0, 0.0, 3.0, 0.0, 0.0, 3.0, 3.0, 3.0])
+    tinted, tree, bsdf = shader("tinted", "BsdfDiffuse")
+    read = node_of(tree, "Attribute")
+    read.attribute_name = "of faces"
+    fill(tree, bsdf, {"Color": read.outputs["Color"]})
+    board = plane("Tinted", (0.0, -2.0, 0.1), 0.5, tinted)
+    board.data.attributes.new("of faces", "FLOAT_COLOR", "FACE").data[0].color = 0.1, 0.2, 0.7, 1.0
+
+
+def _named_by_default():
+    """The render-active one of two colour attributes, by a node without a name, which is baked."""
+    tinted, tree, bsdf = shader("unnamed", "BsdfDiffuse")
+    fill(tree, bsdf, {"Color": node_of(tree, "Gamma", Color=node_of(tree, "VertexColor"), Gamma=1.0)})
+    colours = plane("Unnamed", (1.0, -2.0, 0.1), 0.5, tinted).data.color_attributes
+    for name, colour in (("first", (0.7, 0.1, 0.1, 1.0)), ("second", (0.1, 0.7, 0.1, 1.0))):
+        colours.new(name, "FLOAT_COLOR", "CORNER").data.foreach_set("color", 4 * colour)
+    colours.render_color_index = 1
+
+
+def _image_of_another_kind(folder):
+    """A WebP file whose name is that of a PNG file."""
+    value = image("web", tiles, 32)
+    value.file_format, value.filepath_raw = "WEBP", str(folder / "web.webp")
+    value.save()
+    (folder / "web.webp").rename(folder / "web.png")
+    file = bpy.data.images.load(str(folder / "web.png"))
+    cube("Web", (0.0, 1.5, 0.25), 0.5, shader("web", "BsdfDiffuse", Color=file)[0])

@@ -1,0 +1,74 @@
+"""Data that has other values than a first look at it tells (see corpus/pitfalls.py)."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def exported(blender):
+    code, out, result = blender.job(blender.make("pitfalls")[0], "pitfalls")
+    assert code == 0, result
+    return out, result
+
+
+@pytest.fixture(scope="module")
+def scene(exported):
+    return mi.load_file(str(exported[0] / "scene.xml"), optimize=False)
+
+
+@pytest.fixture(scope="module")
+def shapes(scene):
+    return {shape.id(): shape for shape in scene.shapes()}
+
+
+def values(plugin, name):
+    parameters = mi.traverse(plugin)
+    return np.array(next(parameters[key] for key in parameters.keys() if key.endswith(name))).ravel()  # noqa: SIM118
+
+
+def test_copies_of_a_mesh_with_a_modifier_and_a_normal_map_are_joined(shapes):
+    assert mi.traverse(shapes["Grid: Stud"])["faces"].shape[0] == 4 * 3 * 48
+
+
+def test_values_of_what_viewports_hide_are_those_of_the_first_frame(scene, shapes):
+    lamp = next(emitter for emitter in scene.emitters() if emitter.class_name() == "PointLight")
+    assert values(lamp, "intensity.value") == pytest.approx(3 * [10.0 / (4.0 * np.pi)], rel=1e-5)
+    assert values(shapes["Fading"].bsdf(), "reflectance.value") == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
+
+
+def test_the_output_for_cycles_counts(scene, shapes):
+    assert values(shapes["Both"].bsdf(), "reflectance.value") == pytest.approx([0.0, 1.0, 0.0])
+    sky = next(emitter for emitter in scene.emitters() if emitter.class_name() == "ConstantBackgroundEmitter")
+    assert values(sky, "radiance.value") == pytest.approx([0.0, 0.3, 0.0])
+
+
+def test_attributes_have_any_domain(shapes):
+    coordinates = values(shapes["Wrapped"], "vertex_texcoords")
+    assert (coordinates.min(), coordinates.max()) == (0.0, 3.0)
+    colours = values(shapes["Tinted"], "vertex_color").reshape(-1, 3)
+    assert colours == pytest.approx(np.tile([0.1, 0.2, 0.7], (len(colours), 1)))
+
+
+def test_a_blank_name_is_that_of_the_attribute_of_renders(shapes):
+    assert values(shapes["Unnamed"].bsdf(), "reflectance.value") == pytest.approx([0.1, 0.7, 0.1], abs=2e-3)
+
+
+def test_an_image_is_read_by_its_content_not_by_its_name(exported):
+    file = next((exported[0] / "textures").glob("web*"))
+    assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_lamp_that_the_camera_sees_is_a_surface(exported, shapes):
+    assert shapes["Panel"].is_emitter()
+    assert shapes["Panel"].bsdf().class_name() == "SmoothDiffuse"
+    notes = [note for note in exported[1]["notes"] if note["object"] == "Panel"]
+    assert [note["node"] for note in notes] == ["Ray visibility"]
+
+
+def test_libraries_of_libraries_are_found(blender):
+    code, _, result = blender.job(blender.make("nested_libraries")[0], "nested")
+    assert code == 0, result
+    assert len(result["files"]) == 2
