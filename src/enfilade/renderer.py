@@ -324,12 +324,10 @@ class LobeRenderer(Renderer, Protocol):
         """All arrays that the methods below read, as inputs of a recorded (frozen) kernel."""
         ...
 
-    @property
     def emitters(self) -> Emitters:
         """Points on all emitters: few camera rays hit an emitter that is small in the image."""
         ...
 
-    @property
     def photons(self) -> Photons:
         """The same points at each call: they suggest where bright surfaces are."""
         ...

@@ -75,8 +75,8 @@ def test_surfaces_are_those_of_the_file(tmp_path, unmerged):
     assert set(np.unique(wanted.shape_index)) >= {0, 1, 2, 3, 4, 5, 6}
     for name in ("shape_index", "depth", "normal", "albedo", "surface"):
         np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
-    np.testing.assert_array_equal(merged.emitters.shape_index, unmerged.emitters.shape_index)
-    np.testing.assert_array_equal(merged.emitters.position, unmerged.emitters.position)
+    np.testing.assert_array_equal(merged.emitters().shape_index, unmerged.emitters().shape_index)
+    np.testing.assert_array_equal(merged.emitters().position, unmerged.emitters().position)
 
 
 def test_path_traced_images_agree(tmp_path, unmerged):

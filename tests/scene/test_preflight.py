@@ -15,6 +15,7 @@ from enfilade.errors import SceneError
 from enfilade.scene.preflight import preflight
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
+HOT = '<spectrum name="intensity" type="blackbody"><float name="temperature" value="4000"/></spectrum>'
 BALL = '<shape type="sphere"/><emitter type="constant"/>'
 
 
@@ -41,6 +42,10 @@ def test_what_its_process_prints_is_not_its_answer(scene, tmp_path, monkeypatch)
         ('<shape type="nonesuch"/>', "'nonesuch' is not one of Mitsuba's plugins"),
         ('<shape type="sphere"><integer name="a" value="1"/></shape>', r"can't load .*scene\.xml"),
         (f'<integrator type="direct"/>{BALL}', "leave --max-depth out"),
+        (
+            f'{BALL}<emitter type="point">{HOT}</emitter>',
+            "Mitsuba can't render .*scene.xml: .*[Nn]ot implemented",
+        ),
     ],
 )
 def test_it_refuses_what_mitsuba_refuses(scene, body, words):

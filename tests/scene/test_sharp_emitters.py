@@ -15,6 +15,8 @@ from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.scene.mitsuba.sun import find_sun
 from support.integrated import shaded, standard_errors, traced
+from support.mitsuba_scene import opened as opened_file
+from support.mitsuba_scene import placed, write
 
 SUN = np.array([0.6, 0.64, 0.48])
 LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
@@ -219,3 +221,12 @@ def test_a_discrete_distribution_draws_in_proportion():
     assert np.bincount(np.array(UInt(drawn)), minlength=5).tolist() == [0, 750, 0, 250, 0]
     assert np.unique(np.array(pmf)).tolist() == [0.25, 0.75]
     assert np.array(within)[:750] == pytest.approx((np.arange(750) + 0.5) / 750, abs=1e-5)
+
+
+def test_a_lamp_may_have_any_texture(tmp_path):
+    # Mitsuba can't sample rays of patterns other than bitmaps: there are no photons then.
+    pattern = '<texture type="checkerboard" name="radiance"/>'
+    lamp = placed("rectangle", "lamp", (0, 0, 2), f'<emitter type="area">{pattern}</emitter>', 0.01)
+    renderer = opened_file(write(tmp_path, placed("rectangle", "wall", (0, 0, 5), "", 4.0), lamp, sky=""))
+    assert renderer.has_sharp_light
+    assert not len(renderer.photons().flux)

@@ -88,6 +88,10 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
         answer["why_inseparable"] = renderer.why_inseparable
     except SceneError as error:
         answer["error"] = str(error)
+    except RuntimeError as error:  # of Mitsuba
+        if "alloc" in str(error):
+            raise
+        answer["error"] = f"Mitsuba can't render {scene}: {error}"
     os.write(out, json.dumps(answer).encode())
 
 

@@ -43,7 +43,7 @@ def opened_room(folder, *shapes, sky="", **settings):
 def regions_in(renderer):
     geometry = find_geometry(renderer, camera())
     probe = Integrator(renderer).kernels.probe
-    return find_regions(renderer.photons, probe, geometry, RandomKey(0, 0, Purpose.GUIDING))[0]
+    return find_regions(renderer.photons(), probe, geometry, RandomKey(0, 0, Purpose.GUIDING))[0]
 
 
 def test_the_shade_is_found(tmp_path):

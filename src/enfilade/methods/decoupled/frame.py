@@ -158,7 +158,7 @@ def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tup
     # Add rays at edges.
     geometry, sampling = walk.view(frame).geometry, AdaptiveSampling.of(walk)
     everywhere = np.ones(geometry.shape_index.shape, np.bool_)
-    emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
+    emitters = small_emitter_pixels(shot.renderer.emitters(), geometry)
     edges = is_outline(geometry) | dilated(sampling.uncertain(estimate, everywhere) | emitters)
     return estimate, sampling.refine(estimate, everywhere, edges, everywhere, settings.min_spp)
 

@@ -23,7 +23,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
     where = geometry.has_diffuse
     regions, guide_paths = find_regions(
-        renderer.photons, shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
+        renderer.photons(), shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
     guide = upload_guide(regions)
     estimate = shot.estimate(

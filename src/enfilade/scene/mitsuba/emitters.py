@@ -17,6 +17,7 @@ from enfilade.scene.mitsuba.shapes import is_lamp
 
 MAX_POINTS = 1 << 17  # on all emitters together
 POINTS = 64, 1024  # fewest and most on one
+SAMPLED = ("SRGBReflectanceSpectrum", "UniformSpectrum", "BitmapTexture")  # by Mitsuba, for rays of emitters
 PHOTONS = 1 << 14  # from all emitters together
 
 
@@ -35,7 +36,12 @@ def find_emitters(merged: MergedScene) -> Emitters:
 
 
 def trace_photons(scene: Any) -> Photons:
-    """Follow rays from all emitters but environments to the next surface."""
+    """Follow rays from all emitters but environments to the next surface.
+
+    There are none if Mitsuba can not sample rays of an emitter: of one whose texture is no bitmap.
+    """
+    if any(map(_has_pattern, scene.emitters())):
+        return Photons(np.zeros((0, 3), np.float32), np.zeros(0))
     sampler = one_sequence(PHOTONS)
     points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
     ray, weight, emitter = scene.sample_emitter_ray(0.0, sampler.next_1d(), *points, True)
@@ -44,3 +50,9 @@ def trace_photons(scene: Any) -> Photons:
     is_local = np.array(si.is_valid() & ~mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite))
     is_kept = is_local & np.isfinite(flux) & (flux > 0.0)
     return Photons(rows(Array3f(si.p))[is_kept], flux[is_kept])
+
+
+def _has_pattern(emitter: Any) -> bool:
+    """Whether the light of an emitter has a texture that is no bitmap, such as the colours of vertices."""
+    textures = [node for node in mi.traverse(emitter).hierarchy if isinstance(node, mi.Texture)]
+    return not all(of.class_name().startswith(SAMPLED) for of in textures)

@@ -139,14 +139,20 @@ class MitsubaRenderer:
         lights = self._transport.sharp_emitters.state
         return self._scene, integrators, self._shapes.state, self._lobes.state, lights
 
-    @cached_property
     def emitters(self) -> Emitters:
-        """See :attr:`enfilade.renderer.LobeRenderer.emitters`."""
+        """See :meth:`enfilade.renderer.LobeRenderer.emitters`."""
+        return self._emitters
+
+    def photons(self) -> Photons:
+        """See :meth:`enfilade.renderer.LobeRenderer.photons`."""
+        return self._photons
+
+    @cached_property
+    def _emitters(self) -> Emitters:
         return find_emitters(self._merged)
 
     @cached_property
-    def photons(self) -> Photons:
-        """See :attr:`enfilade.renderer.LobeRenderer.photons`."""
+    def _photons(self) -> Photons:
         return trace_photons(self._scene)
 
     @property

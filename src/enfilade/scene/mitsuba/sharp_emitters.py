@@ -9,11 +9,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import numpy.typing as npt
 
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
 from enfilade.kernels.random import BELOW_ONE, Discrete, one_sequence
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import ShadowRays, Target
+from enfilade.scene.mitsuba.shapes import registry_index
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
@@ -41,9 +43,7 @@ class SharpEmitters:
         emitters = scene.emitters()
         weights = np.array([e.sampling_weight() for e in emitters], np.float64)
         is_delta = np.array([mi.has_flag(e.flags(), mi.EmitterFlags.Delta) for e in emitters], bool)
-        is_small = np.array(
-            [w > 0.0 and _is_small(scene, e) for e, w in zip(emitters, weights, strict=True)], bool
-        )
+        is_small = (weights > 0.0) & _are_small(scene, emitters)
         if is_small.sum() > SHADOW_RAYS:  # the noise of a choice among them costs more than it gains
             is_small[:] = False
         is_sharp = (is_delta | is_small) & (weights > 0.0)  # Mitsuba never samples the others
@@ -208,15 +208,31 @@ def _number(emitter: Any) -> Any:
     return dr.reinterpret_array(UInt, emitter)
 
 
-def _is_small(scene: Any, emitter: Any) -> bool:
-    """Whether an emitting shape is small, seen from what it lights."""
-    shape = emitter.get_shape()
-    if shape is None:
-        return False
+def _are_small(scene: Any, emitters: Sequence[Any]) -> npt.NDArray[np.bool_]:
+    """Whether emitters (N,) are small shapes, seen from what they light; one launch for all."""
+    found = np.zeros(len(emitters), np.bool_)
+    places = [place for place, emitter in enumerate(emitters) if emitter.get_shape() is not None]
+    if not places:
+        return found
+    shapes = [emitters[place].get_shape() for place in places]
+    number = np.array([registry_index(mi.ShapePtr(shape)) for shape in shapes], np.uint32)
+
+    # Trace rays from all of each shape, as a Lambertian emitter sends them.
     sampler = one_sequence(DISTANCE_RAYS)
-    points = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
-    ray, _ = emitter.sample_ray(0.0, 0.5, *points)
-    hit = scene.ray_intersect(ray)
-    distance = np.array(dr.select(hit.is_valid(), hit.t, 0.0))
-    half_width = 0.5 * float(np.array(shape.bbox().extents()).max())
-    return bool(distance.any()) and half_width < SMALL * float(distance[distance > 0.0].mean())
+    position, direction = (
+        mi.Point2f(*(lanes(np.tile(np.array(axis), len(shapes))) for axis in sampler.next_2d()))
+        for _ in range(2)
+    )
+    pointers: Any = dr.reinterpret_array(mi.ShapePtr, lanes(np.repeat(number, DISTANCE_RAYS)))
+    start = pointers.sample_position(0.0, position)
+    local = mi.warp.square_to_cosine_hemisphere(direction)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(shapes) * DISTANCE_RAYS)
+    si.p, si.n = start.p, start.n
+    hit = scene.ray_intersect(si.spawn_ray(mi.Frame3f(mi.Vector3f(start.n)).to_world(local)))
+
+    # Compare their widths with the mean distances.
+    distance = np.array(dr.select(hit.is_valid(), hit.t, 0.0)).reshape(len(shapes), DISTANCE_RAYS)
+    mean = distance.sum(axis=1) / np.maximum((distance > 0.0).sum(axis=1), 1)
+    width = np.array([float(np.array(shape.bbox().extents()).max()) for shape in shapes])
+    found[places] = 0.5 * width < SMALL * mean
+    return found
