@@ -210,6 +210,18 @@ def test_the_sun_is_found(tmp_path, name, radius_deg):
     assert radius_deg < np.degrees(np.arctan(sun.extent[0])) < radius_deg + 0.5
 
 
+@pytest.mark.parametrize("aperture_deg", [0.05, 0.1, 0.2, 0.3, 1.0])
+@pytest.mark.parametrize("x", [0.6, 0.61, 0.63])
+def test_suns_of_any_size_are_found(tmp_path, aperture_deg, x):
+    aperture = f'<float name="sun_aperture" value="{aperture_deg}"/></emitter>'
+    opened(tmp_path, SKIES["sun and sky"].replace('x="0.6"', f'x="{x}"').replace("</emitter>", aperture))
+    sun = find_sun(mi.load_file(str(tmp_path / "scene.xml")).environment())
+    direction = np.array([x, 0.64, 0.48]) / np.linalg.norm([x, 0.64, 0.48])
+    angle_deg = np.degrees(np.arccos(np.clip(np.array(sun.frame.n).ravel() @ direction, -1.0, 1.0)))
+    assert angle_deg < 0.1 * aperture_deg + 0.02
+    assert aperture_deg / 2.0 < np.degrees(np.arctan(sun.extent[0])) < aperture_deg / 2.0 + 0.1
+
+
 def test_skies_without_a_sun_have_none(tmp_path):
     for sky in ('<emitter type="constant"/>', SKIES["sun and sky"].replace('"0.01"', '"0"'), AREA):
         assert not opened(tmp_path, sky).has_sharp_light

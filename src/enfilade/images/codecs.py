@@ -92,7 +92,7 @@ CODECS = {
         },
     ),
     "ffv1": Codec(
-        "ffv1", ".mkv", 12, "gbrp12le", "gbrp12le", 1, 0,
+        "ffv1", ".mkv", 12, "gbrp12le", "gbrp12le", 2, 0,
         {"level": "3", "slicecrc": "1", "slices": "4", "coder": "1"},
     ),
     "av1": Codec(

@@ -47,6 +47,8 @@ def load_scene(file: Path) -> Any:
         raise SceneError(f"{file} holds a {type(scene).__name__}, not a scene")
     if not scene.shapes():
         raise SceneError(f"{file} has no shapes: there is nothing to render")
+    if empty := [s.id() for s in scene.shapes() if isinstance(s, mi.Mesh) and not s.face_count()]:
+        raise SceneError(f"{file}: the mesh {empty[0]} has no triangles: leave it out")
     if not scene.emitters():
         raise SceneError(
             f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "

@@ -9,14 +9,16 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import numpy.typing as npt
 import scipy.ndimage
 
 from enfilade.arrays import Array3f, Float, UInt, lanes, opaque
-from enfilade.kernels.random import Discrete
+from enfilade.kernels.random import Discrete, one_sequence
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.records import F32
 
 SEARCH_WIDTH = 1024  # of the latitude-longitude map in which the sun is searched: texels of 0.35 degrees
+SAMPLES = 4096  # of the environment's own density, beside these
 MAX_RADIUS = math.radians(2.5)  # the disc seen from the Earth has 0.27 degrees; many photographs blur it
 MIN_SHARE = 0.05  # of the sky's flux
 CONTAINED = 0.99  # of the flux within that radius, to be on the map
@@ -101,14 +103,17 @@ def find_sun(environment: Any) -> Sun | None:
     sine = np.sin(polar)
     directions = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], axis=1)
     sky = _luminance(environment, mi.Vector3f(lanes(directions.astype(np.float32)[None])))
-    frame = _facing(directions[np.argmax(sky)])
+    frame = _facing(_brightest(environment, directions, sky))
 
-    # Compare the flux around it, beyond that of its surroundings, with that of the sphere.
-    limit = math.tan(MAX_RADIUS)
-    x, y, luminance = _map(environment, frame, limit)
-    excess = np.where(np.hypot(x, y) < limit, luminance - luminance.min(), 0.0)
-    flux = float(excess.sum()) * (2.0 * limit / TEXELS) ** 2
-    if flux <= MIN_SHARE * float(np.dot(sky, sine)) * step**2:
+    # Compare the flux around it, beyond that of its surroundings, with that of the sphere. A disc may be
+    # smaller than the texels of a map.
+    for limit in math.tan(MAX_RADIUS) / np.array([1.0, 4.0, 16.0]):
+        x, y, luminance = _map(environment, frame, limit)
+        excess = np.where(np.hypot(x, y) < limit, luminance - luminance.min(), 0.0)
+        flux = float(excess.sum()) * (2.0 * limit / TEXELS) ** 2
+        if flux > MIN_SHARE * float(np.dot(sky, sine)) * step**2:
+            break
+    else:
         return None
 
     # Map the disc alone.
@@ -123,6 +128,19 @@ def find_sun(environment: Any) -> Sun | None:
     weights = scipy.ndimage.maximum_filter(luminance.reshape(TEXELS, TEXELS), 3)
     texels = Discrete.of(np.maximum(weights, 1e-6 * weights.max()).ravel().astype(np.float64))
     return Sun(environment, frame, opaque(float(radius)), texels)
+
+
+def _brightest(environment: Any, directions: npt.NDArray[np.float64], sky: F32) -> Any:
+    """The brightest direction of a grid of known luminances, and of samples by the environment's own density.
+
+    The samples find discs between the directions of the grid.
+    """
+    si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES)
+    sample, _ = environment.sample_direction(si, mi.Point2f(one_sequence(SAMPLES).next_2d()))
+    found = _luminance(environment, sample.d)
+    if found.max() > sky.max():
+        return np.array(sample.d).T[np.argmax(found)]
+    return directions[np.argmax(sky)]
 
 
 def _map(environment: Any, frame: Any, extent: float) -> tuple[F32, F32, F32]:
