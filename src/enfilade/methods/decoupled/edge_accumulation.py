@@ -14,9 +14,9 @@ import numpy as np
 
 from enfilade.arrays import image, lanes, to_float, to_half
 from enfilade.kernels.tone import luminance
-from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.specular import accumulate_temporally, upload_aov
+from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import F32, Geometry, Mask, SurfaceClass
 
 # Of the samples' deviation: rays are stratified, and textures have less noise than their contrast tells. With

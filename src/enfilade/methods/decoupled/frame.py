@@ -17,7 +17,6 @@ from enfilade.methods.decoupled.edge_accumulation import accumulate_refined, red
 from enfilade.methods.decoupled.edges import dilated, is_outline, small_emitter_pixels
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.light_camera import light_camera
-from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import ShadedFrame
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular import (
@@ -25,6 +24,7 @@ from enfilade.methods.decoupled.specular import (
     upload_aov,
 )
 from enfilade.methods.decoupled.specular_rays import shade_specular
+from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import U8, Frame, Geometry, Mask, Provenance
 from enfilade.renderer import Purpose
 from enfilade.settings import LimitSettings, ViewingSettings

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
 from enfilade.kernels.guiding import LEAST_ODDS, OCTANTS, REGIONS, PathGuide
 from enfilade.kernels.random import samplers
-from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.kernels.rays import camera_rays, pixel_centres, points_at
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.records import F32, Geometry
@@ -107,8 +107,8 @@ def find_regions(
 
     # Take pixels at equal distances in the image.
     pixels = pixels[np.linspace(0, len(pixels) - 1, PIXELS).astype(np.int64)]
-    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
-    position = rows(rays.origin + Float(geometry.depth.ravel()[pixels]) * rays.direction)
+    depths = Float(geometry.depth.ravel()[pixels])
+    position = rows(points_at(geometry.camera, depths, lanes(pixels)))
     normal = geometry.normal.reshape(-1, 3)[pixels]
 
     def probed(guide: PathGuide, paths: int) -> Probes:

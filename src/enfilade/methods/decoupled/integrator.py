@@ -20,7 +20,6 @@ from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX, PathKernels, Vertex
 from enfilade.methods.decoupled.paths import (
     Contributions,
@@ -31,6 +30,7 @@ from enfilade.methods.decoupled.paths import (
     scatter_add,
     spawn,
 )
+from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.renderer import Branch, LobeRenderer, Rays
 
 SPECULAR_AOVS = 2  # reflection, transmission

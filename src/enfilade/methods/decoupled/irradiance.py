@@ -7,10 +7,10 @@ from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
 from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
-from enfilade.methods.decoupled.lookup import UploadedImage
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
+from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import Mask
 from enfilade.renderer import Purpose
 

@@ -21,13 +21,12 @@ from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
     IrradianceCache,
     accumulate,
-    blank_image,
     is_covered,
     reproject_to,
     upload,
 )
 from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
-from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.records import Geometry, Mask
@@ -164,7 +163,7 @@ class ShotContext:
         """Images and weights with blank ones up to a number, so that one kernel serves all frames."""
         missing = count - len(images)
         while len(self._blank) < missing:
-            self._blank.append(blank_image(layers=1))
+            self._blank.append(blank_image())
         return [*images, *self._blank[:missing]], [*weights, *[0.0] * missing]
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:

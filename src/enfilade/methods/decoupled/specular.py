@@ -11,19 +11,13 @@ import numpy as np
 import scipy.ndimage
 
 from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, opaque, to_float, to_half, vector3
+from enfilade.kernels.rays import points_at
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.denoising import denoise_light
-from enfilade.methods.decoupled.irradiance_cache import (
-    MIN_WEIGHT,
-    PLANE_TOLERANCE,
-    points_of,
-    smooth_along,
-    upload_layers,
-)
-from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.records import SpecularAov
+from enfilade.methods.decoupled.surface_image import MIN_FOUND_WEIGHT, UploadedImage, lookup, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.methods.decoupled.wavelet import firefly_weights
+from enfilade.methods.decoupled.wavelet import firefly_weights, smooth_along
 from enfilade.records import F32, Geometry, Mask, Shading
 
 DENOISER = "fast"  # quality: what it leaves is averaged over frames
@@ -156,7 +150,7 @@ def accumulate_temporally(
     color, variance = Array3f(here.values[0]), here.variances[0]
 
     # Compute the apparent positions; virtual images face the eye.
-    position = points_of(geometry, here.depths)
+    position = points_at(geometry.camera, here.depths)
     is_real = here.shape_indices < IN_VIRTUAL_IMAGE
     normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
     total, weight = Array3f(color), dr.ones(Float, dr.width(color))
@@ -164,14 +158,14 @@ def accumulate_temporally(
     dr.eval(position, normal, total, weight, luminance)
     for other, given in others:
         # Reproject.
-        found = lookup(position, normal, here.shape_indices, other, plane_tolerance=PLANE_TOLERANCE)
+        found = lookup(position, normal, here.shape_indices, other)
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
 
         # Weight by the difference, in units of the noise.
         difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - luminance)
         frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
-        frame_weight = dr.select(found.weight > MIN_WEIGHT, opaque(given) * frame_weight, 0.0)
+        frame_weight = dr.select(found.weight > MIN_FOUND_WEIGHT, opaque(given) * frame_weight, 0.0)
 
         # Accumulate.
         total += frame_weight * value
