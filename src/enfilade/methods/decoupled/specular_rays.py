@@ -27,7 +27,7 @@ from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.records import SpecularAov
 from enfilade.methods.decoupled.sample_counts import specular_spp
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.specular import filter_spatially, upload_aovs, with_edges
+from enfilade.methods.decoupled.specular_filter import filter_spatially, upload_aovs, with_edges
 from enfilade.methods.decoupled.surface_edges import narrow_surfaces, surface_edges
 from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
