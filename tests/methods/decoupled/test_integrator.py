@@ -26,7 +26,7 @@ from support.integrated import (
 )
 from support.material_scene import (
     MATERIALS,
-    PIXEL_ANGLE,
+    camera_paths,
     front_camera,
     integrator_of,
     opened_scene,
@@ -163,7 +163,7 @@ def test_a_hash_grid_without_images_gives_its_light(diffuse):
 
     def radiance(rays, sampler):
         integrator = integrator_of(renderer)
-        return integrator.final_gather(EMPTY, rays, sampler, parts.append, pixel_angle=PIXEL_ANGLE)
+        return integrator.final_gather(EMPTY, camera_paths(rays, sampler), parts.append)
 
     estimated(radiance, camera, 64, layers=2)
     grid = Entries.joined(parts).upload()

@@ -38,7 +38,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             camera,
             pixels,
             lambda rays, sampler, known=known: shot.integrator.specular_radiance(
-                known, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+                known, shot.spawn(frame, rays, sampler), parts.append
             ),
             random,
             pixel_filter=PixelFilter.BOX,
@@ -52,7 +52,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         camera,
         np.ones(camera.width * camera.height, np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
-            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+            cache, shot.spawn(frame, rays, sampler), parts.append
         ),
         walk.random(frame, Purpose.SEEN_HASH_GRID),
         pixel_filter=PixelFilter.GAUSSIAN,
@@ -65,7 +65,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         geometry.camera,
         geometry.has_diffuse,
         lambda rays, sampler: shot.integrator.final_gather(
-            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+            cache, shot.spawn(frame, rays, sampler), parts.append
         ),
         walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )

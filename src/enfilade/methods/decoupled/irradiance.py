@@ -6,7 +6,7 @@ from enfilade.camera.path import Segment
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
-from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
+from enfilade.methods.decoupled.light_camera import irradiance_camera
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
@@ -33,12 +33,10 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     paths : int
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
-    whole = walk.path.cameras[frame]
-    camera, pixel_angle = irradiance_camera(whole), light_camera(whole).pixel_angle
     estimate = shot.estimate(
-        camera,
+        irradiance_camera(walk.path.cameras[frame]),
         where,
-        lambda rays, sampler: shot.integrator.final_gather(cache, rays, sampler, pixel_angle=pixel_angle),
+        lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler)),
         walk.random(frame, Purpose.IRRADIANCE),
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))

@@ -6,19 +6,16 @@ import numpy as np
 
 from enfilade.arrays import to_half
 from enfilade.kernels.estimate import Estimate
-from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.kernels.tone import luminance
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.adaptive_sampling import AdaptiveSampling
 from enfilade.methods.decoupled.edges import dilated, is_outline, small_emitter_pixels
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.records import ShadedFrame
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.specular_rays import shade_specular
 from enfilade.records import U8, Geometry, Mask, Provenance
 from enfilade.renderer import Purpose
-from enfilade.settings import LimitSettings
 
 
 def shade(shot: ShotContext, frame: int) -> Output:
@@ -51,21 +48,18 @@ def shade(shot: ShotContext, frame: int) -> Output:
 def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tuple[Estimate, Mask]:
     """Emission, diffuse reflection and highlights of sharp emitters; where it has more rays, (H, W)."""
     walk, settings = shot.walk, shot.settings
-    camera = walk.path.cameras[frame]
-    estimate = ReconstructedEstimate(
-        camera,
-        np.arange(camera.width * camera.height, dtype=np.uint32),
-        lambda rays, sampler: shot.integrator.diffuse_radiance(
-            cache, rays, sampler, pixel_angle=light_camera(camera).pixel_angle
-        ),
-        paths_in_flight=walk.settings[LimitSettings].paths_in_flight,
-        random=walk.random(frame, Purpose.DIFFUSE),
+    geometry, sampling = walk.view(frame).geometry, AdaptiveSampling.of(walk)
+    everywhere = np.ones(geometry.shape_index.shape, np.bool_)
+    estimate = shot.reconstructed_estimate(
+        geometry.camera,
+        everywhere,
+        lambda rays, sampler: shot.integrator.diffuse_radiance(cache, shot.spawn(frame, rays, sampler)),
+        walk.random(frame, Purpose.DIFFUSE),
+        layers=1,
     )
     estimate.add(settings.min_spp)
 
     # Add rays at edges.
-    geometry, sampling = walk.view(frame).geometry, AdaptiveSampling.of(walk)
-    everywhere = np.ones(geometry.shape_index.shape, np.bool_)
     emitters = small_emitter_pixels(shot.renderer.emitters, geometry)
     edges = is_outline(geometry) | dilated(sampling.uncertain(estimate, everywhere) | emitters)
     return estimate, sampling.refine(estimate, everywhere, edges, everywhere, settings.min_spp)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from enfilade.camera.pinhole import Camera
 from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
+from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
 from enfilade.methods.decoupled.guiding import upload_guide
@@ -26,11 +28,13 @@ from enfilade.methods.decoupled.irradiance_cache import (
     upload,
 )
 from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
+from enfilade.methods.decoupled.path_kernels import ENTRY_PX
+from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import Geometry, Mask
-from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey
+from enfilade.records import F32, Geometry, Mask
+from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey, Rays
 from enfilade.settings import DecoupledSettings, LimitSettings
 
 ACCUMULATED = 4  # keyframes to each side that are averaged with one
@@ -105,8 +109,18 @@ class ShotContext:
         *,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
         layers: int = 2,
+        centred: Mask | None = None,
     ) -> Estimate:
-        """An estimate of the pixels of a mask."""
+        """An estimate of pixels, without paths yet.
+
+        Parameters
+        ----------
+        camera
+        where, centred : (H, W) bool
+            Pixels, and those of them whose rays all pass through their centre. None: no such pixels.
+        radiance, random, pixel_filter, layers
+            As of :class:`Estimate`.
+        """
         return Estimate(
             camera,
             np.flatnonzero(where).astype(np.uint32),
@@ -115,7 +129,34 @@ class ShotContext:
             pixel_filter=pixel_filter,
             random=random,
             layers=layers,
+            centred=None if centred is None else centred[where],
         )
+
+    def reconstructed_estimate(
+        self,
+        camera: Camera,
+        where: Mask,
+        radiance: Radiance,
+        random: RandomKey,
+        *,
+        layers: int,
+        background: Sequence[F32] | None = None,
+    ) -> ReconstructedEstimate:
+        """The same of pixels that are reconstructed; arguments as of :class:`ReconstructedEstimate`."""
+        return ReconstructedEstimate(
+            camera,
+            np.flatnonzero(where).astype(np.uint32),
+            radiance,
+            paths_in_flight=self.walk.settings[LimitSettings].paths_in_flight,
+            random=random,
+            layers=layers,
+            background=background,
+        )
+
+    def spawn(self, frame: int, rays: Rays, sampler: Any) -> Path:
+        """Camera paths of a frame, which grow by the width of the hash grid's entries."""
+        pixel_angle = light_camera(self.walk.path.cameras[frame]).pixel_angle
+        return spawn(rays, sampler, ENTRY_PX * pixel_angle)
 
     def prepass_cache(self, frame: int) -> IrradianceCache:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""

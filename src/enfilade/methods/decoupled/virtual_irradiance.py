@@ -19,8 +19,7 @@ from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
 from enfilade.methods.decoupled.integrator import OnMiss
-from enfilade.methods.decoupled.path_kernels import ENTRY_PX
-from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
@@ -58,7 +57,7 @@ def _gather(
     cache, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
-        return shot.virtual_images.seen_along(spawn(rays, sampler, ENTRY_PX * camera.pixel_angle), choice)
+        return shot.virtual_images.seen_along(shot.spawn(frame, rays, sampler), choice)
 
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
