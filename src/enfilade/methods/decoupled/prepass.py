@@ -9,7 +9,7 @@ from __future__ import annotations
 from enfilade.kernels.estimate import Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
-from enfilade.methods.decoupled.guiding import find_regions, upload_guide
+from enfilade.methods.decoupled.guiding import find_regions
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import Purpose
@@ -25,7 +25,7 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
     regions, guide_paths = find_regions(
         renderer.photons, shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
-    guide = upload_guide(regions)
+    guide = regions.upload() if regions else None
     estimate = shot.estimate(
         geometry.camera,
         where,
@@ -44,5 +44,9 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         image = denoise_irradiance(
             geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
         )
-    rays = {"prepass": estimate.paths, "path_guide": guide_paths}
-    return Output({frame: image}, {"rays": rays, "dropped": image.direct.dropped, "regions": regions})
+    metadata = {
+        "rays": {"prepass": estimate.paths, "path_guide": guide_paths},
+        "dropped": image.direct.dropped,
+        "regions": regions.to_json() if regions else [],
+    }
+    return Output({frame: image}, metadata)

@@ -17,7 +17,7 @@ from enfilade.kernels.guiding import PathGuide
 from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
-from enfilade.methods.decoupled.guiding import upload_guide
+from enfilade.methods.decoupled.guiding import Regions
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import (
@@ -195,8 +195,11 @@ class ShotContext:
         )
 
     def _path_guide(self, keyframe: int) -> PathGuide | None:
-        regions = self.inputs.metadata("prepass", keyframe)["regions"]
-        return self._path_guides.get(keyframe, lambda: upload_guide(regions))
+        def make() -> PathGuide | None:
+            regions = Regions.from_json(self.inputs.metadata("prepass", keyframe)["regions"])
+            return regions.upload() if regions else None
+
+        return self._path_guides.get(keyframe, make)
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int
