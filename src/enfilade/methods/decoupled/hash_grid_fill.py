@@ -24,7 +24,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
-    camera, geometry = light_camera(walk.path.cameras[frame]), shot.light_geometry(frame)
+    camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
     # Gather at the surfaces that mirrors and panes show.
     virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)

@@ -46,7 +46,7 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
-    geometry = shot.irradiance_geometry(frame)
+    geometry = shot.images.irradiance_geometry(frame)
     image, paths = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
         image = denoise_irradiance(geometry, image, shot.settings.denoiser)
@@ -77,7 +77,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
         image, count = _gather(shot, middle, shot.uncovered(middle, {}))
-        images[middle], uploaded[middle] = image, upload(shot.irradiance_geometry(middle), image)
+        images[middle], uploaded[middle] = image, upload(shot.images.irradiance_geometry(middle), image)
         paths += count
         pending += [(middle, last), (first, middle)]
     numbers = [shot.walk.path.numbers[frame] for frame in sorted(images)]

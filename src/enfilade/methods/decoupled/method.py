@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
@@ -33,6 +34,20 @@ from enfilade.settings import (
 SPACING = 8  # of keyframes, frames
 
 
+@dataclass(frozen=True)
+class _Kernels:
+    """The kernels of a renderer, which all shots share.
+
+    Attributes
+    ----------
+    renderer, integrator, virtual_images
+    """
+
+    renderer: LobeRenderer
+    integrator: Integrator
+    virtual_images: VirtualImages
+
+
 class Decoupled(Method):
     """Irradiance cached at keyframes; visibility, texture, edges and specular lobes in every frame."""
 
@@ -55,7 +70,7 @@ class Decoupled(Method):
     )
 
     def __init__(self) -> None:
-        self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
+        self._kernels: _Kernels | None = None
         self._shot: ShotContext | None = None
         self._accumulation = TemporalAccumulation()
 
@@ -121,14 +136,14 @@ class Decoupled(Method):
 
     def _context_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> ShotContext:
         """The context of a task, which is kept until the next one begins."""
-        if self._kernels is None or self._kernels[0] is not walk.renderer:
+        if self._kernels is None or self._kernels.renderer is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
-            self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
+            self._kernels = _Kernels(walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer))
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
-            self._shot, self._accumulation = (
-                None,
-                TemporalAccumulation(),
-            )  # free memory before the next shot allocates
+            # Free memory before the next shot allocates.
+            self._shot, self._accumulation = None, TemporalAccumulation()
             segments = inputs.analysis.segments(SPACING)[task.shot]
-            self._shot = ShotContext(task.shot, segments, inputs, walk, *self._kernels[1:])
+            self._shot = ShotContext(
+                task.shot, segments, inputs, walk, self._kernels.integrator, self._kernels.virtual_images
+            )
         return self._shot

@@ -20,7 +20,7 @@ OUTLIER = 16.0  # times the denoised irradiance: brighter estimates are limited 
 
 def trace_prepass(shot: ShotContext, frame: int) -> Output:
     """Path trace the prepass image of a keyframe."""
-    walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
+    walk, renderer, geometry = shot.walk, shot.renderer, shot.images.light_geometry(frame)
     where = geometry.has_diffuse
     regions, guide_paths = find_regions(
         renderer.photons, shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)

@@ -44,7 +44,7 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     paths, dropped : int
         Number of paths, and of those that were not finite.
     """
-    images = shot.virtual_images.find(shot.light_geometry(frame))
+    images = shot.virtual_images.find(shot.images.light_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
     entries = Entries.joined([one for found, *_ in gathered for one in found])
     return entries, sum(paths for _, paths, _ in gathered), sum(dropped for *_, dropped in gathered)
