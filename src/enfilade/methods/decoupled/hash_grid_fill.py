@@ -27,7 +27,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
     # Gather at the surfaces that mirrors and panes show.
-    virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
+    virtual, count = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
@@ -45,7 +45,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             layers=SPECULAR_AOVS,
         )
         specular.add(SPECULAR_SPP)
-        paths, dropped = paths + specular.paths, dropped + specular.dropped
+        count += specular.count
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
@@ -73,6 +73,6 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
-    paths, dropped = paths + seen.paths + gathered.paths, dropped + seen.dropped + gathered.dropped
-    metadata = {"rays": {"hash_grid": paths}, "dropped": dropped}
+    count += seen.count + gathered.count
+    metadata = {"rays": {"hash_grid": count.rays}, "dropped": count.dropped}
     return Output({frame: entries}, metadata | {"entries": len(entries.keys)})

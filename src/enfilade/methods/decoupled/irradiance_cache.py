@@ -168,8 +168,19 @@ def reproject_to(
 
 def is_covered(geometry: Geometry, images: Sequence[UploadedImage]) -> Mask:
     """Pixels of a view whose surfaces at least one image shows, (H, W)."""
-    _, is_known = _averaged(geometry, images, [1.0] * len(images))
-    return image(is_known, *geometry.shape_index.shape)
+    position, normal, shape_index = _surface_points(geometry)
+    weight = Float(0)
+    for one in images:
+        weight += lookup(position, normal, shape_index, one).weight
+        dr.eval(weight)  # so that one kernel serves any number of images
+    return image(weight > MIN_FOUND_WEIGHT, *geometry.shape_index.shape)
+
+
+def _surface_points(geometry: Geometry) -> tuple[Any, Any, Any]:
+    """Points (Array3f), normals (Array3f) and shape indices (UInt) of the surfaces of a view."""
+    position = points_at(geometry.camera, lanes(geometry.depth))
+    dr.eval(position)
+    return position, lanes(geometry.normal), lanes(geometry.shape_index)
 
 
 def _averaged(
@@ -178,13 +189,12 @@ def _averaged(
     """Layers of several images at the surfaces of a view, averaged; and whether any shows them, Bool."""
     # Compute the points, and their footprints in this view.
     camera = geometry.camera
-    normal, shape_index = lanes(geometry.normal), lanes(geometry.shape_index)
-    position = points_at(camera, lanes(geometry.depth))
+    position, normal, shape_index = _surface_points(geometry)
     own = footprint(position, normal, vector3(camera.eye), matrix3(camera.direction_from_pixel))
     layers = range(len(images[0].values))
     totals, variances = [Array3f(0) for _ in layers], [Float(0) for _ in layers]
     weight, valid = Float(0), Float(0)
-    dr.eval(position, own)
+    dr.eval(own)
     for one, given in zip(images, weights, strict=True):
         # Look up the image; coarser ones weigh less, as do all at their borders.
         found = lookup(position, normal, shape_index, one)

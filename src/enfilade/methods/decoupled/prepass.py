@@ -44,9 +44,10 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         image = denoise_irradiance(
             geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
         )
+    count = estimate.count
     metadata = {
-        "rays": {"prepass": estimate.paths, "path_guide": guide_paths},
-        "dropped": image.direct.dropped,
+        "rays": {"prepass": count.rays, "path_guide": guide_paths},
+        "dropped": count.dropped,
         "regions": regions.to_json() if regions else [],
     }
     return Output({frame: image}, metadata)

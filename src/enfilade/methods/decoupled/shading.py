@@ -26,7 +26,7 @@ def shade(shot: ShotContext, frame: int) -> Output:
     cache = shot.shading_cache(frame)
     diffuse, refined = _shade_diffuse(shot, frame, cache)
     diffuse_image = diffuse.shading.to_image(np.ones_like(refined))
-    seen, paths = diffuse.is_marked.reshape(refined.shape), diffuse.paths
+    seen, count = diffuse.is_marked.reshape(refined.shape), diffuse.count
     del diffuse  # its sums take 200 bytes a pixel
     virtual = shot.virtual_images.find(geometry) if seen.any() else []
     specular = shade_specular(shot, frame, cache, seen, virtual, luminance(diffuse_image.color))
@@ -40,9 +40,8 @@ def shade(shot: ShotContext, frame: int) -> Output:
     shaded = ShadedFrame(
         to_half(diffuse_image.color), reflection, transmission, to_half(np.sqrt(variance)), provenance
     )
-    rays = {"camera": paths, "specular": specular.paths}
-    dropped = diffuse_image.dropped + specular.dropped
-    return Output({frame: shaded}, {"rays": rays, "dropped": dropped})
+    rays = {"camera": count.rays, "specular": specular.count.rays}
+    return Output({frame: shaded}, {"rays": rays, "dropped": (count + specular.count).dropped})
 
 
 def _shade_diffuse(shot: ShotContext, frame: int, cache: IrradianceCache) -> tuple[Estimate, Mask]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from enfilade.arrays import to_float
+from enfilade.kernels.estimate import RayCount
 from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.decoupled.adaptive_sampling import (
     SPECULAR_CONTRAST,
@@ -62,7 +63,7 @@ def shade_specular(
     nowhere, no_variance = np.zeros_like(where), np.zeros(where.shape, np.float32)
     black = SpecularAov(np.zeros((*where.shape, 3), np.float16), np.zeros(where.shape, np.float16))
     if not near.any():
-        return SpecularShading([black], nowhere, no_variance, 0, 0)
+        return SpecularShading([black], nowhere, no_variance, RayCount())
     is_seen_in = where & np.any([g.shape_index >= IN_VIRTUAL_IMAGE for g in virtual], axis=0)
     in_mirrors = is_seen_in & dilated(np.any([is_outline(g) for g in virtual], axis=0))
 
@@ -86,13 +87,13 @@ def shade_specular(
     estimate.add(spp)
     sampling.reduce_noise(estimate, where, is_narrow, spp)
     traced = [of.to_image(where) for of in estimate.shadings]
-    paths, dropped = estimate.paths, estimate.dropped
+    count = estimate.count
     del estimate  # its sums take 80 bytes a pixel
 
     # Filter the AOVs along the surfaces that are seen in them.
-    count = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
+    used = 1 + max((k for k, aov in enumerate(traced) if aov.color.any()), default=0)
     is_denoised = shot.settings.denoiser != "none"
-    aovs = filter_spatially(virtual[:count], traced[:count], where, is_denoised=is_denoised)
+    aovs = filter_spatially(virtual[:used], traced[:used], where, is_denoised=is_denoised)
 
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
     # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that of
@@ -101,7 +102,7 @@ def shade_specular(
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
     edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & matters(shown))
     if not edges.any():
-        return SpecularShading(aovs, nowhere, no_variance, paths, dropped)
+        return SpecularShading(aovs, nowhere, no_variance, count)
 
     # Look up the AOVs over the whole pixel, and trace what the centres of the pixels around do not show well.
     within = edges | is_seen_in
@@ -112,7 +113,7 @@ def shade_specular(
         aovs = [*aovs, *[black] * (SPECULAR_AOVS - len(aovs))]
     aovs = [with_edges(aov, layer, refined) for aov, layer in zip(aovs, layers, strict=False)]
     variance = np.where(refined, sum(layer.variance for layer in layers), no_variance)
-    return SpecularShading(aovs, refined, variance, paths + fine.paths, dropped + fine.dropped)
+    return SpecularShading(aovs, refined, variance, count + fine.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +128,13 @@ class SpecularShading:
         Pixels at edges, which have rays of their own.
     variance : (H, W) float32
         Of the luminance of the AOVs' sum in these pixels; 0 elsewhere.
-    paths, dropped : int
-        Number of rays, and of those that were not finite.
+    count : RayCount
     """
 
     aovs: list[SpecularAov]
     is_refined: Mask
     variance: F32
-    paths: int
-    dropped: int
+    count: RayCount
 
 
 def _looked_up(

@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import Samples
+from enfilade.kernels.estimate import RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
@@ -28,7 +28,7 @@ from enfilade.renderer import Purpose, Rays
 SPP = 8  # final gather rays of a pixel
 
 
-def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, int, int]:
+def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, RayCount]:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
 
     Parameters
@@ -41,19 +41,18 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     Returns
     -------
     entries : Entries
-    paths, dropped : int
-        Number of paths, and of those that were not finite.
+    count : RayCount
     """
     images = shot.virtual_images.find(shot.images.light_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
-    entries = Entries.joined([one for found, *_ in gathered for one in found])
-    return entries, sum(paths for _, paths, _ in gathered), sum(dropped for *_, dropped in gathered)
+    entries = Entries.joined([one for found, _ in gathered for one in found])
+    return entries, sum((count for _, count in gathered), RayCount())
 
 
 def _gather(
     shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
-) -> tuple[list[Entries], int, int]:
-    """Entries of a virtual image, one list a level, the number of paths, and of those not finite."""
+) -> tuple[list[Entries], RayCount]:
+    """Entries of a virtual image, one list a level, and the number of rays."""
     cache, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
@@ -62,14 +61,14 @@ def _gather(
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
     if not len(pixels):
-        return [], 0, 0
+        return [], RayCount()
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
-        return [], 0, 0
+        return [], RayCount()
     keys, irradiance, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
-        return [], 0, 0
+        return [], RayCount()
     known = np.array(is_known)
     known_pixels, known_irradiance = pixels[lane[known]], rows(irradiance)[known]
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
@@ -100,4 +99,4 @@ def _gather(
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
         gathered, times = denoised[is_gathered], RELIABLE_SAMPLES
     found = [Entries.of(np.array(key)[chosen], gathered).repeated(times) for key in keys]
-    return found, estimate.paths, estimate.dropped
+    return found, estimate.count
