@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array2f
+from enfilade.arrays import Array2f, Float, UInt
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.kernels.random import one_sequence
-from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets
+from enfilade.kernels.rays import box_offsets, camera_rays, gaussian_offsets, points_at
 
 COUNT = 1 << 18
 
@@ -24,6 +24,16 @@ def test_directions_have_unit_depth_and_pass_through_their_point():
     np.testing.assert_allclose(-got @ camera.world_from_camera[:3, 2], 1.0, rtol=1e-6)
     image = got @ camera.pixel_from_direction.T
     np.testing.assert_allclose(image[:, :2], np.stack([x, y], axis=1), atol=2e-5)  # float32 of 64 px
+
+
+def test_points_project_to_the_centres_of_their_pixels():
+    camera = Camera(look_at((1, 2, 3), (-1, 0, 0.5)), 47.0, 64, 48)
+    pixels, depths = np.array([0, 70, 64 * 48 - 1]), np.array([1.0, 3.0, 20.0])
+    got = np.array(points_at(camera, Float(depths), UInt(pixels))).T
+    x, y, depth = camera.pixel_from_direction @ (got - camera.eye).T
+    np.testing.assert_allclose(depth, depths, rtol=1e-5)
+    np.testing.assert_allclose([x / depth, y / depth], [pixels % 64 + 0.5, pixels // 64 + 0.5], atol=1e-3)
+    assert np.array(points_at(camera, Float(2.0))).shape == (3, 64 * 48)
 
 
 def test_box_offsets_are_uniform_over_the_pixel():

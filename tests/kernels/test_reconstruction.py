@@ -185,7 +185,7 @@ def test_paths_that_are_not_finite_do_not_count():
     first, second = estimate.shadings
     np.testing.assert_allclose(first.color, 2.0, rtol=1e-6)
     np.testing.assert_allclose(second.color, 3.0, rtol=1e-6)
-    assert 0.2 < estimate.dropped / estimate.paths < 0.4
+    assert 0.2 < estimate.count.dropped / estimate.count.rays < 0.4
 
 
 def test_radiance_that_follows_the_place_has_no_offset():

@@ -8,6 +8,7 @@ import pytest
 from enfilade.arrays import Array3f, rows
 from enfilade.kernels.random import one_sequence
 from enfilade.methods.decoupled.integrator import Integrator
+from enfilade.methods.decoupled.paths import spawn
 from enfilade.renderer import Rays
 from support.integrated import EMPTY
 from support.mitsuba_scene import opened, placed, rgb, write
@@ -60,7 +61,7 @@ def test_emission_in_a_coat_is_counted_once(tmp_path):
     renderer = renderer_of(tmp_path, COATS["plastic"])
     integrator = Integrator(renderer)
     seen, reflected = (
-        rows(sum(of(EMPTY, rays(0.5), one_sequence(COUNT), pixel_angle=0.01).layers, Array3f(0)))
+        rows(sum(of(EMPTY, spawn(rays(0.5), one_sequence(COUNT), spread=0.02)).layers, Array3f(0)))
         for of in (integrator.diffuse_radiance, integrator.specular_radiance)
     )
     expected = rows(renderer.coat_emission(renderer.intersect(rays(0.5))))

@@ -7,7 +7,7 @@ from enfilade.kernels.estimate import Estimate
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
 from enfilade.records import Shading
 from enfilade.renderer import PixelFilter, Purpose, RandomKey
-from support.material_scene import PIXEL_ANGLE, front_camera, integrator_of, pixels_of
+from support.material_scene import camera_paths, front_camera, integrator_of, pixels_of
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 EMPTY = IrradianceCache()
@@ -18,9 +18,9 @@ def shaded(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **mo
     integrator = integrator_of(renderer)
 
     def radiance(rays, sampler):
-        at = {"pixel_angle": PIXEL_ANGLE}
-        diffuse = integrator.diffuse_radiance(irradiance, rays, sampler, **at).layers[0]
-        specular = integrator.specular_radiance(irradiance, rays, sampler, **at)
+        path = camera_paths(rays, sampler)
+        diffuse = integrator.diffuse_radiance(irradiance, path).layers[0]
+        specular = integrator.specular_radiance(irradiance, path)
         return diffuse + sum(specular.layers)
 
     return estimated(radiance, camera, spp, **more)[0]
@@ -30,7 +30,7 @@ def gathered(renderer, irradiance: IrradianceCache, camera: Camera, spp: int, **
     """Irradiance by final gathering, direct and indirect."""
 
     def radiance(rays, sampler):
-        return integrator_of(renderer).final_gather(irradiance, rays, sampler, pixel_angle=PIXEL_ANGLE)
+        return integrator_of(renderer).final_gather(irradiance, camera_paths(rays, sampler))
 
     return estimated(radiance, camera, spp, layers=2, **more)
 

@@ -1,5 +1,7 @@
 """Mitsuba scenes of spheres of every material, and of panes, in an illuminated corner."""
 
+from typing import Any
+
 import numpy as np
 
 from enfilade.camera.pinhole import Camera, look_at
@@ -7,9 +9,11 @@ from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Samples
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
+from enfilade.methods.decoupled.path_kernels import ENTRY_PX
+from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.records import Geometry, Shading
-from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.renderer import PixelFilter, Purpose, RandomKey, Rays
 from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
 PIXEL_ANGLE = 0.02  # radians
@@ -102,13 +106,18 @@ def integrator_of(renderer: MitsubaRenderer) -> Integrator:
     return integrator
 
 
+def camera_paths(rays: Rays, sampler: Any) -> Path:
+    """Paths from a camera whose pixels have an angle of :data:`PIXEL_ANGLE`."""
+    return spawn(rays, sampler, ENTRY_PX * PIXEL_ANGLE)
+
+
 def specular_aovs(renderer: MitsubaRenderer, camera: Camera, spp: int = 8) -> list[Shading]:
     """Reflection and transmission, (N,), without a cache."""
     estimate = Estimate(
         camera,
         pixels_of(camera),
         lambda rays, sampler: integrator_of(renderer).specular_radiance(
-            IrradianceCache(), rays, sampler, pixel_angle=PIXEL_ANGLE
+            IrradianceCache(), camera_paths(rays, sampler)
         ),
         paths_in_flight=1 << 20,
         pixel_filter=PixelFilter.CENTRE,

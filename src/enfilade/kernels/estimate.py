@@ -40,6 +40,18 @@ class Samples:
     is_marked: Any = None
 
 
+@dataclass(frozen=True)
+class RayCount:
+    """Number of camera rays, and of those left out since their radiance was not finite."""
+
+    rays: int = 0
+    dropped: int = 0
+
+    def __add__(self, other: RayCount) -> RayCount:
+        """The sum of both."""
+        return RayCount(self.rays + other.rays, self.dropped + other.dropped)
+
+
 class Estimate:
     """Means over the paths of each pixel of a list, to which paths can be added.
 
@@ -120,14 +132,9 @@ class Estimate:
         self._traced += spp * len(chosen)
 
     @property
-    def paths(self) -> int:
-        """Paths traced so far, of all pixels together."""
-        return self._traced
-
-    @property
-    def dropped(self) -> int:
-        """Paths that were not finite, of all pixels together."""
-        return self._traced - round(dr.sum(self._sums[0])[0])
+    def count(self) -> RayCount:
+        """Rays traced so far, of all pixels together."""
+        return RayCount(self._traced, self._traced - round(dr.sum(self._sums[0])[0]))
 
     @property
     def shading(self) -> Shading:
@@ -139,7 +146,7 @@ class Estimate:
         """The same of every layer."""
         found = self._means()
         dr.eval(found)
-        n, dropped = len(self._pixels), self.dropped
+        n, dropped = len(self._pixels), self.count.dropped
         return [Shading(rows(color)[:n], np.array(variance)[:n], dropped) for color, variance in found]
 
     @property

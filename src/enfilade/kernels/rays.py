@@ -39,6 +39,21 @@ def camera_rays(camera: Camera, at: Any) -> Rays:
     return Rays(vector3(camera.eye), matrix3(camera.direction_from_pixel) @ Array3f(at.x, at.y, 1))
 
 
+def points_at(camera: Camera, depths: Any, pixel: Any = None) -> Any:
+    """Points in the world at some depths (Float) on the rays through the centres of pixels; Array3f.
+
+    Parameters
+    ----------
+    camera
+    depths : Float
+        Distances along the optical axis, scene units.
+    pixel
+        As of :func:`pixel_centres`.
+    """
+    rays = camera_rays(camera, pixel_centres(camera, pixel))
+    return rays.origin + depths * rays.direction
+
+
 def box_offsets(sample_point: Any) -> Any:
     """Offsets from a pixel's centre, uniform over the pixel, of points of the unit square; Array2f."""
     return sample_point - 0.5

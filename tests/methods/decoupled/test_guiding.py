@@ -1,5 +1,7 @@
 """Rooms that a lamp in an opaque shade lights: most light leaves through the small opening."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from enfilade.gbuffer import find_geometry
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled import Decoupled, guiding, prepass
-from enfilade.methods.decoupled.guiding import find_regions, upload_guide
+from enfilade.methods.decoupled.guiding import Regions, find_regions
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.renderer import Purpose, RandomKey
 from support.in_memory import run_passes, walk_of
@@ -47,22 +49,30 @@ def regions_in(renderer):
 
 
 def test_the_shade_is_found(tmp_path):
-    *spheres, _ = regions_in(opened_room(tmp_path, *SHADED))
-    x, y, z, radius, *radiance = np.array(spheres).T
+    regions = regions_in(opened_room(tmp_path, *SHADED))
+    x, y, z, radius = regions.spheres.T
     assert np.all(np.hypot(x, y) < 0.13)
     assert np.all((z > 1.84) & (z < 2.11))
     assert np.all((radius > 0.0) & (radius < 0.3))
-    below, above = np.mean(radiance[:4]), np.mean(radiance[4:])
+    below, above = regions.radiance[:, :4].mean(), regions.radiance[:, 4:].mean()
     assert below > 10.0 * above  # the shade is closed at its top
 
 
+def test_regions_are_stored_as_json():
+    regions = Regions(np.random.default_rng(1).random((3, 4)), np.random.default_rng(2).random((3, 8)), 0.25)
+    found = Regions.from_json(json.loads(json.dumps(regions.to_json())))
+    for name in ("spheres", "radiance", "background"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(regions, name))
+    assert Regions.from_json([]) is None
+
+
 def test_open_lamps_and_the_sky_need_no_guide(tmp_path):
-    assert regions_in(opened_room(tmp_path, ROOM, LAMP)) == []
-    assert regions_in(opened_room(tmp_path, SHADE, sky=SKY)) == []
+    assert regions_in(opened_room(tmp_path, ROOM, LAMP)) is None
+    assert regions_in(opened_room(tmp_path, SHADE, sky=SKY)) is None
 
 
 def test_a_guide_changes_no_mean_and_reduces_the_noise(tmp_path):
-    guide = upload_guide(regions_in(opened_room(tmp_path, *SHADED)))
+    guide = regions_in(opened_room(tmp_path, *SHADED)).upload()
     renderer = opened_room(tmp_path, *SHADED, max_depth=3)  # of longer paths the first bounce alone is guided
     pixels = np.repeat(np.arange(40 * 64, 48 * 64, dtype=np.uint32), 4096)  # of the floor
     point = renderer.intersect(camera_rays(camera(), pixel_centres(camera(), lanes(pixels))))
@@ -90,7 +100,7 @@ def test_final_gathering_is_guided(tmp_path, monkeypatch):
 
     guided, guide_paths = noise()
     assert guide_paths >= guiding.PIXELS * (guiding.PATHS + guiding.MORE_PATHS)
-    monkeypatch.setattr(prepass, "find_regions", lambda *_: ([], 0))
+    monkeypatch.setattr(prepass, "find_regions", lambda *_: (None, 0))
     plain, guide_paths = noise()
     assert guided < 0.5 * plain
     assert guide_paths == 0

@@ -12,6 +12,7 @@ from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, upload
 from enfilade.methods.decoupled.paths import compact, spawn
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
 from support.integrated import (
     EMPTY,
     LUMINANCE,
@@ -25,11 +26,13 @@ from support.integrated import (
 )
 from support.material_scene import (
     MATERIALS,
-    PIXEL_ANGLE,
+    camera_paths,
     front_camera,
     integrator_of,
     opened_scene,
+    pane,
     pixels_of,
+    specular_aovs,
     traced_irradiance,
 )
 
@@ -160,7 +163,7 @@ def test_a_hash_grid_without_images_gives_its_light(diffuse):
 
     def radiance(rays, sampler):
         integrator = integrator_of(renderer)
-        return integrator.final_gather(EMPTY, rays, sampler, parts.append, pixel_angle=PIXEL_ANGLE)
+        return integrator.final_gather(EMPTY, camera_paths(rays, sampler), parts.append)
 
     estimated(radiance, camera, 64, layers=2)
     grid = Entries.joined(parts).upload()
@@ -245,3 +248,39 @@ def test_other_scenes_may_be_open(tmp_path):
 def test_batches_change_no_byte(diffuse):
     # The number of lanes of a recorded kernel is padded, also that of the last batch.
     assert_same_in_batches(diffuse[0], cache_of(*diffuse[1]))
+
+
+@pytest.mark.parametrize(
+    ("panes", "has_reflection", "has_transmission"),
+    [
+        ([("front", 0.0, 1.0), ("second", 1.0, 0.0)], True, False),
+        ([("front", 0.0, 1.0), ("second", 0.0, 1.0)], False, True),
+    ],
+)
+def test_reflection_and_transmission_of_panes_are_separate_aovs(
+    tmp_path, panes, has_reflection, has_transmission
+):
+    balls = {f"ball {k}": pane(name, 1.0 - 0.01 * k, *shares) for k, (name, *shares) in enumerate(panes)}
+    renderer, camera = opened_scene(tmp_path, balls), front_camera()
+    seen = find_geometry(renderer, camera)
+    is_between = positions(seen)[..., 1] < 0.3  # where the floor between the panes may be visible
+    where = ((seen.shape_index == renderer.describe().shapes.index("front") + 1) & ~is_between).ravel()
+    reflected, transmitted = (aov.color[where] for aov in specular_aovs(renderer, camera))
+    assert (reflected.any(), transmitted.any()) == (has_reflection, has_transmission)
+
+
+def test_total_internal_reflection_is_transmission(tmp_path):
+    cube = (
+        '<transform name="to_world"><rotate y="1" angle="45"/><translate y="1.5" z="2"/></transform>'
+        '<bsdf type="dielectric"><rgb name="specular_reflectance" value="1"/></bsdf>'
+    )
+    ball = f'{MATERIALS["diffuse"]}</shape><shape type="cube" id="block">{cube}'
+    renderer, camera = opened_scene(tmp_path, {"ball": ball}), front_camera()
+    seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
+    where = seen.shape_index == renderer.describe().shapes.index("block") + 1
+    reflected, transmitted = (aov.to_image(where | True) for aov in specular_aovs(renderer, camera, 64))
+    assert where.mean() > 0.1
+    # Much of the transmission is reflected totally by the second face. Fresnel reflection is 4 to 8 %.
+    shares = (aov.color[where].mean() for aov in (reflected, transmitted))
+    assert next(shares) < 0.25 * next(shares)
+    assert (images.find(seen)[1].shape_index[where] >= IN_VIRTUAL_IMAGE).all()

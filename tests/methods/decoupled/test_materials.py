@@ -22,7 +22,7 @@ from support.integrated import (
 )
 from support.material_scene import (
     MATERIALS,
-    PIXEL_ANGLE,
+    camera_paths,
     front_camera,
     integrator_of,
     opened_scene,
@@ -84,7 +84,7 @@ def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
 
     def seen(cache):
         def radiance(rays, sampler):
-            found = integrator_of(renderer).diffuse_radiance(cache, rays, sampler, pixel_angle=PIXEL_ANGLE)
+            found = integrator_of(renderer).diffuse_radiance(cache, camera_paths(rays, sampler))
             return found.layers[0]
 
         return estimated(radiance, camera, 16)[0].color.reshape(-1, 3)[is_metal]
@@ -123,7 +123,7 @@ def test_light_that_passes_null_interactions_keeps_its_energy(tmp_path):
 
     def irradiance(rays, sampler):
         """By final gathering, with the sharp light apart; and by path tracing."""
-        gathered = integrator_of(renderer).final_gather(EMPTY, rays, sampler, pixel_angle=PIXEL_ANGLE)
+        gathered = integrator_of(renderer).final_gather(EMPTY, camera_paths(rays, sampler))
         point = renderer.intersect(rays, opaque_only=True)
         sharp = renderer.sharp_light(point, sampler.fork(1))[0]
         return Samples((sum(gathered.layers) + sharp, sum(renderer.estimate_diffuse(point, sampler.fork(2)))))

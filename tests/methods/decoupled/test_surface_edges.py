@@ -4,7 +4,7 @@ import numpy as np
 
 from enfilade.gbuffer import find_geometry
 from enfilade.methods.decoupled import surface_edges as kernel
-from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE
+from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from support.material_scene import MATERIALS, front_camera, opened_scene
 from twins import surface_edges as twin
 

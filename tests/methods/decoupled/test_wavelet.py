@@ -18,7 +18,6 @@ from twins import wavelet as twin
 HEIGHT, WIDTH = 18, 24
 CAMERA = Camera(look_at((0, 0, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
 OPTIONS = {"levels": 3, "deviations": 3.0}
-SURFACE = {"plane_tolerance": 0.01, "normal_exponent": 64}
 
 
 @dataclasses.dataclass
@@ -39,7 +38,6 @@ class Scene:
             matrix3(CAMERA.direction_from_pixel),
             WIDTH,
             HEIGHT,
-            **SURFACE,
         )
         color, variance = smooth(lanes(self.color), lanes(self.variance), guide, **{**OPTIONS, **options})
         return image(color, HEIGHT, WIDTH), image(variance, HEIGHT, WIDTH)
@@ -87,7 +85,6 @@ def wall(height, width):
         matrix3(Camera(CAMERA.world_from_camera, 40, width, height).direction_from_pixel),
         width,
         height,
-        **SURFACE,
     )
 
 

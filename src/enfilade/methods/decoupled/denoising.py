@@ -8,9 +8,8 @@ import scipy.ndimage
 
 from enfilade.arrays import Array3f, Array4f, image, lanes
 from enfilade.kernels.tone import REC709_LUMINANCE
-from enfilade.methods.decoupled.irradiance_cache import guide_of
 from enfilade.methods.decoupled.records import IrradianceImage
-from enfilade.methods.decoupled.wavelet import smooth
+from enfilade.methods.decoupled.wavelet import guide_of, smooth
 from enfilade.methods.denoise import denoise
 from enfilade.records import F32, Geometry, Mask, Shading
 

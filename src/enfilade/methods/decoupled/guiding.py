@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,13 +13,11 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
 from enfilade.kernels.guiding import LEAST_ODDS, OCTANTS, REGIONS, PathGuide
 from enfilade.kernels.random import samplers
-from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.kernels.rays import camera_rays, pixel_centres, points_at
 from enfilade.kernels.tone import REC709_LUMINANCE
 from enfilade.methods.decoupled.paths import Path, spawn
-from enfilade.records import F32, Geometry
+from enfilade.records import F32, F64, Geometry
 from enfilade.renderer import LobeRenderer, Photons, RandomKey
-
-F64 = npt.NDArray[np.float64]
 
 PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels, and paths of each
 MORE_PATHS = 32  # ... of each pixel that measure the regions of a guide that is used
@@ -27,7 +25,49 @@ HALVINGS = range(3, 7)  # of the extent of the photons: sizes of the voxels that
 MIN_PHOTONS = 8  # in a voxel
 WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
 OUTLIER = 16  # times the mean light: brighter paths are limited
-MAX_NOISE = 0.4  # of the second moment without a guide: one that reduces it by less is not used
+MAX_MOMENT_RATIO = 0.4  # second moment with a guide over that without: a guide of a larger one is not used
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Spheres that contain bright surfaces, with their radiance.
+
+    Attributes
+    ----------
+    spheres : (N, 4) float64
+        Centre in world space, and radius, scene units; at most :data:`REGIONS`.
+    radiance : (N, 8) float64
+        Mean luminance as points in each octant around the centre see it.
+    background : float
+        Mean luminance of all other light.
+    """
+
+    spheres: F64
+    radiance: F64
+    background: float
+
+    @staticmethod
+    def from_json(stored: list[list[float]]) -> Regions | None:
+        """Regions of :meth:`to_json`; None of an empty list."""
+        if not stored:
+            return None
+        *of_spheres, (background,) = stored
+        table = np.array(of_spheres)
+        return Regions(table[:, :4], table[:, 4:], background)
+
+    def to_json(self) -> list[list[float]]:
+        """A row of each sphere and its radiance, then one of the background."""
+        return [*np.hstack([self.spheres, self.radiance]).tolist(), [self.background]]
+
+    def upload(self) -> PathGuide:
+        """Upload them as a guide."""
+        table = np.zeros((REGIONS, 4 + OCTANTS), np.float32)
+        table[: len(self.spheres)] = np.hstack([self.spheres, self.radiance])
+        guide = PathGuide(
+            lanes(table[None, :, :3]), lanes(table[:, 3]), lanes(table[:, 4:]), opaque(self.background)
+        )
+        dr.make_opaque(guide)
+        return guide
 
 
 @dataclass(frozen=True)
@@ -80,7 +120,7 @@ def find_regions(
     probe: Callable[[PathGuide, Path], Probes],
     geometry: Geometry,
     random: RandomKey,
-) -> tuple[list[list[float]], int]:
+) -> tuple[Regions | None, int]:
     """Find the regions of a guide from a keyframe.
 
     Groups of photons in voxels of several sizes are proposed, and the light from there is estimated.
@@ -96,19 +136,19 @@ def find_regions(
 
     Returns
     -------
-    regions : list of [x, y, z, radius, radiance in eight octants]
-        Followed by the background; empty if no guide is of use.
+    regions : Regions or None
+        None if no guide is of use.
     traced : int
         Number of paths.
     """
     pixels = np.flatnonzero(geometry.has_diffuse).astype(np.uint32)
     if not len(pixels) or len(photons.flux) < MIN_PHOTONS:
-        return [], 0
+        return None, 0
 
     # Take pixels at equal distances in the image.
     pixels = pixels[np.linspace(0, len(pixels) - 1, PIXELS).astype(np.int64)]
-    rays = camera_rays(geometry.camera, pixel_centres(geometry.camera, lanes(pixels)))
-    position = rows(rays.origin + Float(geometry.depth.ravel()[pixels]) * rays.direction)
+    depths = Float(geometry.depth.ravel()[pixels])
+    position = rows(points_at(geometry.camera, depths, lanes(pixels)))
     normal = geometry.normal.reshape(-1, 3)[pixels]
 
     def probed(guide: PathGuide, paths: int) -> Probes:
@@ -123,33 +163,24 @@ def find_regions(
         count = 2**halvings + 1  # along each axis
         voxel = ((photons.position - corner) * ((count - 1) / extent)).astype(np.int64) @ (1, count, count**2)
         proposed = _proposed(photons, voxel, position, normal)
-        if guide := upload_guide(proposed):
-            for paths in (PATHS, MORE_PATHS):
-                regions, noise = _measured(probed(guide, paths), proposed)
-                traced += PIXELS * paths
-                if noise > MAX_NOISE:
-                    break
-            else:
-                return regions, traced
-    return [], traced
+        if proposed is None:
+            continue
+        guide = proposed.upload()
+        for paths in (PATHS, MORE_PATHS):
+            regions, moment_ratio = _measured(probed(guide, paths), proposed)
+            traced += PIXELS * paths
+            if moment_ratio > MAX_MOMENT_RATIO:
+                break
+        else:
+            return regions, traced
+    return None, traced
 
 
-def upload_guide(regions: Sequence[Sequence[float]]) -> PathGuide | None:
-    """Upload the regions; None if there are none."""
-    if not regions:
-        return None
-    *spheres, (background,) = regions
-    table = np.zeros((REGIONS, 4 + OCTANTS), np.float32)
-    table[: len(spheres)] = spheres
-    guide = PathGuide(lanes(table[None, :, :3]), lanes(table[:, 3]), lanes(table[:, 4:]), opaque(background))
-    dr.make_opaque(guide)
-    return guide
+def _proposed(photons: Photons, voxel: npt.NDArray[np.int64], position: F32, normal: F32) -> Regions | None:
+    """Spheres around the groups that may contribute most to the second moment of the light on some points.
 
-
-def _proposed(
-    photons: Photons, voxel: npt.NDArray[np.int64], position: F32, normal: F32
-) -> list[list[float]]:
-    """Spheres around the groups that may contribute most to the second moment of the light on some points."""
+    With the radiance of their photons, the same to all sides; None if no group has enough photons.
+    """
     # Describe the groups.
     _, group, counts = np.unique(voxel, return_inverse=True, return_counts=True)
     flux = np.bincount(group, photons.flux)
@@ -165,15 +196,17 @@ def _proposed(
     cosine = np.maximum((to * normal[:, None]).sum(axis=2) / distance, 0.0)
     share = (np.square(radius / distance) * cosine).mean(axis=0)
     order = np.argsort(-np.square(radiance) * share, kind="stable")[:REGIONS]
-    spheres = [[*center[k].tolist(), float(radius[k]), *[float(radiance[k])] * OCTANTS] for k in order]
-    return [*spheres, [0.0]] if spheres else []
+    if not len(order):
+        return None
+    sides = np.repeat(radiance[order, None], OCTANTS, axis=1)
+    return Regions(np.hstack([center[order], radius[order, None]]), sides, background=0.0)
 
 
-def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[float]], float]:
+def _measured(probes: Probes, proposed: Regions) -> tuple[Regions, float]:
     """Regions with their measured radiance, and the second moment with this guide over that without one."""
     used = np.flatnonzero(np.array(probes.is_used))
     if not len(used):
-        return [], 1.0
+        return proposed, 1.0
 
     def taken(values: Any) -> Any:
         return np.array(values)[used]
@@ -200,7 +233,7 @@ def _measured(probes: Probes, proposed: list[list[float]]) -> tuple[list[list[fl
     guided = weights / np.maximum(total + np.maximum(background, LEAST_ODDS * total), 1e-30)
     own = 1.0 - guided.sum(axis=0)
     moments = np.square(weights) / np.maximum(own * share + guided, 1e-30)
-    noise = moments.sum(axis=0) + dim**2 * rest / own
-    spheres = zip(proposed, radiance.reshape(REGIONS, OCTANTS).tolist(), strict=False)
-    regions = [[*sphere[:4], *of] for sphere, of in spheres if len(sphere) > 1]
-    return [*regions, [background]], float(noise.mean() / plain.mean()) if plain.any() else 1.0
+    mixed = moments.sum(axis=0) + dim**2 * rest / own
+    spheres = proposed.spheres
+    regions = Regions(spheres, radiance.reshape(REGIONS, OCTANTS)[: len(spheres)], background)
+    return regions, float(mixed.mean() / plain.mean()) if plain.any() else 1.0

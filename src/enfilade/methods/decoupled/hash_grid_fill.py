@@ -24,10 +24,10 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     """Estimate irradiance where paths from a keyframe end on surfaces that no prepass image shows."""
     parts: list[Entries] = []
     cache, walk = shot.prepass_cache(frame), shot.walk
-    camera, geometry = light_camera(walk.path.cameras[frame]), shot.light_geometry(frame)
+    camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
     # Gather at the surfaces that mirrors and panes show.
-    virtual, paths, dropped = gather_virtual_images(shot, frame, parts.append)
+    virtual, count = gather_virtual_images(shot, frame, parts.append)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
@@ -38,21 +38,21 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
             camera,
             pixels,
             lambda rays, sampler, known=known: shot.integrator.specular_radiance(
-                known, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+                known, shot.spawn(frame, rays, sampler), parts.append
             ),
             random,
             pixel_filter=PixelFilter.BOX,
             layers=SPECULAR_AOVS,
         )
         specular.add(SPECULAR_SPP)
-        paths, dropped = paths + specular.paths, dropped + specular.dropped
+        count += specular.count
 
     # See what prepass images don't show: surfaces that are clear for the most part, and thin ones.
     seen = shot.estimate(
         camera,
         np.ones(camera.width * camera.height, np.bool_),
         lambda rays, sampler: shot.integrator.diffuse_radiance(
-            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+            cache, shot.spawn(frame, rays, sampler), parts.append
         ),
         walk.random(frame, Purpose.SEEN_HASH_GRID),
         pixel_filter=PixelFilter.GAUSSIAN,
@@ -65,7 +65,7 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
         geometry.camera,
         geometry.has_diffuse,
         lambda rays, sampler: shot.integrator.final_gather(
-            cache, rays, sampler, parts.append, pixel_angle=camera.pixel_angle
+            cache, shot.spawn(frame, rays, sampler), parts.append
         ),
         walk.random(frame, Purpose.PREPASS_HASH_GRID),
     )
@@ -73,6 +73,6 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Sum up the estimates by entry.
     entries = Entries.joined([*parts, virtual])
-    paths, dropped = paths + seen.paths + gathered.paths, dropped + seen.dropped + gathered.dropped
-    metadata = {"rays": {"hash_grid": paths}, "dropped": dropped}
+    count += seen.count + gathered.count
+    metadata = {"rays": {"hash_grid": count.rays}, "dropped": count.dropped}
     return Output({frame: entries}, metadata | {"entries": len(entries.keys)})

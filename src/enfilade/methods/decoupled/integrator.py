@@ -20,8 +20,7 @@ from enfilade.kernels.replay import padded
 from enfilade.methods.decoupled.cache_query import CacheQuery
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
-from enfilade.methods.decoupled.lookup import UploadedImage
-from enfilade.methods.decoupled.path_kernels import ENTRY_PX, PathKernels, Vertex
+from enfilade.methods.decoupled.path_kernels import PathKernels, Vertex
 from enfilade.methods.decoupled.paths import (
     Contributions,
     Path,
@@ -29,9 +28,9 @@ from enfilade.methods.decoupled.paths import (
     joined,
     merged,
     scatter_add,
-    spawn,
 )
-from enfilade.renderer import Branch, LobeRenderer, Rays
+from enfilade.methods.decoupled.surface_image import UploadedImage
+from enfilade.renderer import Branch, LobeRenderer
 
 SPECULAR_AOVS = 2  # reflection, transmission
 JITTER = 3.0  # range of lookups in the hash grid, in widths of an entry
@@ -87,15 +86,7 @@ class Integrator:
     def __init__(self, renderer: LobeRenderer) -> None:
         self.kernels = PathKernels(renderer)
 
-    def diffuse_radiance(
-        self,
-        cache: IrradianceCache,
-        rays: Rays,
-        sampler: Any,
-        on_miss: OnMiss | None = None,
-        *,
-        pixel_angle: float,
-    ) -> Samples:
+    def diffuse_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
 
         With the highlights of emitters that cast sharp shadows, if the cache is soft.
@@ -103,35 +94,24 @@ class Integrator:
         Parameters
         ----------
         cache
-        rays
+        path
             From the camera, one a lane.
-        sampler : PaddedSobolSampler
         on_miss
             Receives the irradiance that was not cached and had to be estimated.
-        pixel_angle
-            Of the camera, radians.
 
         Returns
         -------
         Samples
             Marked where the surface has specular lobes, for :meth:`specular_radiance`.
         """
-        vertex = self.kernels.see(cache, spawn(rays, sampler, ENTRY_PX * pixel_angle))
+        vertex = self.kernels.see(cache, path)
         radiance, deferred = Array3f(vertex.radiance), _Deferred()
         deferred.add_missed(vertex, JITTER)
         for found, lane in self._missed_light(cache, deferred, on_miss):
             scatter_add(radiance, found, lane)
         return Samples((radiance,), vertex.has_specular)
 
-    def specular_radiance(
-        self,
-        cache: IrradianceCache,
-        rays: Rays,
-        sampler: Any,
-        on_miss: OnMiss | None = None,
-        *,
-        pixel_angle: float,
-    ) -> Samples:
+    def specular_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces reflect and transmit by their specular lobes.
 
         Without the highlights that :meth:`diffuse_radiance` has.
@@ -139,13 +119,10 @@ class Integrator:
         Parameters
         ----------
         cache
-        rays
+        path
             From the camera, one a lane.
-        sampler : PaddedSobolSampler
         on_miss
             Receives the irradiance that was not cached and had to be estimated.
-        pixel_angle
-            Of the camera, radians.
 
         Returns
         -------
@@ -153,34 +130,24 @@ class Integrator:
             Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
             surfaces), and transmission straight through clear surfaces.
         """
-        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         # Pad the paths: a few are often as many as some mesh has vertices, which would be another signature.
         count = dr.width(path.lane)
         return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 
-    def specular_radiance_at_edges(
-        self,
-        aovs: UploadedImage,
-        cache: IrradianceCache,
-        rays: Rays,
-        sampler: Any,
-        *,
-        pixel_angle: float,
-    ) -> Samples:
+    def specular_radiance_at_edges(self, aovs: UploadedImage, cache: IrradianceCache, path: Path) -> Samples:
         """The same from filtered AOVs of the pixels' centres; traced where these do not show the surface.
 
         Parameters
         ----------
         aovs
             Both AOVs of the surfaces at pixel centres, without the pixels whose values are to be traced.
-        cache, rays, sampler, pixel_angle
+        cache, path
             As of :meth:`specular_radiance`.
 
         Returns
         -------
         Samples
         """
-        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         *found, is_missing = self.kernels.see_aovs(aovs, path)
         missing = compact(path, dr.compress(is_missing))
         if not dr.width(missing.lane):
@@ -207,20 +174,12 @@ class Integrator:
         lane = dr.arange(UInt, count)
         return tuple(dr.gather(Array3f, radiance, lane + opaque(k * count)) for k in range(SPECULAR_AOVS))
 
-    def final_gather(
-        self,
-        cache: IrradianceCache,
-        rays: Rays,
-        sampler: Any,
-        on_miss: OnMiss | None = None,
-        *,
-        pixel_angle: float,
-    ) -> Samples:
+    def final_gather(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Irradiance over pi at visible surfaces, by next-event estimation and one bounce into the cache.
 
         Parameters
         ----------
-        cache, rays, sampler, on_miss, pixel_angle
+        cache, path, on_miss
             As of :meth:`specular_radiance`.
 
         Returns
@@ -229,7 +188,6 @@ class Integrator:
             Two layers: by light straight from emitters, without next-event estimates of those that cast
             sharp shadows; and by all other.
         """
-        path = spawn(rays, sampler, ENTRY_PX * pixel_angle)
         direct, vertex = self.kernels.gather(cache, path, True)
         return self._gathered(cache, path, direct, vertex, on_miss)
 

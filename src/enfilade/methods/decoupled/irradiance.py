@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from enfilade.camera.path import Segment
+from enfilade.kernels.estimate import RayCount
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, denoise_irradiance
 from enfilade.methods.decoupled.irradiance_cache import upload
-from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
-from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.light_camera import irradiance_camera
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
 from enfilade.methods.decoupled.shot import ShotContext, either_side
+from enfilade.methods.decoupled.surface_image import UploadedImage
 from enfilade.records import Mask
 from enfilade.renderer import Purpose
 
 MIN_DISOCCLUSION = 5e-3  # of a frame's pixels: fewer have no image, and are estimated in each frame
 
 
-def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, int]:
+def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage, RayCount]:
     """Gather the irradiance of some pixels of an irradiance image, at their centres.
 
     Parameters
@@ -30,29 +31,27 @@ def _gather(shot: ShotContext, frame: int, where: Mask) -> tuple[IrradianceImage
     -------
     image : IrradianceImage
         Its variance is that between images of independent random numbers.
-    paths : int
+    count : RayCount
     """
     walk, cache = shot.walk, shot.final_gather_cache(frame)
-    whole = walk.path.cameras[frame]
-    camera, pixel_angle = irradiance_camera(whole), light_camera(whole).pixel_angle
     estimate = shot.estimate(
-        camera,
+        irradiance_camera(walk.path.cameras[frame]),
         where,
-        lambda rays, sampler: shot.integrator.final_gather(cache, rays, sampler, pixel_angle=pixel_angle),
+        lambda rays, sampler: shot.integrator.final_gather(cache, shot.spawn(frame, rays, sampler)),
         walk.random(frame, Purpose.IRRADIANCE),
     )
     estimate.add(irradiance_spp(shot.settings, len(shot.keyframes)))
     direct, indirect = (shading.to_image(where) for shading in estimate.shadings)
-    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), estimate.paths
+    return IrradianceImage(direct, indirect, where).with_noise(NOISE_SHARE), estimate.count
 
 
 def gather_keyframe(shot: ShotContext, frame: int) -> Output:
     """The irradiance image of a keyframe, denoised."""
-    geometry = shot.irradiance_geometry(frame)
-    image, paths = _gather(shot, frame, geometry.has_diffuse)
+    geometry = shot.images.irradiance_geometry(frame)
+    image, count = _gather(shot, frame, geometry.has_diffuse)
     if shot.settings.denoiser != "none":
         image = denoise_irradiance(geometry, image, shot.settings.denoiser)
-    return Output({frame: image}, {"rays": {"irradiance": paths}, "dropped": image.direct.dropped})
+    return Output({frame: image}, {"rays": {"irradiance": count.rays}, "dropped": count.dropped})
 
 
 def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
@@ -64,7 +63,7 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
     """
     images: dict[int, IrradianceImage] = {}
     uploaded: dict[int, UploadedImage] = {}
-    paths = 0
+    count = RayCount()
     pending = [(segment.first, segment.last)]
     while pending:
         first, last = pending.pop()
@@ -78,10 +77,10 @@ def fill_disocclusions(shot: ShotContext, segment: Segment) -> Output:
             continue
 
         # Gather the surfaces that no keyframe shows, and go on with both halves.
-        image, count = _gather(shot, middle, shot.uncovered(middle, {}))
-        images[middle], uploaded[middle] = image, upload(shot.irradiance_geometry(middle), image)
-        paths += count
+        image, own = _gather(shot, middle, shot.uncovered(middle, {}))
+        images[middle], uploaded[middle] = image, upload(shot.images.irradiance_geometry(middle), image)
+        count += own
         pending += [(middle, last), (first, middle)]
     numbers = [shot.walk.path.numbers[frame] for frame in sorted(images)]
-    dropped = sum(image.direct.dropped for image in images.values())
-    return Output(images, {"images": numbers, "rays": {"irradiance": paths}, "dropped": dropped})
+    metadata = {"rays": {"irradiance": count.rays}, "dropped": count.dropped}
+    return Output(images, metadata | {"images": numbers})

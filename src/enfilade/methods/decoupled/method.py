@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from enfilade.methods.analysis import Analysis, keyframes_of
 from enfilade.methods.base import FRAMES, Inputs, Method, Output, Pass, Task, TaskId
-from enfilade.methods.decoupled.frame import Frames, window
 from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.hash_grid_fill import fill_hash_grid
 from enfilade.methods.decoupled.integrator import Integrator
@@ -15,7 +15,9 @@ from enfilade.methods.decoupled.light_camera import light_reduction
 from enfilade.methods.decoupled.prepass import trace_prepass
 from enfilade.methods.decoupled.records import IrradianceImage, ShadedFrame
 from enfilade.methods.decoupled.sample_counts import irradiance_spp
+from enfilade.methods.decoupled.shading import shade
 from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.temporal import TemporalAccumulation, window
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.denoise import denoiser_name
 from enfilade.methods.walkthrough import Walkthrough
@@ -30,6 +32,20 @@ from enfilade.settings import (
 )
 
 SPACING = 8  # of keyframes, frames
+
+
+@dataclass(frozen=True)
+class _Kernels:
+    """The kernels of a renderer, which all shots share.
+
+    Attributes
+    ----------
+    renderer, integrator, virtual_images
+    """
+
+    renderer: LobeRenderer
+    integrator: Integrator
+    virtual_images: VirtualImages
 
 
 class Decoupled(Method):
@@ -54,9 +70,9 @@ class Decoupled(Method):
     )
 
     def __init__(self) -> None:
-        self._kernels: tuple[LobeRenderer, Integrator, VirtualImages] | None = None
+        self._kernels: _Kernels | None = None
         self._shot: ShotContext | None = None
-        self._frames = Frames()
+        self._accumulation = TemporalAccumulation()
 
     def libraries(self, settings: Settings) -> Mapping[str, str]:
         """The denoiser, where it is used."""
@@ -114,17 +130,20 @@ class Decoupled(Method):
                 segment = next(s for s in shot.segments if s.first == frame)
                 return fill_disocclusions(shot, segment)
             case "shading":
-                return self._frames.shade(shot, frame)
+                return shade(shot, frame)
             case _:
-                return self._frames.finish(shot, frame)
+                return self._accumulation.deliver(shot, frame)
 
     def _context_of(self, task: Task, inputs: Inputs, walk: Walkthrough) -> ShotContext:
         """The context of a task, which is kept until the next one begins."""
-        if self._kernels is None or self._kernels[0] is not walk.renderer:
+        if self._kernels is None or self._kernels.renderer is not walk.renderer:
             assert isinstance(walk.renderer, LobeRenderer)  # noqa: S101  (`needs_lobes`)
-            self._kernels = walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer)
+            self._kernels = _Kernels(walk.renderer, Integrator(walk.renderer), VirtualImages(walk.renderer))
         if self._shot is None or not self._shot.is_of(task, inputs, walk):
-            self._shot, self._frames = None, Frames()  # free memory before the next shot allocates
+            # Free memory before the next shot allocates.
+            self._shot, self._accumulation = None, TemporalAccumulation()
             segments = inputs.analysis.segments(SPACING)[task.shot]
-            self._shot = ShotContext(task.shot, segments, inputs, walk, *self._kernels[1:])
+            self._shot = ShotContext(
+                task.shot, segments, inputs, walk, self._kernels.integrator, self._kernels.virtual_images
+            )
         return self._shot

@@ -13,9 +13,9 @@ from enfilade.kernels.replay import recorded
 from enfilade.methods.decoupled.cache_query import CacheQuery, query_further, query_hash_grid, query_view
 from enfilade.methods.decoupled.guiding import trace_probes
 from enfilade.methods.decoupled.hash_grid import LEVELS, entry_key
-from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, IrradianceCache
-from enfilade.methods.decoupled.lookup import UploadedImage, lookup
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache
 from enfilade.methods.decoupled.paths import Path
+from enfilade.methods.decoupled.surface_image import UploadedImage, lookup
 from enfilade.records import MIN_DIFFUSE_ALBEDO, SurfaceClass
 from enfilade.renderer import MAX_PATH_DEPTH, Branch, BsdfSample, LobeRenderer, ShadingPoint
 
@@ -119,7 +119,7 @@ class PathKernels:
         """Camera rays: intersect, and look up the AOVs; whether they miss a surface with specular lobes."""
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
         at = point.position, point.surfaces.normal, point.surfaces.shape_index
-        found = lookup(*at, aovs, plane_tolerance=PLANE_TOLERANCE, min_cosine=AOV_COSINE)
+        found = lookup(*at, aovs, min_cosine=AOV_COSINE)
         is_found = (found.weight > 0.0) & ~point.may_pass  # what is seen through it changes with its opacity
         scale = dr.select(is_found & point.has_specular, dr.rcp(dr.maximum(found.weight, 1e-12)), 0.0)
         return *(Array3f(total * scale) for total in found.totals), Bool(point.has_specular & ~is_found)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from enfilade.kernels.estimate import Samples
 from enfilade.methods.base import Output
 from enfilade.methods.decoupled.denoising import denoise_irradiance
-from enfilade.methods.decoupled.guiding import find_regions, upload_guide
+from enfilade.methods.decoupled.guiding import find_regions
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.renderer import Purpose
@@ -20,12 +20,12 @@ OUTLIER = 16.0  # times the denoised irradiance: brighter estimates are limited 
 
 def trace_prepass(shot: ShotContext, frame: int) -> Output:
     """Path trace the prepass image of a keyframe."""
-    walk, renderer, geometry = shot.walk, shot.renderer, shot.light_geometry(frame)
+    walk, renderer, geometry = shot.walk, shot.renderer, shot.images.light_geometry(frame)
     where = geometry.has_diffuse
     regions, guide_paths = find_regions(
         renderer.photons(), shot.integrator.kernels.probe, geometry, walk.random(frame, Purpose.GUIDING)
     )
-    guide = upload_guide(regions)
+    guide = regions.upload() if regions else None
     estimate = shot.estimate(
         geometry.camera,
         where,
@@ -44,5 +44,10 @@ def trace_prepass(shot: ShotContext, frame: int) -> Output:
         image = denoise_irradiance(
             geometry, image.with_noise(0.0), denoiser, outlier=OUTLIER, is_excess_kept=True
         )
-    rays = {"prepass": estimate.paths, "path_guide": guide_paths}
-    return Output({frame: image}, {"rays": rays, "dropped": image.direct.dropped, "regions": regions})
+    count = estimate.count
+    metadata = {
+        "rays": {"prepass": count.rays, "path_guide": guide_paths},
+        "dropped": count.dropped,
+        "regions": regions.to_json() if regions else [],
+    }
+    return Output({frame: image}, metadata)

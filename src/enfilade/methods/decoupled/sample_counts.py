@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from enfilade.methods.decoupled.shot import ACCUMULATED
 from enfilade.settings import DecoupledSettings
 
+ACCUMULATED = 4  # keyframes to each side whose irradiance images are averaged with that of one
 # At quality 1; divided by the square root of the quality.
 IRRADIANCE_PATHS = 95.0  # of a pixel, in all images together that are averaged
 SPECULAR_RAYS = 34.0  # of a pixel with specular lobes

@@ -1,48 +1,42 @@
-"""The irradiance of a shot: keyframes, their images on the device, and the weights of images at a frame."""
+"""The context of the tasks of a shot: irradiance caches near a frame, weights of images, and estimates."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from enfilade.cache import LruCache
-from enfilade.camera.path import CameraPath, Segment
+from enfilade.camera.path import Segment
 from enfilade.camera.pinhole import Camera
-from enfilade.gbuffer import find_geometry
 from enfilade.kernels.estimate import Estimate, Radiance
 from enfilade.kernels.guiding import PathGuide
+from enfilade.kernels.reconstruction import ReconstructedEstimate
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs, Task
-from enfilade.methods.decoupled.guiding import upload_guide
+from enfilade.methods.decoupled.guiding import Regions
 from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
+from enfilade.methods.decoupled.image_store import DISOCCLUSION_IMAGES, PREPASS_IMAGES, ImageStore, nearest
 from enfilade.methods.decoupled.integrator import Integrator
-from enfilade.methods.decoupled.irradiance_cache import (
-    IrradianceCache,
-    accumulate,
-    blank_image,
-    is_covered,
-    reproject_to,
-    upload,
-)
-from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
-from enfilade.methods.decoupled.lookup import UploadedImage
+from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, is_covered, reproject_to
+from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.path_kernels import ENTRY_PX
+from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
 from enfilade.methods.decoupled.virtual_images import VirtualImages
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.records import Geometry, Mask
-from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey
+from enfilade.records import F32, Mask
+from enfilade.renderer import LobeRenderer, PixelFilter, RandomKey, Rays
 from enfilade.settings import DecoupledSettings, LimitSettings
 
-ACCUMULATED = 4  # keyframes to each side that are averaged with one
-PREPASS_IMAGES = 4  # nearest ones that are looked up
 HASH_GRID_KEYFRAMES = 8  # nearest ones whose entries are looked up
-DISOCCLUSION_IMAGES = 2  # that are looked up: before and after a frame
 MIN_WEIGHT = 1e-3  # of an image, which then counts only where no other shows the surface
 
 
 class ShotContext:
-    """The context of the tasks of a shot: its keyframes, and their irradiance on the device.
+    """The context of the tasks of a shot: its keyframes, and their irradiance.
 
     Parameters
     ----------
@@ -74,16 +68,9 @@ class ShotContext:
         self.integrator = integrator
         self.virtual_images = virtual_images
         self.settings = walk.settings[DecoupledSettings]
-        # Sized so that each image is uploaded and accumulated once along the path.
-        self._prepass: LruCache[int, UploadedImage] = LruCache(2 * ACCUMULATED + 1 + PREPASS_IMAGES)
-        self._accumulated_prepass: LruCache[int, UploadedImage] = LruCache(PREPASS_IMAGES + 2)
+        self.images = ImageStore(segments, inputs, walk)
         self._entries: LruCache[int, Entries] = LruCache(HASH_GRID_KEYFRAMES)
         self._hash_grid: tuple[list[int], HashGrid | None] = ([], None)
-        self._resized: LruCache[tuple[int, int], Geometry] = LruCache(2)
-        self._irradiance: LruCache[int, UploadedImage] = LruCache(2 * (2 * ACCUMULATED + 1))
-        size = self.settings.lookup_keyframes + DISOCCLUSION_IMAGES + 1
-        self._accumulated: LruCache[int, UploadedImage] = LruCache(size)
-        self._disocclusions: dict[int, list[int]] | None = None
         self._path_guides: LruCache[int, PathGuide | None] = LruCache(2)
         self._blank: list[UploadedImage] = []
 
@@ -106,8 +93,18 @@ class ShotContext:
         *,
         pixel_filter: PixelFilter = PixelFilter.CENTRE,
         layers: int = 2,
+        centred: Mask | None = None,
     ) -> Estimate:
-        """An estimate of the pixels of a mask."""
+        """An estimate of pixels, without paths yet.
+
+        Parameters
+        ----------
+        camera
+        where, centred : (H, W) bool
+            Pixels, and those of them whose rays all pass through their centre. None: no such pixels.
+        radiance, random, pixel_filter, layers
+            As of :class:`Estimate`.
+        """
         return Estimate(
             camera,
             np.flatnonzero(where).astype(np.uint32),
@@ -116,12 +113,39 @@ class ShotContext:
             pixel_filter=pixel_filter,
             random=random,
             layers=layers,
+            centred=None if centred is None else centred[where],
         )
+
+    def reconstructed_estimate(
+        self,
+        camera: Camera,
+        where: Mask,
+        radiance: Radiance,
+        random: RandomKey,
+        *,
+        layers: int,
+        background: Sequence[F32] | None = None,
+    ) -> ReconstructedEstimate:
+        """The same of pixels that are reconstructed; arguments as of :class:`ReconstructedEstimate`."""
+        return ReconstructedEstimate(
+            camera,
+            np.flatnonzero(where).astype(np.uint32),
+            radiance,
+            paths_in_flight=self.walk.settings[LimitSettings].paths_in_flight,
+            random=random,
+            layers=layers,
+            background=background,
+        )
+
+    def spawn(self, frame: int, rays: Rays, sampler: Any) -> Path:
+        """Camera paths of a frame, which grow by the width of the hash grid's entries."""
+        pixel_angle = light_camera(self.walk.path.cameras[frame]).pixel_angle
+        return spawn(rays, sampler, ENTRY_PX * pixel_angle)
 
     def prepass_cache(self, frame: int) -> IrradianceCache:
         """The accumulated prepass images near a frame; a fixed number, so that one kernel serves all."""
         near = nearest(self.walk.path, self.keyframes, frame, PREPASS_IMAGES)
-        images = [self._accumulated_prepass_image(keyframe) for keyframe in near]
+        images = [self.images.accumulated_prepass(keyframe) for keyframe in near]
         filled_up = self._filled_up(images, [1.0] * len(images), PREPASS_IMAGES)
         return IrradianceCache.of(*filled_up, view=images[0], path_guide=self._path_guide(near[0]))
 
@@ -143,7 +167,7 @@ class ShotContext:
         The weights change continuously along the path.
         """
         weights = self._keyframe_weights(frame) | self._disocclusion_weights(frame)
-        images, own = [self._accumulated_image(f) for f in weights], list(weights.values())
+        images, own = [self.images.accumulated(f) for f in weights], list(weights.values())
         reprojected = reproject_to(self.walk.view(frame).geometry, images, own)
         filled_up = self._filled_up(images, own, self.settings.lookup_keyframes + DISOCCLUSION_IMAGES)
         return IrradianceCache.of(
@@ -155,8 +179,11 @@ class ShotContext:
         )
 
     def _path_guide(self, keyframe: int) -> PathGuide | None:
-        regions = self.inputs.metadata("prepass", keyframe)["regions"]
-        return self._path_guides.get(keyframe, lambda: upload_guide(regions))
+        def make() -> PathGuide | None:
+            regions = Regions.from_json(self.inputs.metadata("prepass", keyframe)["regions"])
+            return regions.upload() if regions else None
+
+        return self._path_guides.get(keyframe, make)
 
     def _filled_up(
         self, images: list[UploadedImage], weights: list[float], count: int
@@ -164,7 +191,7 @@ class ShotContext:
         """Images and weights with blank ones up to a number, so that one kernel serves all frames."""
         missing = count - len(images)
         while len(self._blank) < missing:
-            self._blank.append(blank_image(layers=1))
+            self._blank.append(blank_image())
         return [*images, *self._blank[:missing]], [*weights, *[0.0] * missing]
 
     def uncovered(self, frame: int, others: Mapping[int, UploadedImage]) -> Mask:
@@ -172,58 +199,11 @@ class ShotContext:
 
         Of shape (H, W), at the resolution of irradiance images.
         """
-        geometry = self.irradiance_geometry(frame)
+        geometry = self.images.irradiance_geometry(frame)
         near = nearest(self.walk.path, self.keyframes, frame, self.settings.lookup_keyframes)
-        return geometry.has_diffuse & ~is_covered(geometry, [*map(self.image, near), *others.values()])
-
-    def image(self, frame: int) -> UploadedImage:
-        """The irradiance image of a keyframe, or a disocclusion image."""
-        pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
-        return self._irradiance.get(
-            frame, lambda: upload(self.irradiance_geometry(frame), self.inputs.record(pass_name, frame))
+        return geometry.has_diffuse & ~is_covered(
+            geometry, [*map(self.images.irradiance, near), *others.values()]
         )
-
-    def irradiance_geometry(self, frame: int) -> Geometry:
-        """G-buffer of an irradiance image."""
-        return self._geometry(frame, irradiance_camera(self.walk.path.cameras[frame]))
-
-    def light_geometry(self, frame: int) -> Geometry:
-        """G-buffer of the light camera."""
-        return self._geometry(frame, light_camera(self.walk.path.cameras[frame]))
-
-    def _geometry(self, frame: int, camera: Camera) -> Geometry:
-        """G-buffer of a frame by a camera of another size."""
-        if camera is self.walk.path.cameras[frame]:
-            return self.walk.view(frame).geometry
-        return self._resized.get((frame, camera.width), lambda: find_geometry(self.renderer, camera))
-
-    def _prepass_image(self, frame: int) -> UploadedImage:
-        return self._prepass.get(
-            frame, lambda: upload(self.light_geometry(frame), self.inputs.record("prepass", frame))
-        )
-
-    def _accumulated_prepass_image(self, frame: int) -> UploadedImage:
-        def make() -> UploadedImage:
-            around = sorted(nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1))
-            own = self.inputs.record("prepass", frame)
-            images = [self._prepass_image(keyframe) for keyframe in around]
-            return accumulate(self.light_geometry(frame), own.is_known, images)
-
-        return self._accumulated_prepass.get(frame, make)
-
-    def _accumulated_image(self, frame: int) -> UploadedImage:
-        """An irradiance image, averaged with the images around it."""
-
-        def make() -> UploadedImage:
-            around = nearest(self.walk.path, self.keyframes, frame, 2 * ACCUMULATED + 1)
-            disocclusions = sorted({f for frames in self.disocclusions().values() for f in frames})
-            around += nearest(self.walk.path, disocclusions, frame, 2 * ACCUMULATED + 1)
-            images = [self.image(f) for f in sorted({*around, frame})]
-            pass_name = "irradiance" if frame in self.keyframes else "disocclusion"
-            is_known = self.inputs.record(pass_name, frame).is_known
-            return accumulate(self.irradiance_geometry(frame), is_known, images)
-
-        return self._accumulated.get(frame, make)
 
     def _keyframe_weights(self, frame: int) -> dict[int, float]:
         """Weights of the nearest keyframes, which fall to zero where the next one replaces them."""
@@ -240,7 +220,7 @@ class ShotContext:
         The outermost ones of a segment fall to zero at its ends, where the next segment has its own.
         """
         segment = self._segment(frame)
-        pair = either_side(self.disocclusions()[segment.first], frame)
+        pair = either_side(self.images.disocclusions()[segment.first], frame)
         weights = {}
         for one in pair:
             ends = [f for f in (*pair, segment.first, segment.last) if (f - one) * (frame - one) > 0]
@@ -255,22 +235,6 @@ class ShotContext:
         """The segment of a frame, whose disocclusion images it uses."""
         # The last segment ends where the camera stops: all frames after it repeat its pose.
         return next((s for s in self.segments if frame <= s.last), self.segments[-1])
-
-    def disocclusions(self) -> dict[int, list[int]]:
-        """Frames of the disocclusion images of each segment, by its first frame."""
-        if self._disocclusions is None:
-            places = {number: index for index, number in enumerate(self.walk.path.numbers)}
-            self._disocclusions = {
-                s.first: [places[n] for n in self.inputs.metadata("disocclusion", s.first)["images"]]
-                for s in self.segments
-            }
-        return self._disocclusions
-
-
-def nearest(path: CameraPath, frames: list[int], frame: int, count: int) -> list[int]:
-    """The frames of a list that are nearest on the path, nearest first; repeated poses do not count."""
-    here = path.distance(frame)
-    return sorted(frames, key=lambda k: (abs(path.distance(k) - here), k))[:count]
 
 
 def either_side(frames: list[int], frame: int) -> list[int]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import drjit as dr
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, image, lanes, opaque, pixel_grid
+from enfilade.kernels.rays import points_at
 from enfilade.methods.decoupled.edges import dilated
-from enfilade.methods.decoupled.irradiance_cache import PLANE_TOLERANCE, points_of
+from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE
 from enfilade.records import Geometry, Mask
 
 CREASE_COSINE = 0.9  # between the normals of two pixels, below which they show different surfaces
@@ -38,7 +39,7 @@ def surface_edges(geometry: Geometry) -> tuple[Mask, Mask]:
     _, column, row = pixel_grid(height, width)
     columns, rows = opaque(width, Int), opaque(height, Int)
     index, depth, normal = lanes(geometry.shape_index), lanes(geometry.depth), lanes(geometry.normal)
-    position = points_of(geometry, depth)
+    position = points_at(geometry.camera, depth)
     dr.eval(position)
 
     is_edge, support = Bool(False), UInt(0)

@@ -13,14 +13,13 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import Samples
+from enfilade.kernels.estimate import RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
 from enfilade.methods.decoupled.integrator import OnMiss
-from enfilade.methods.decoupled.path_kernels import ENTRY_PX
-from enfilade.methods.decoupled.paths import Path, spawn
+from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
@@ -29,7 +28,7 @@ from enfilade.renderer import Purpose, Rays
 SPP = 8  # final gather rays of a pixel
 
 
-def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, int, int]:
+def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, RayCount]:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
 
     Parameters
@@ -42,35 +41,34 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     Returns
     -------
     entries : Entries
-    paths, dropped : int
-        Number of paths, and of those that were not finite.
+    count : RayCount
     """
-    images = shot.virtual_images.find(shot.light_geometry(frame))
+    images = shot.virtual_images.find(shot.images.light_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
-    entries = Entries.joined([one for found, *_ in gathered for one in found])
-    return entries, sum(paths for _, paths, _ in gathered), sum(dropped for *_, dropped in gathered)
+    entries = Entries.joined([one for found, _ in gathered for one in found])
+    return entries, sum((count for _, count in gathered), RayCount())
 
 
 def _gather(
     shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
-) -> tuple[list[Entries], int, int]:
-    """Entries of a virtual image, one list a level, the number of paths, and of those not finite."""
+) -> tuple[list[Entries], RayCount]:
+    """Entries of a virtual image, one list a level, and the number of rays."""
     cache, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
-        return shot.virtual_images.seen_along(spawn(rays, sampler, ENTRY_PX * camera.pixel_angle), choice)
+        return shot.virtual_images.seen_along(shot.spawn(frame, rays, sampler), choice)
 
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
     if not len(pixels):
-        return [], 0, 0
+        return [], RayCount()
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
-        return [], 0, 0
+        return [], RayCount()
     keys, irradiance, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
-        return [], 0, 0
+        return [], RayCount()
     known = np.array(is_known)
     known_pixels, known_irradiance = pixels[lane[known]], rows(irradiance)[known]
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
@@ -101,4 +99,4 @@ def _gather(
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
         gathered, times = denoised[is_gathered], RELIABLE_SAMPLES
     found = [Entries.of(np.array(key)[chosen], gathered).repeated(times) for key in keys]
-    return found, estimate.paths, estimate.dropped
+    return found, estimate.count

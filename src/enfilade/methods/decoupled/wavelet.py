@@ -7,11 +7,16 @@ from typing import Any
 
 import drjit as dr
 
-from enfilade.arrays import Array3f, Float, Int, UInt, opaque, pixel_grid
+from enfilade.arrays import Array3f, Float, Int, UInt, lanes, matrix3, opaque, pixel_grid
 from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.methods.decoupled.surface_image import PLANE_TOLERANCE, Layer
+from enfilade.records import U32, Geometry
 
 SPLINE = (1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0)  # cubic B-spline
 TINY = 1e-8
+SMOOTHING_LEVELS = 4
+SMOOTHING_DEVIATIONS = 3.0  # of the luminance, across which it smooths
+NORMAL_EXPONENT = 64  # of the cosine: normals 12 degrees apart have a weight of a quarter
 # Neighbours at later levels are correlated, since they are averages over common pixels. They reduce the
 # logarithm of the variance by this part of the reduction by independent ones (exact for a flat image).
 INDEPENDENT, INDEPENDENT_BEYOND = (1.0, 0.613, 0.552, 0.539), 0.535
@@ -30,10 +35,6 @@ class Guide:
     direction_from_pixel : Matrix3f
         Of the camera.
     width, height : int
-    plane_tolerance : float
-        Distance from the tangent plane, by depth, at which a neighbour's weight falls to 1/e.
-    normal_exponent : int
-        Of the cosine between two normals.
     """
 
     depths: Any
@@ -42,8 +43,41 @@ class Guide:
     direction_from_pixel: Any
     width: int
     height: int
-    plane_tolerance: float
-    normal_exponent: int
+
+
+def guide_of(geometry: Geometry, groups: U32) -> Guide:
+    """Guide of the wavelet filter; pixels of different groups, (H, W) uint32, never mix."""
+    return Guide(
+        depths=lanes(geometry.depth),
+        normals=lanes(geometry.normal),
+        shape_indices=lanes(groups),
+        direction_from_pixel=matrix3(geometry.camera.direction_from_pixel),
+        width=geometry.camera.width,
+        height=geometry.camera.height,
+    )
+
+
+def smooth_along(geometry: Geometry, groups: U32, color: Any, variance: Any) -> Layer:
+    """Smooth an image along its surfaces by the wavelet filter.
+
+    Parameters
+    ----------
+    geometry
+    groups : (H, W) uint32
+        Only pixels of the same group mix.
+    color : Array3f
+        Image, width * height lanes.
+    variance : Float
+        Of its luminance.
+
+    Returns
+    -------
+    color : Array3f
+    variance : Float
+        Of the result.
+    """
+    guide = guide_of(geometry, groups)
+    return smooth(color, variance, guide, levels=SMOOTHING_LEVELS, deviations=SMOOTHING_DEVIATIONS)
 
 
 def smooth(
@@ -100,7 +134,7 @@ def _filter_level(
     shape_index = dr.gather(UInt, guide.shape_indices, lane)
     slope = guide.direction_from_pixel.T @ normal
     offset = depth * dr.dot(slope, Array3f(Float(column) + 0.5, Float(row) + 0.5, 1))
-    nearness = dr.rcp(guide.plane_tolerance * depth + TINY)
+    nearness = dr.rcp(PLANE_TOLERANCE * depth + TINY)
 
     vector = type(color)
     total, total_variance, squares = vector(0), Float(0), Float(0)
@@ -119,7 +153,7 @@ def _filter_level(
                 slope, Array3f(Float(i) + 0.5, Float(j) + 0.5, 1)
             )
             cosine: Any = dr.clip(dr.dot(normal, dr.gather(Array3f, guide.normals, tap)), 0.0, 1.0)
-            surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**guide.normal_exponent
+            surface = dr.exp(-dr.abs(beyond - offset) * nearness) * cosine**NORMAL_EXPONENT
             surface = dr.select(is_same, surface * Float(weight_x * weight_y), 0.0)
 
             # Weight it by the difference of luminance in units of the noise of both pixels.

@@ -1,4 +1,4 @@
-"""The specular filter: AOVs smoothed along the surfaces seen in them, and accumulated along their motion."""
+"""The spatial filter of specular AOVs: denoised, or smoothed along the surfaces that are seen in them."""
 
 from __future__ import annotations
 
@@ -10,21 +10,13 @@ import drjit as dr
 import numpy as np
 import scipy.ndimage
 
-from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, opaque, to_float, to_half, vector3
-from enfilade.kernels.tone import REC709_LUMINANCE
+from enfilade.arrays import Array3f, Array3f16, Float, image, lanes, to_half
 from enfilade.methods.decoupled.denoising import denoise_light
-from enfilade.methods.decoupled.irradiance_cache import (
-    MIN_WEIGHT,
-    PLANE_TOLERANCE,
-    points_of,
-    smooth_along,
-    upload_layers,
-)
-from enfilade.methods.decoupled.lookup import UploadedImage, lookup
 from enfilade.methods.decoupled.records import SpecularAov
+from enfilade.methods.decoupled.surface_image import UploadedImage, upload_layers
 from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
-from enfilade.methods.decoupled.wavelet import firefly_weights
-from enfilade.records import F32, Geometry, Mask, Shading
+from enfilade.methods.decoupled.wavelet import firefly_weights, smooth_along
+from enfilade.records import Geometry, Mask, Shading
 
 DENOISER = "fast"  # quality: what it leaves is averaged over frames
 NOISE_SHARE = 0.5  # of the samples' variance: low-discrepancy samples have less noise than it tells
@@ -32,7 +24,6 @@ OUTLIER = 8.0  # times the denoised value: brighter estimates are limited where 
 DENOISED_SHARE = 0.25  # of the samples' deviation that the denoiser leaves
 DENOISED_SUPPORT = 5  # pixels, over which that deviation is averaged
 FIREFLY = 2.0  # times the brightest neighbour: brighter pixels are fireflies
-MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
 
 
 def filter_spatially(
@@ -114,67 +105,3 @@ def _filtered(geometry: Geometry, aov: Shading, where: Mask, weights: Any) -> Sp
     color, variance = smooth_along(geometry, groups, weights * lanes(aov.color), noise)
     deviation = np.sqrt(image(variance, *where.shape))
     return SpecularAov(to_half(image(color, *where.shape)), to_half(deviation))
-
-
-def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:
-    """Upload a filtered AOV.
-
-    Parameters
-    ----------
-    geometry
-        G-buffer of the frame with the AOV's virtual images.
-    aov
-    where : (H, W) bool
-        Pixels that were sampled.
-    """
-    layers = [(lanes(aov.color), lanes(np.square(to_float(aov.deviation))))]
-    return upload_layers(geometry, lanes(where), layers, has_normals=False)
-
-
-def accumulate_temporally(
-    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]]
-) -> F32:
-    """Average an AOV with that of neighbouring frames, reprojected along its own motion.
-
-    Virtual images are reprojected at their apparent positions. Values that differ from the frame's own by
-    more than their noise weigh less, so that highlights and rough reflections, which move otherwise, remain.
-
-    Parameters
-    ----------
-    geometry
-        G-buffer of the frame, for its camera and normals.
-    here
-        The AOV of the frame.
-    others
-        The same AOV of other frames, with weights relative to the frame's own.
-
-    Returns
-    -------
-    (H, W, 3) float32
-        0 where the frame was not sampled.
-    """
-    color, variance = Array3f(here.values[0]), here.variances[0]
-
-    # Compute the apparent positions; virtual images face the eye.
-    position = points_of(geometry, here.depths)
-    is_real = here.shape_indices < IN_VIRTUAL_IMAGE
-    normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
-    total, weight = Array3f(color), dr.ones(Float, dr.width(color))
-    luminance = dr.dot(color, Array3f(*REC709_LUMINANCE))
-    dr.eval(position, normal, total, weight, luminance)
-    for other, given in others:
-        # Reproject.
-        found = lookup(position, normal, here.shape_indices, other, plane_tolerance=PLANE_TOLERANCE)
-        scale = dr.rcp(dr.maximum(found.weight, 1e-6))
-        value, noise = found.totals[0] * scale, found.variances[0] * scale
-
-        # Weight by the difference, in units of the noise.
-        difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - luminance)
-        frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
-        frame_weight = dr.select(found.weight > MIN_WEIGHT, opaque(given) * frame_weight, 0.0)
-
-        # Accumulate.
-        total += frame_weight * value
-        weight += frame_weight
-        dr.eval(total, weight)  # so that one kernel serves any number of frames
-    return image(total / weight, *geometry.shape_index.shape)

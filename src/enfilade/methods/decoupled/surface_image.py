@@ -1,19 +1,26 @@
-"""Lookup of images at points in the world, by reverse reprojection."""
+"""Images of values at surfaces, on the device, and their lookup at points in the world."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
-from enfilade.arrays import Array3f, Float, UInt
+from enfilade.arrays import Array3f, Float, Int, UInt, lanes, matrix3, opaque, vector3
 from enfilade.kernels.bilinear import taps_around
+from enfilade.records import Geometry
 
+PLANE_TOLERANCE = 0.01  # largest distance from the tangent plane on the same surface, as a part of the depth
+MIN_FOUND_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
 TAPER = 0.125  # of an image's width or height, over which its weight falls towards its borders
 MIN_TAPER = 0.02  # of an image's weight at its borders, where it may be the only one that shows a surface
+
+Layer = tuple[Any, Any]  # Array3f: values, Float: variance of their luminance
 
 
 @dataclass(frozen=True)
@@ -72,21 +79,81 @@ class Found:
     taper: Any
 
 
+def upload_layers(
+    geometry: Geometry, is_known: Any, layers: Sequence[Layer], *, has_normals: bool = True
+) -> UploadedImage:
+    """Upload layers of an image into memory that is not shared with NumPy.
+
+    Memory shared with NumPy can't be freed while a kernel is recorded.
+
+    Parameters
+    ----------
+    geometry
+    is_known : Bool
+        Pixels that have values, width * height lanes.
+    layers
+        Values (Array3f) and variances of their luminance (Float), the same.
+    has_normals
+        Whether normals are compared in lookups.
+    """
+    camera = geometry.camera
+    uploaded = UploadedImage(
+        depths=dr.select(is_known, lanes(geometry.depth), 0.0),
+        shape_indices=dr.select(is_known, lanes(geometry.shape_index), 0),
+        normals=packed(lanes(geometry.normal)) if has_normals else None,
+        values=tuple(dr.select(is_known, value, 0.0) for value, _ in layers),
+        variances=tuple(dr.select(is_known, variance, 0.0) for _, variance in layers),
+        eye=vector3(camera.eye),
+        direction_from_pixel=matrix3(camera.direction_from_pixel),
+        pixel_from_direction=matrix3(camera.pixel_from_direction),
+        width=opaque(camera.width, Int),
+        height=opaque(camera.height, Int),
+    )
+    dr.eval(uploaded.depths, uploaded.shape_indices, uploaded.normals, uploaded.values, uploaded.variances)
+    return uploaded
+
+
+def blank_image() -> UploadedImage:
+    """An image of one layer that shows nothing, in place of a missing one: one kernel serves any number.
+
+    Its arrays are its own: Dr.Jit merges arrays that appear twice, which would make another kernel.
+    """
+
+    def zeros(kind: Any) -> Any:
+        found = dr.zeros(kind, 2)  # gathering from a single lane would be another kernel
+        dr.make_opaque(found)
+        return found
+
+    nowhere = np.zeros((3, 3))
+    return UploadedImage(
+        depths=zeros(Float),
+        shape_indices=zeros(UInt),
+        normals=zeros(UInt),
+        values=(zeros(Array3f),),
+        variances=(zeros(Float),),
+        eye=vector3(np.zeros(3)),
+        direction_from_pixel=matrix3(nowhere),
+        pixel_from_direction=matrix3(nowhere),  # all points are behind its camera
+        width=opaque(2, Int),
+        height=opaque(1, Int),
+    )
+
+
 def lookup(
     position: Any,
     normal: Any,
     shape_index: Any,
     image: UploadedImage,
     *,
-    plane_tolerance: float,
     min_cosine: float = 0.0,
     margin: float = 0.0,
 ) -> Found:
     """Interpolate an image at points in the world.
 
-    Of the four pixels around a point's projection those are valid that show the same shape within a tolerance
-    of the point's tangent plane, which excludes occluders and surfaces that meet at an edge. Pixels are
-    weighted bilinearly and by the cosine between the normals. Images of the back of the surface are not used.
+    Of the four pixels around a point's projection those are valid that show the same shape within
+    :data:`PLANE_TOLERANCE` of the point's tangent plane, which excludes occluders and surfaces that meet at
+    an edge. Pixels are weighted bilinearly and by the cosine between the normals. Images of the back of the
+    surface are not used.
 
     Parameters
     ----------
@@ -94,8 +161,6 @@ def lookup(
         Points in world space, and surface normals on the shaded side, of any length.
     shape_index : UInt
     image
-    plane_tolerance
-        Largest distance from the tangent plane on the same surface, as a part of the depth.
     min_cosine
         Least cosine between the normals.
     margin
@@ -120,7 +185,7 @@ def lookup(
     scale = dr.rcp(dr.norm(normal))
     offset = dr.dot(normal, image.eye - position) * scale
     slope = (image.direction_from_pixel.T @ normal) * scale
-    tolerance = plane_tolerance * seen.z
+    tolerance = PLANE_TOLERANCE * seen.z
     is_inside &= offset > 0.0  # the camera is in front of the surface
 
     # Interpolate between the four neighbouring pixels.

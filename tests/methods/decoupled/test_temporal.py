@@ -1,16 +1,24 @@
-"""Refined pixels averaged over frames: less noise, no light of a bright sky, no mix of frames that differ."""
+"""Specular AOVs and refined pixels averaged over frames.
+
+Less noise, no light of a bright sky, no mix of frames that differ.
+"""
 
 import numpy as np
 import pytest
 
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.edge_accumulation import (
+from enfilade.gbuffer import find_geometry
+from enfilade.methods.decoupled.records import SpecularAov
+from enfilade.methods.decoupled.temporal import (
     accumulate_refined,
+    accumulate_temporally,
     redisplayed,
+    upload_aov,
     upload_displayed,
 )
 from support.analytic_truth import geometry_of
 from support.example_scenes import wall
+from support.material_scene import MATERIALS, front_camera, opened_scene
 
 WIDTH, HEIGHT = 96, 64
 SKY = 40.0  # times white
@@ -24,6 +32,30 @@ GEOMETRIES = [
 ]
 RIGHT = np.arange(WIDTH) > WIDTH // 2
 WHERE = np.broadcast_to(RIGHT, (HEIGHT, WIDTH))
+
+
+def test_accumulation_averages_noise_and_keeps_differences(tmp_path):
+    renderer = opened_scene(tmp_path, dict.fromkeys(("one", "two"), MATERIALS["diffuse"]))
+    rng = np.random.default_rng(4)
+    geometries = [find_geometry(renderer, front_camera(x=x)) for x in (0.0, 0.05, -0.05)]
+    size = geometries[0].shape_index.shape
+    colors = [rng.normal(1.0, 0.1, (*size, 3)).astype(np.float16) for _ in geometries]
+
+    def accumulated(offset):
+        aovs = [
+            SpecularAov(color + np.float16(offset if k else 0.0), np.full(size, 0.1, np.float16))
+            for k, color in enumerate(colors)
+        ]
+        here, *others = (upload_aov(g, aov, g.is_hit) for g, aov in zip(geometries, aovs, strict=True))
+        return accumulate_temporally(geometries[0], here, [(other, 1.0) for other in others])
+
+    where = geometries[0].is_hit
+    averaged = accumulated(0.0)
+    assert averaged[where].std() < 0.75 * colors[0][where].std(dtype=float)
+    assert abs(averaged[where].mean() - 1.0) < 0.01
+    assert not averaged[~where].any()
+    # Differences of many standard deviations are not noise.
+    np.testing.assert_allclose(accumulated(5.0)[where], colors[0][where], atol=1e-2)
 
 
 def changed(values, exposure_ev=0.0, noise=NOISE):

@@ -8,20 +8,20 @@ import pytest
 
 from enfilade.arrays import Array3f, Bool, Float, Int, UInt, lanes, matrix3, opaque, vector3
 from enfilade.camera.pinhole import Camera, look_at
-from enfilade.methods.decoupled.irradiance_cache import upload_layers
-from enfilade.methods.decoupled.lookup import (
+from enfilade.methods.decoupled.surface_image import (
     MIN_TAP_WEIGHT,
     MIN_TAPER,
+    PLANE_TOLERANCE,
     TAPER,
     UploadedImage,
     footprint,
     lookup,
     packed,
+    upload_layers,
 )
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Camera(look_at((0.3, 0.2, 4), (0, 0, 0)), 40, WIDTH, HEIGHT)
-TOLERANCE = 0.01
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def found(wall, points, shape_index, normal=(0.0, 0.0, 1.0), normals=None, **mor
         height=opaque(HEIGHT, Int),
     )
     position = Array3f(np.asarray(points, np.float32).T)
-    return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, plane_tolerance=TOLERANCE, **more)
+    return lookup(position, Array3f(*normal), UInt(shape_index), uploaded, **more)
 
 
 def by_loops(wall, point, shape_index):
@@ -68,7 +68,7 @@ def by_loops(wall, point, shape_index):
             if (
                 depth[v, u] > 0
                 and shape_indices[v, u] == shape_index
-                and abs(there[2] - point[2]) <= TOLERANCE * seen[2]
+                and abs(there[2] - point[2]) <= PLANE_TOLERANCE * seen[2]
             ):
                 total += (wx * wy + MIN_TAP_WEIGHT) * value[v, u]
                 weight += wx * wy + MIN_TAP_WEIGHT
@@ -146,7 +146,7 @@ def kernels_of_lookup(height, width):
     position = dr.opaque(Array3f, 0.1, 3)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        dr.eval(lookup(position, Array3f(0, 0, 1), UInt(1), uploaded, plane_tolerance=TOLERANCE))
+        dr.eval(lookup(position, Array3f(0, 0, 1), UInt(1), uploaded))
         return [k["hash"] for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
 
 

@@ -1,0 +1,267 @@
+"""Temporal accumulation: specular AOVs along the motion of virtual images, and refined pixels.
+
+Refined pixels show several surfaces, often one a hundred times brighter than another: an average of radiance
+would be that of the brightest. They are averaged as they are displayed, where all that is white has the same
+value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import drjit as dr
+import numpy as np
+
+from enfilade.arrays import Array3f, Float, image, lanes, opaque, to_float, to_half, vector3
+from enfilade.cache import LruCache
+from enfilade.camera.path import CameraPath
+from enfilade.kernels.rays import points_at
+from enfilade.kernels.tone import REC709_LUMINANCE, luminance
+from enfilade.methods.base import Output
+from enfilade.methods.decoupled.edges import dilated
+from enfilade.methods.decoupled.records import ShadedFrame, SpecularAov
+from enfilade.methods.decoupled.shot import ShotContext
+from enfilade.methods.decoupled.surface_image import MIN_FOUND_WEIGHT, UploadedImage, lookup, upload_layers
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE
+from enfilade.records import F32, Frame, Geometry, Mask, Provenance, SurfaceClass
+from enfilade.settings import ViewingSettings
+
+REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
+MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
+# Of the samples' deviation: rays are stratified, and textures have less noise than their contrast tells. With
+# the whole deviation pictures on a wall are blurred; half of it keeps nine tenths of the gain at metal edges.
+DISPLAYED_NOISE_SHARE = 0.5
+
+
+class TemporalAccumulation:
+    """Accumulates the specular AOVs of frames, and their refined pixels, over time.
+
+    Keeps those of the frames that it spans on the device.
+    """
+
+    def __init__(self) -> None:
+        self._virtual: LruCache[int, list[Geometry]] = LruCache(1)
+        # One frame fewer than a window: its first one is not needed again.
+        self._uploaded: LruCache[int, list[UploadedImage]] = LruCache(2 * REACH)
+        self._displayed: LruCache[int, UploadedImage] = LruCache(2 * REACH)
+        self._last: LruCache[int, Frame] = LruCache(1)
+
+    def deliver(self, shot: ShotContext, frame: int) -> Output:
+        """Deliver a frame; the frames of its window are shaded. Repeated poses are copies."""
+        static = shot.walk.path.static_frame(frame)
+        made = self._last.get(static, lambda: self._accumulated(shot, static))
+        if frame != static:
+            made = Frame(made.color, np.full_like(made.provenance, Provenance.REUSED))
+        return Output({frame: made})
+
+    def _accumulated(self, shot: ShotContext, frame: int) -> Frame:
+        """A frame whose specular AOVs are averaged over its window, with weights that fall linearly."""
+        path, shaded = shot.walk.path, self._record(shot, frame)
+        geometry, color = shot.walk.view(frame).geometry, to_float(shaded.diffuse)
+        frames = window(path, path.shots()[shot.number], frame)
+        weights = {f: 1.0 - abs(path.distance(f) - path.distance(frame)) / (REACH + 1) for f in frames}
+        if np.any(shaded.provenance == Provenance.SPECULAR):
+            aovs = {f: self._aovs(shot, f) for f in frames}
+            for k, here in enumerate(aovs.pop(frame)):
+                neighbours = [(of[k], weights[f]) for f, of in aovs.items() if k < len(of)]
+                color = color + accumulate_temporally(geometry, here, neighbours)
+
+        # Average refined pixels.
+        if shaded.deviation.any():
+            displayed = {f: self._displayed_image(shot, f) for f in frames}
+            shown, where = displayed.pop(frame), shaded.deviation > 0
+            deviation = to_float(shaded.deviation)
+            here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
+            neighbours = [(other, weights[f]) for f, other in displayed.items()]
+            color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
+
+        # Specular lobes that are a difference have negative samples: clip the sum.
+        return Frame(np.maximum(color, 0.0), shaded.provenance)
+
+    def _displayed_image(self, shot: ShotContext, frame: int) -> UploadedImage:
+        """A shaded frame as it is displayed, on the device."""
+
+        def make() -> UploadedImage:
+            shaded, virtual = self._record(shot, frame), self._virtual_geometry(shot, frame)
+            deviation = to_float(shaded.deviation)
+            return upload_displayed(virtual, shaded.color, deviation, exposure_ev=_exposure_ev(shot))
+
+        return self._displayed.get(frame, make)
+
+    def _aovs(self, shot: ShotContext, frame: int) -> list[UploadedImage]:
+        """Specular AOVs of a shaded frame, on the device."""
+
+        def make() -> list[UploadedImage]:
+            shaded = self._record(shot, frame)
+            where = dilated(shaded.provenance == Provenance.SPECULAR)
+            aovs = zip(self._virtual_geometry(shot, frame), shaded.specular, strict=False)
+            return [upload_aov(geometry, aov, where) for geometry, aov in aovs]
+
+        return self._uploaded.get(frame, make)
+
+    @staticmethod
+    def _record(shot: ShotContext, frame: int) -> ShadedFrame:
+        record: ShadedFrame = shot.inputs.record("shading", frame)
+        return record
+
+    def _virtual_geometry(self, shot: ShotContext, frame: int) -> list[Geometry]:
+        """G-buffers of a frame with the virtual images of its AOVs."""
+        return self._virtual.get(frame, lambda: shot.virtual_images.find(shot.walk.view(frame).geometry))
+
+
+def window(path: CameraPath, shot: range, frame: int) -> list[int]:
+    """Distinct frames of a shot over which the AOVs of a frame are accumulated, itself among them."""
+    first, here, last = (path.distance(f) for f in (shot.start, frame, shot.stop - 1))
+    return list(path.distinct_frames[max(here - REACH, first) : min(here + REACH, last) + 1])
+
+
+def _exposure_ev(shot: ShotContext) -> float:
+    return shot.walk.settings[ViewingSettings].exposure_ev
+
+
+def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedImage:
+    """Upload a filtered AOV.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the frame with the AOV's virtual images.
+    aov
+    where : (H, W) bool
+        Pixels that were sampled.
+    """
+    layers = [(lanes(aov.color), lanes(np.square(to_float(aov.deviation))))]
+    return upload_layers(geometry, lanes(where), layers, has_normals=False)
+
+
+def accumulate_temporally(
+    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]]
+) -> F32:
+    """Average an AOV with that of neighbouring frames, reprojected along its own motion.
+
+    Virtual images are reprojected at their apparent positions. Values that differ from the frame's own by
+    more than their noise weigh less, so that highlights and rough reflections, which move otherwise, remain.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the frame, for its camera and normals.
+    here
+        The AOV of the frame.
+    others
+        The same AOV of other frames, with weights relative to the frame's own.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        0 where the frame was not sampled.
+    """
+    color, variance = Array3f(here.values[0]), here.variances[0]
+
+    # Compute the apparent positions; virtual images face the eye.
+    position = points_at(geometry.camera, here.depths)
+    is_real = here.shape_indices < IN_VIRTUAL_IMAGE
+    normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
+    total, weight = Array3f(color), dr.ones(Float, dr.width(color))
+    own = dr.dot(color, Array3f(*REC709_LUMINANCE))
+    dr.eval(position, normal, total, weight, own)
+    for other, given in others:
+        # Reproject.
+        found = lookup(position, normal, here.shape_indices, other)
+        scale = dr.rcp(dr.maximum(found.weight, 1e-6))
+        value, noise = found.totals[0] * scale, found.variances[0] * scale
+
+        # Weight by the difference, in units of the noise.
+        difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - own)
+        frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
+        frame_weight = dr.select(found.weight > MIN_FOUND_WEIGHT, opaque(given) * frame_weight, 0.0)
+
+        # Accumulate.
+        total += frame_weight * value
+        weight += frame_weight
+        dr.eval(total, weight)  # so that one kernel serves any number of frames
+    return image(total / weight, *geometry.shape_index.shape)
+
+
+def upload_displayed(
+    virtual: Sequence[Geometry], color: F32, deviation: F32, *, exposure_ev: float
+) -> UploadedImage:
+    """Upload a frame as it is displayed, at the virtual images that its mirrors and panes show.
+
+    Parameters
+    ----------
+    virtual
+        G-buffers of the frame with the virtual images of reflection, and of transmission.
+    color : (H, W, 3) float32
+        Linear radiance.
+    deviation : (H, W) float32
+        Standard deviation of the luminance.
+    exposure_ev
+        In stops.
+    """
+    reflected, transmitted = virtual
+    is_pane = reflected.surface == SurfaceClass.TRANSPARENT
+    shown = replace(
+        reflected,
+        depth=np.where(is_pane, transmitted.depth, reflected.depth),
+        shape_index=np.where(is_pane, transmitted.shape_index, reflected.shape_index),
+    )
+    displayed = _displayed(color, deviation, exposure_ev)
+    return upload_aov(shown, displayed, np.ones(deviation.shape, np.bool_))
+
+
+def redisplayed(
+    whole: UploadedImage, color: F32, deviation: F32, where: Mask, *, exposure_ev: float
+) -> UploadedImage:
+    """An image of :func:`upload_displayed` with other colours, in some pixels only, (H, W)."""
+    shown = _displayed(color, deviation, exposure_ev)
+    depths = dr.select(lanes(where), whole.depths, 0.0)
+    value, variance = lanes(shown.color), lanes(np.square(to_float(shown.deviation)))
+    dr.eval(depths, value, variance)
+    return replace(whole, depths=depths, values=(value,), variances=(variance,))
+
+
+def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
+    """Colours after exposure, 0..1, and their deviation.
+
+    Above white there is no noise: bright pixels beside a dark line are not averaged with it.
+    """
+    scale = np.float32(2.0**exposure_ev)
+    mean, error = luminance(color) * scale, deviation * scale
+    low, high = (np.clip(value, 0.0, 1.0) for value in (mean - error, mean + error))
+    noise = np.float32(0.5 * DISPLAYED_NOISE_SHARE) * (high - low)
+    return SpecularAov(to_half(np.clip(color * scale, 0.0, 1.0)), to_half(noise))
+
+
+def accumulate_refined(
+    geometry: Geometry,
+    color: F32,
+    here: UploadedImage,
+    others: Sequence[tuple[UploadedImage, float]],
+    *,
+    exposure_ev: float,
+) -> F32:
+    """Average the refined pixels of a frame with neighbouring frames.
+
+    Radiance above white stays: the sum of the frames' light is kept.
+
+    Parameters
+    ----------
+    geometry
+        G-buffer of the frame.
+    color : (H, W, 3) float32
+        Linear radiance of the frame.
+    here, others
+        Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
+        to its own.
+    exposure_ev
+        In stops.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Linear radiance; pixels that are not refined stay.
+    """
+    change: F32 = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
+    return color + change * np.float32(2.0**-exposure_ev)

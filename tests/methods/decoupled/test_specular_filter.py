@@ -1,0 +1,54 @@
+"""The spatial filter of specular AOVs: less noise, the same energy."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import minimum_filter
+
+from enfilade.camera.pinhole import Camera, look_at
+from enfilade.gbuffer import find_geometry
+from enfilade.methods.decoupled.specular_filter import filter_spatially
+from enfilade.methods.decoupled.virtual_images import IN_VIRTUAL_IMAGE, VirtualImages
+from enfilade.records import Shading
+from support.analytic_truth import geometry_of
+from support.example_scenes import wall
+from support.material_scene import front_camera, opened_scene, pane, specular_aovs
+
+
+@pytest.fixture(scope="module")
+def pane_scene(tmp_path_factory):
+    """A pane: renderer, camera, G-buffer, and the G-buffers with virtual images of both AOVs."""
+    renderer = opened_scene(tmp_path_factory.mktemp("pane"), {"ball": pane("front", 1.0)})
+    camera = front_camera(96, 72)
+    seen, images = find_geometry(renderer, camera), VirtualImages(renderer)
+    return renderer, camera, seen, images.find(seen)
+
+
+@pytest.mark.parametrize("denoiser", ["none", "balanced"])
+def test_thin_regions_are_smoothed_and_keep_their_energy(denoiser):
+    geometry = geometry_of(wall(), Camera(look_at((0, 0, 4), (0, 0, 0)), 45, 32, 24))
+    size = geometry.shape_index.shape
+    where = np.zeros(size, bool)
+    where[11:13] = True
+    light = np.random.default_rng(5).gamma(1.0, 1.0, (*size, 1)).astype(np.float32).repeat(3, axis=2)
+    band = Shading(light * where[..., None], np.where(where, 1.0, 0.0).astype(np.float32))
+    (found,) = filter_spatially([geometry], [band], where, is_denoised=denoiser != "none")
+    assert found.color[where].std() < 0.5 * light[where].std()
+    assert found.color[where].mean() == pytest.approx(light[where].mean(), rel=0.15)
+
+
+@pytest.mark.parametrize("denoiser", ["none", "balanced"])
+@pytest.mark.parametrize("spp", [2, 4, 12])
+def test_reflections_in_a_pane_have_no_noise_and_keep_their_energy(pane_scene, spp, denoiser):
+    renderer, camera, seen, virtual = pane_scene
+    where = np.ones(seen.shape_index.shape, bool)
+    aovs = [aov.to_image(where) for aov in specular_aovs(renderer, camera, spp)]
+    reflection, _ = filter_spatially(virtual, aovs, where, is_denoised=denoiser != "none")
+    front = seen.shape_index == renderer.describe().shapes.index("front") + 1
+    filtered, unfiltered = (aov.color[front].mean(dtype=float) for aov in (reflection, aovs[0]))
+    assert filtered == pytest.approx(unfiltered, rel=0.02)
+    # The sky in the pane is one surface. Both branches of the pane are followed: nothing is left to chance.
+    sky = front & (virtual[0].shape_index == IN_VIRTUAL_IMAGE)
+    interior = minimum_filter(sky, 5)
+    assert interior.sum() > 200
+    color = aovs[0].color[interior]
+    assert color.std(dtype=float) < 0.01 * color.mean(dtype=float)  # the Fresnel reflectance changes
