@@ -391,7 +391,8 @@ class LobeRenderer(Renderer, Protocol):
     def sharp_light(self, point: ShadingPoint, sampler: Any, *, specular: bool = False) -> tuple[Any, Any]:
         """Estimate the light of emitters with sharp shadows that the lobes reflect, by next-event estimation.
 
-        It is MIS-weighted: samples of the lobes with `soft_only` have the rest of this light.
+        It is MIS-weighted; the complementary weight is in the emission that samples of the lobes with
+        `soft_only` hit.
 
         Parameters
         ----------

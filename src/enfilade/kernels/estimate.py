@@ -26,14 +26,14 @@ Radiance = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Samples:
-    """Results of paths that are more than one colour, as lanes.
+    """Radiance of paths in several layers, as lanes.
 
     Attributes
     ----------
     layers : tuple of Array3f
         Averaged separately; a path counts only where all of them are finite.
     is_marked : Bool or None
-        Marks paths, and so their pixels.
+        Flags of paths; a pixel has the flag if any of its paths has it.
     """
 
     layers: tuple[Any, ...]

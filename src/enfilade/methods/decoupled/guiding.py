@@ -23,7 +23,7 @@ PIXELS, PATHS = 512, 4  # that probe the scene for each size of regions: pixels,
 MORE_PATHS = 32  # ... of each pixel that measure the regions of a guide that is used
 HALVINGS = range(3, 7)  # of the extent of the photons: sizes of the voxels that group them
 MIN_PHOTONS = 8  # in a voxel
-WIDTH = 1.5  # radius of a region over the root mean square distance from its centre: 1.4 of a disk
+WIDTH = 1.5  # radius of a region over the root mean square distance from its centre, which is 1.41 of a disk
 OUTLIER = 16  # times the mean light: brighter paths are limited
 MAX_MOMENT_RATIO = 0.4  # second moment with a guide over that without: a guide of a larger one is not used
 

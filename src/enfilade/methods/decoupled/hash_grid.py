@@ -67,8 +67,8 @@ class HashGrid:
         width : Float
             Of the path there, scene units.
         offset : Array3f or None
-            Shift of the point in widths of an entry, plus 0.5, so that many lookups interpolate. Moved points
-            without an entry use that of the point itself.
+            Jitter in widths of an entry, where 0.5 is none: the mean of many lookups interpolates between
+            entries. Moved points without an entry use that of the point itself.
         where : Bool
             Lanes that are looked up.
 

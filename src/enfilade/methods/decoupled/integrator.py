@@ -89,7 +89,7 @@ class Integrator:
     def diffuse_radiance(self, cache: IrradianceCache, path: Path, on_miss: OnMiss | None = None) -> Samples:
         """Radiance that visible surfaces emit, and reflect by their diffuse lobes.
 
-        With the highlights of emitters that cast sharp shadows, if the cache is soft.
+        Includes specular highlights of sharp emitters where the cache excludes these emitters.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Integrator:
             Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
             surfaces), and transmission straight through clear surfaces.
         """
-        # Pad the paths: a few are often as many as some mesh has vertices, which would be another signature.
+        # Pad the paths: a number of lanes that equals the size of a scene's array changes a kernel's signature.
         count = dr.width(path.lane)
         return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 

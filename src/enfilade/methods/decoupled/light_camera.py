@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from enfilade.camera.pinhole import Camera
 
-LIGHT_PIXELS = 640 * 360  # of the light camera; frames of up to 2.25 times as many have one as large
+LIGHT_PIXELS = 640 * 360  # target number of pixels; frames of up to 2.25 times as many are not reduced
 IRRADIANCE_SCALE = 2  # width and height of irradiance images over those of the light camera
 
 
@@ -17,7 +17,7 @@ def light_camera(camera: Camera) -> Camera:
 
 
 def irradiance_camera(camera: Camera) -> Camera:
-    """The camera of irradiance images: shadows where surfaces meet are narrower than its pixels otherwise."""
+    """The camera of irradiance images: contact shadows are narrower than its pixels."""
     light = light_camera(camera)
     width, height = IRRADIANCE_SCALE * light.width, IRRADIANCE_SCALE * light.height
     if (width, height) == (camera.width, camera.height):

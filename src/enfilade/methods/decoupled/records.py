@@ -35,7 +35,7 @@ class IrradianceImage:
             raise ValueError(f"is_known is {self.is_known.shape}, expected {self.direct.variance.shape}")
 
     def with_noise(self, share: float) -> IrradianceImage:
-        """The same image with a part of its variances."""
+        """A copy with its variances multiplied by a factor."""
         direct, indirect = (
             replace(layer, variance=np.float32(share) * layer.variance)
             for layer in (self.direct, self.indirect)
