@@ -130,7 +130,7 @@ class Integrator:
             Two AOVs, each of which has its own virtual image: reflection (with transmission through rough
             surfaces), and transmission straight through clear surfaces.
         """
-        # Pad the paths: a number of lanes that equals the size of a scene's array changes a kernel's signature.
+        # Pad the paths: a number of lanes that is the size of a scene's array changes a kernel's signature.
         count = dr.width(path.lane)
         return Samples(self._reflected(cache, compact(path, path.lane), count, on_miss))
 

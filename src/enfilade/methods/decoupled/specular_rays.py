@@ -55,8 +55,8 @@ def shade_specular(
     beneath : (H, W) float32
         Luminance of what camera rays see, which is displayed together with the AOVs.
     """
-    # Surfaces thinner than a pixel, which no centre of a pixel around hits, are not denoised. Cut-outs and thin
-    # cloth are no such surfaces: their G-buffer may be of another class, or of what is behind.
+    # Surfaces thinner than a pixel, which no centre of a pixel around hits, are not denoised. Cut-outs and
+    # thin cloth are no such surfaces: their G-buffer may be of another class, or of what is behind.
     geometry, near = shot.walk.view(frame).geometry, dilated(seen)
     is_wide = dilated(geometry.is_specular | ~dilated(~seen))
     where, is_missed = near & is_wide, near & ~is_wide

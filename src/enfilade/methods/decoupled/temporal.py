@@ -29,8 +29,9 @@ from enfilade.settings import ViewingSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
-# Of the samples' deviation, which overestimates noise: rays are stratified, and the contrast of textures counts
-# as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal edges.
+# Of the samples' deviation, which overestimates noise: rays are stratified, and the contrast of textures
+# counts as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal
+# edges.
 DISPLAYED_NOISE_SHARE = 0.5
 
 
