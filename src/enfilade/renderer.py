@@ -242,7 +242,7 @@ class Photons:
 
 
 @dataclass(frozen=True)
-class SceneFacts:
+class SceneDescription:
     """Facts of a loaded scene.
 
     Attributes
@@ -266,8 +266,8 @@ class SceneFacts:
 class Renderer(Protocol):
     """A renderer for the methods `reference` and `paper`."""
 
-    def describe(self) -> SceneFacts:
-        """Facts of the scene and the renderer."""
+    def describe(self) -> SceneDescription:
+        """Description of the scene and the renderer."""
         ...
 
     def surfaces(self, rays: Rays) -> Surfaces:

@@ -16,7 +16,7 @@ from enfilade.arrays import Array3f, Float, UInt, opaque
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneFacts, Surfaces
+from enfilade.renderer import PixelFilter, RandomKey, Rays, Renderer, SceneDescription, Surfaces
 
 SUN = (0.36, 0.48, 0.8)  # direction of the light, world space
 AMBIENT = 0.3  # share of the light that is the same from all directions
@@ -39,7 +39,7 @@ class NoiseFreeRenderer:
     def __init__(self, renderer: Renderer) -> None:
         self._renderer = renderer
 
-    def describe(self) -> SceneFacts:
+    def describe(self) -> SceneDescription:
         """Facts of the scene and of its renderer."""
         return self._renderer.describe()
 

@@ -19,7 +19,7 @@ from enfilade.arrays import Array3f, Float, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.kernels.estimate import estimate
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
+from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneDescription, Surfaces
 from support.analytic_scene import (
     AnalyticScene,
     Checker,
@@ -52,9 +52,9 @@ class AnalyticRenderer:
         self._paths_in_flight = paths_in_flight
         self._classes = UInt([SurfaceClass.NONE, *(shape.material.surface for shape in scene.shapes)])
 
-    def describe(self) -> SceneFacts:
+    def describe(self) -> SceneDescription:
         """Facts of the scene."""
-        return SceneFacts(
+        return SceneDescription(
             renderer="analytic",
             variant=dr.backend_v(Float).name.lower(),
             shapes=tuple(shape.name for shape in self._scene.shapes),

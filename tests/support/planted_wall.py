@@ -8,7 +8,7 @@ from typing import Any
 from enfilade.camera.path import CameraPath
 from enfilade.camera.pinhole import Camera
 from enfilade.records import Shading, SurfaceClass
-from enfilade.renderer import Rays, SceneFacts, Surfaces
+from enfilade.renderer import Rays, SceneDescription, Surfaces
 from support.analytic import AnalyticRenderer
 from support.analytic_scene import AnalyticScene, Checker, Material, Plane, Quad
 from support.example_scenes import slide
@@ -43,7 +43,7 @@ class PlantedWall:
         self._light = [AnalyticRenderer(replace(s, noise=noise)) for s in (plain, light)]
         self._seen = [AnalyticRenderer(s) for s in (plain, seen)]
 
-    def describe(self) -> SceneFacts:
+    def describe(self) -> SceneDescription:
         return self._seen[0].describe()
 
     def surfaces(self, rays: Rays) -> Surfaces:

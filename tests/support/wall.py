@@ -11,7 +11,7 @@ import numpy.typing as npt
 from enfilade.arrays import Array3f, UInt
 from enfilade.camera.pinhole import Camera
 from enfilade.records import F32, Shading, SurfaceClass
-from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneFacts, Surfaces
+from enfilade.renderer import PixelFilter, RandomKey, Rays, SceneDescription, Surfaces
 
 
 def load(file: Path, *, max_depth: int, paths_in_flight: int) -> Wall:
@@ -27,8 +27,8 @@ class Wall:
         self.folder = file.parent
         self.paths_in_flight = paths_in_flight
 
-    def describe(self) -> SceneFacts:
-        return SceneFacts("wall", "none", ("wall",))
+    def describe(self) -> SceneDescription:
+        return SceneDescription("wall", "none", ("wall",))
 
     def surfaces(self, rays: Rays) -> Surfaces:
         distance = -rays.origin.z / rays.direction.z

@@ -31,7 +31,7 @@ from enfilade.renderer import (
     PixelFilter,
     RandomKey,
     Rays,
-    SceneFacts,
+    SceneDescription,
     ShadingPoint,
     Surfaces,
 )
@@ -92,9 +92,9 @@ class MitsubaRenderer:
         # while a kernel is recorded.
         dr.eval(scene.sample_emitter_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5)))
 
-    def describe(self) -> SceneFacts:
-        """Facts of the scene and the renderer."""
-        return SceneFacts(
+    def describe(self) -> SceneDescription:
+        """Description of the scene and the renderer."""
+        return SceneDescription(
             renderer=f"Mitsuba {mi.__version__}",
             variant=self._device.variant,
             shapes=self._shapes.names,
