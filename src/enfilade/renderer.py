@@ -166,14 +166,14 @@ class Bounce:
         Density of the sampled direction, per steradian.
     is_delta : Bool
         Whether the direction comes from a delta lobe, which next-event estimation can't sample.
-    is_soft : Bool
+    soft_only : Bool
         Whether emitters that cast sharp shadows are estimated apart: :meth:`LobeRenderer.sharp_light`.
     """
 
     position: Any
     pdf: Any
     is_delta: Any
-    is_soft: Any
+    soft_only: Any
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, 
 
 RAYS = 16  # a pixel
 BOUNCES = 6  # reflections and transmissions, before a path ends
-SHARP = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
+IMAGING = (SurfaceClass.MIRROR, SurfaceClass.TRANSPARENT)
 
 
 class Guides:
@@ -76,9 +76,9 @@ class Guides:
         batches = []
         for first in range(0, len(pixels), step):
             rays, sampler = _stratified_rays(camera, pixels[first : first + step], random)
-            albedo, normal, is_sharp = self._first(rays, sampler)
+            albedo, normal, forms_image = self._first(rays, sampler)
             if is_followed:
-                self._follow(albedo, normal, is_sharp, rays, sampler)
+                self._follow(albedo, normal, forms_image, rays, sampler)
             sums = [np.array(dr.block_sum(v, RAYS)) for v in (*albedo, *normal)]
             batches.append(np.stack(sums) / np.float32(RAYS))
         found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
@@ -92,14 +92,14 @@ class Guides:
         dr.eval(found, rays, sampler)
         return found
 
-    def _follow(self, albedo: Any, normal: Any, is_sharp: Any, rays: Rays, sampler: Any) -> None:
+    def _follow(self, albedo: Any, normal: Any, forms_image: Any, rays: Rays, sampler: Any) -> None:
         """Replace the guides of sharp surfaces by those of the surfaces behind."""
-        lane = dr.arange(UInt, dr.width(is_sharp))
-        throughput = dr.full(Array3f, 1, dr.width(is_sharp))
-        rays = Rays(rays.origin + dr.zeros(Array3f, dr.width(is_sharp)), rays.direction)
+        lane = dr.arange(UInt, dr.width(forms_image))
+        throughput = dr.full(Array3f, 1, dr.width(forms_image))
+        rays = Rays(rays.origin + dr.zeros(Array3f, dr.width(forms_image)), rays.direction)
         for _ in range(BOUNCES):
             # Keep the paths at sharp surfaces.
-            active: Any = dr.compress(is_sharp)
+            active: Any = dr.compress(forms_image)
             if not dr.width(active):
                 return
             chosen, is_real = padded(active)
@@ -108,7 +108,7 @@ class Guides:
             dr.eval(lane, throughput, rays, sampler)
 
             # Reflect or transmit them, and find the next surfaces.
-            rays, sampler, factor, next_albedo, next_normal, is_sharp = self._extend(rays, sampler)
+            rays, sampler, factor, next_albedo, next_normal, forms_image = self._extend(rays, sampler)
             throughput *= factor
 
             # Add their albedo, and take their normal.
@@ -116,8 +116,8 @@ class Guides:
                 dr.scatter_add(target, Float(value), lane, is_real, dr.ReduceMode.NoConflicts)
             for target, value in zip(normal, next_normal, strict=True):
                 dr.scatter(target, value, lane, is_real)
-            is_sharp &= is_real
-            dr.eval(albedo, normal, is_sharp, throughput)
+            forms_image &= is_real
+            dr.eval(albedo, normal, forms_image, throughput)
 
     def _extend_kernel(self, rays: Rays, sampler: Any) -> tuple[Any, ...]:
         """Scatter paths at a sharp surface, and find the next one."""
@@ -147,6 +147,6 @@ def _guides_of(hit: Surfaces) -> tuple[Any, Any]:
 
 def _is_sharp(hit: Surfaces) -> Any:
     found = Bool(False)
-    for one in SHARP:
+    for one in IMAGING:
         found |= hit.surface == int(one)
     return found & hit.is_hit

@@ -151,7 +151,7 @@ def test_all_emitters_of_a_scene_may_be_sharp(tmp_path):
 <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>"""
     pane = """<shape type="rectangle"><transform name="to_world"><translate z="-1"/></transform>
 <bsdf type="thindielectric"/></shape>"""
-    renderer, cache = opened(tmp_path, BULBS + ball + pane), IrradianceCache(is_soft=True)
+    renderer, cache = opened(tmp_path, BULBS + ball + pane), IrradianceCache(soft_only=True)
     camera = Camera(look_at((1.5, 2.0, 2.5), (0.0, 0.2, 0.0)), 50.0, 48, 36)
     few = shaded(renderer, cache, camera, 4, pixels=300)
     ours, reference = shaded(renderer, cache, camera, 64), traced(renderer, camera, 64)

@@ -14,7 +14,7 @@ import numpy as np
 from enfilade.errors import ImageError
 from enfilade.images.codecs import codec_named
 from enfilade.images.container import written_container
-from enfilade.images.view import View, open_view
+from enfilade.images.view import ViewTransform, open_view
 from enfilade.images.ycbcr import FULL_RANGE, LIMITED_RANGE, Plane, frame_of, planes_from_rgb, quantized
 from enfilade.records import F32
 from enfilade.settings import VideoSettings
@@ -137,7 +137,7 @@ def _unchanged_scheduling() -> Iterator[None]:
                     os.sched_setscheduler(thread, policy, parameters)
 
 
-def _tag(target: Any, view: View, *, is_rgb: bool) -> None:
+def _tag(target: Any, view: ViewTransform, *, is_rgb: bool) -> None:
     target.color_primaries = BT709
     target.color_trc = view.transfer
     target.colorspace = IDENTITY_MATRIX if is_rgb else BT709

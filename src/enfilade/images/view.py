@@ -23,7 +23,7 @@ DISPLAYS = (("srgb", SRGB_TRANSFER), ("rec.1886", BT709_TRANSFER), ("rec.709", B
 
 
 @dataclass(frozen=True)
-class View:
+class ViewTransform:
     """A view transform.
 
     Attributes
@@ -38,7 +38,7 @@ class View:
     transfer: int
 
 
-def open_view(settings: VideoSettings, exposure_ev: float) -> View:
+def open_view(settings: VideoSettings, exposure_ev: float) -> ViewTransform:
     """Make the view transform of the settings: sRGB, or one of an OpenColorIO configuration.
 
     Parameters
@@ -60,7 +60,7 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
         for name in ("view", "display", "look"):
             if value := getattr(settings, name):
                 raise SettingsError(f"[video] {name} = {value!r} needs a configuration: set [video] ocio too")
-        return View(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
+        return ViewTransform(lambda linear: srgb_encode(np.clip(linear * gain, 0.0, 1.0)), SRGB_TRANSFER)
     processor, transfer = _open_ocio(settings)
     apply = processor.getDefaultCPUProcessor().applyRGB
 
@@ -69,7 +69,7 @@ def open_view(settings: VideoSettings, exposure_ev: float) -> View:
         apply(values)
         return np.clip(values, 0.0, 1.0)
 
-    return View(encode, transfer)
+    return ViewTransform(encode, transfer)
 
 
 def view_identity(settings: VideoSettings) -> dict[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from enfilade.comparison.objects import ObjectDifference, compare_objects
 from enfilade.images.stills import encode_webp
-from enfilade.images.view import View, open_view
+from enfilade.images.view import ViewTransform, open_view
 from enfilade.records import F32, U8, U32
 from enfilade.reports.page import write_page
 from enfilade.reports.tables import seconds
@@ -84,7 +84,7 @@ def write_check(imported: ImportedScene, check: ImportCheck, differences: Sequen
     return file
 
 
-def _frame(of: CheckedFrame, view: View) -> dict[str, Any]:
+def _frame(of: CheckedFrame, view: ViewTransform) -> dict[str, Any]:
     """Both pictures, and the map of their difference."""
     pictures = [_displayed(halves, view) for halves in (of.cycles, of.imported)]
     difference = np.abs(pictures[0].astype(np.int16) - pictures[1]).astype(np.uint8)
@@ -93,7 +93,7 @@ def _frame(of: CheckedFrame, view: View) -> dict[str, Any]:
     return {"number": of.number, **encoded}
 
 
-def _displayed(halves: tuple[F32, F32], view: View) -> U8:
+def _displayed(halves: tuple[F32, F32], view: ViewTransform) -> U8:
     shown: U8 = (view.encode((halves[0] + halves[1]) * np.float32(0.5)) * 255.0 + 0.5).astype(np.uint8)
     return shown
 

@@ -13,7 +13,7 @@ import numpy as np
 from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
 from enfilade.images.stills import encode_webp, resized
-from enfilade.images.view import View
+from enfilade.images.view import ViewTransform
 from enfilade.monitor import Monitor, Silence
 from enfilade.records import F32, U8
 from enfilade.reports.layers import LAYERS, Layer, painted, painted_difference
@@ -60,7 +60,12 @@ class Film:
     """
 
     def __init__(
-        self, run: ReportedRun, view: View, references: Sequence[Path], max_bytes: float, monitor: Monitor
+        self,
+        run: ReportedRun,
+        view: ViewTransform,
+        references: Sequence[Path],
+        max_bytes: float,
+        monitor: Monitor,
     ) -> None:
         self._run, self._view = run, view
         full = (run.viewing.width_px, run.viewing.height_px)

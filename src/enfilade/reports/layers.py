@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.comparison import ComparedFrame
-from enfilade.images.view import View
+from enfilade.images.view import ViewTransform
 from enfilade.records import F32, U8, Provenance
 from enfilade.reports import heatmap
 from enfilade.reports.charts import PROVENANCE_COLORS
@@ -50,7 +50,7 @@ class Layer:
         return None if self.is_overlay else QUALITY
 
 
-def painted(frame: DeliveredFrame, view: View, viewing: Viewing) -> dict[str, U8]:
+def painted(frame: DeliveredFrame, view: ViewTransform, viewing: Viewing) -> dict[str, U8]:
     """Paint the layers of a frame: result, provenance and velocity, as far as its file has them.
 
     Parameters

@@ -150,7 +150,9 @@ def test_edges_matter_where_the_display_shows_them():
     color = np.zeros((H, W, 3), np.float32)
     color[:, 15:] = 0.05
     dark, bright, white = (
-        AdaptiveSampling(128, 0.02, 0.0, beneath=np.full((H, W), value, np.float32)).matters(color)
+        AdaptiveSampling(128, 0.02, 0.0, beneath=np.full((H, W), value, np.float32)).has_visible_contrast(
+            color
+        )
         for value in (0.0, 0.6, 2.0)
     )
     expected = np.zeros((H, W), bool)

@@ -74,7 +74,7 @@ def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
     )
     renderer, camera = opened_scene(tmp_path, MATERIALS, sky + bulbs), front_camera()
     assert dr.width(renderer.state[-1][0]) == 3  # sharp emitters beside the sun
-    ours = shaded(renderer, IrradianceCache(is_soft=True), camera, 256)
+    ours = shaded(renderer, IrradianceCache(soft_only=True), camera, 256)
     reference = traced(renderer, camera, 256)
     assert large_errors(renderer, camera, ours, reference) == {}
 
@@ -89,7 +89,7 @@ def test_highlights_of_sharp_emitters_are_counted_once(tmp_path):
 
         return estimated(radiance, camera, 16)[0].color.reshape(-1, 3)[is_metal]
 
-    assert seen(IrradianceCache(is_soft=True)).max() > 0.2
+    assert seen(IrradianceCache(soft_only=True)).max() > 0.2
     assert not seen(EMPTY).any()
 
 

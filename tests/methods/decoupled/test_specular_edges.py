@@ -74,7 +74,7 @@ def test_edges_of_glossy_surfaces_are_those_of_path_tracing(tmp_path, monkeypatc
     error = edge_error(renderer)
     assert error < 0.06
     # The centres of pixels alone give aliased edges.
-    monkeypatch.setattr(AdaptiveSampling, "matters", lambda *_: np.zeros(SIZE[::-1], bool))
+    monkeypatch.setattr(AdaptiveSampling, "has_visible_contrast", lambda *_: np.zeros(SIZE[::-1], bool))
     assert error < 0.5 * edge_error(renderer)
 
 

@@ -58,7 +58,7 @@ class AdaptiveSampling:
         tolerance = times * displayed_tolerance(settings.quality)
         return AdaptiveSampling(settings.edge_spp, tolerance, exposure_ev, beneath)
 
-    def matters(self, color: F32) -> Mask:
+    def has_visible_contrast(self, color: F32) -> Mask:
         """Pixels whose 3x3 neighbourhood spans more than twice the tolerance, as it is displayed, (H, W)."""
         shape = color.shape[0], color.shape[1]
         pixel = dr.arange(UInt, shape[0] * shape[1])

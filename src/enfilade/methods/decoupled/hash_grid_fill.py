@@ -11,7 +11,7 @@ from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
-from enfilade.methods.decoupled.virtual_images import SHARP
+from enfilade.methods.decoupled.virtual_images import IMAGING
 from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
 from enfilade.renderer import PixelFilter, Purpose
 
@@ -31,9 +31,9 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common
-    is_sharp = np.isin(geometry.surface, SHARP).ravel()
+    forms_image = np.isin(geometry.surface, IMAGING).ravel()
     with_virtual = replace(cache, hash_grid=virtual.upload())
-    for pixels, known in ((~is_sharp, cache), (is_sharp, with_virtual)):
+    for pixels, known in ((~forms_image, cache), (forms_image, with_virtual)):
         specular = shot.estimate(
             camera,
             pixels,

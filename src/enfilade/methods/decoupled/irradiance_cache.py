@@ -43,7 +43,7 @@ class IrradianceCache:
     weights : tuple of Float
         One an image, for surfaces that several of them show.
     hash_grid : HashGrid or None
-    is_soft : bool
+    soft_only : bool
         Whether the images are without next-event estimates of emitters that cast sharp shadows.
     path_guide : PathGuide or None
         Of paths that estimate irradiance.
@@ -53,7 +53,7 @@ class IrradianceCache:
     images: tuple[UploadedImage, ...] = ()
     weights: tuple[Any, ...] = ()
     hash_grid: HashGrid | None = None
-    is_soft: bool = False
+    soft_only: bool = False
     path_guide: PathGuide | None = None
 
     @staticmethod
@@ -63,12 +63,12 @@ class IrradianceCache:
         hash_grid: HashGrid | None = None,
         *,
         view: UploadedImage | None = None,
-        is_soft: bool = False,
+        soft_only: bool = False,
         path_guide: PathGuide | None = None,
     ) -> IrradianceCache:
         """A cache of some images with their weights."""
         own = tuple(opaque(float(weight)) for weight in weights)
-        return IrradianceCache(view, tuple(images), own, hash_grid, is_soft, path_guide)
+        return IrradianceCache(view, tuple(images), own, hash_grid, soft_only, path_guide)
 
     def lookup_in_view(self, position: Any, normal: Any, shape_index: Any) -> tuple[Any, Any]:
         """The same as :meth:`lookup`, from the image in the view of the camera."""

@@ -132,7 +132,7 @@ class PathKernels:
         sharp: tuple[Any, ...] = ()
         is_seen = path.bounce is None
         direct = self._renderer.coat_emission(point) if is_seen else Array3f(0)
-        if cache.is_soft:  # the camera sees the highlights of sharp emitters, too
+        if cache.soft_only:  # the camera sees the highlights of sharp emitters, too
             sampler = path.sampler.fork(SHARP_SALT)
             reflected_sharp, highlights = self._renderer.sharp_light(point, sampler, specular=is_seen)
             sharp, direct = (reflected_sharp,), direct + highlights
@@ -165,7 +165,7 @@ class PathKernels:
 
         # Intersect, and sample a specular lobe.
         point = self._renderer.intersect(path.rays, path.bounce, path.is_active)
-        soft_only = cache.is_soft and path.bounce is None  # the rest is in the diffuse image
+        soft_only = cache.soft_only and path.bounce is None  # the rest is in the diffuse image
         sample = self._renderer.sample_specular(point, sampler, branch=path.branch, soft_only=soft_only)
 
         # Extend the path; a broad lobe widens it.

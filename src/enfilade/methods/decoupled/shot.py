@@ -174,7 +174,7 @@ class ShotContext:
             *filled_up,
             self.hash_grid(frame),
             view=reprojected,
-            is_soft=self.renderer.has_sharp_light,
+            soft_only=self.renderer.has_sharp_light,
             path_guide=self._path_guide(*nearest(self.walk.path, self.keyframes, frame, 1)),
         )
 

@@ -98,9 +98,11 @@ def shade_specular(
     # Choose the edges: those in mirrors and panes, surfaces that centres miss, and those between surfaces
     # where the AOVs differ visibly. Aliasing is more visible than noise: its tolerance is a third of that of
     # noise.
-    matters = AdaptiveSampling.of(shot.walk, times=SPECULAR_CONTRAST, beneath=beneath).matters
+    has_visible_contrast = AdaptiveSampling.of(
+        shot.walk, times=SPECULAR_CONTRAST, beneath=beneath
+    ).has_visible_contrast
     shown = np.sum([to_float(aov.color) for aov in aovs], axis=0)
-    edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & matters(shown))
+    edges = in_mirrors | is_missed | (where & (is_edge | is_thin) & has_visible_contrast(shown))
     if not edges.any():
         return SpecularShading(aovs, nowhere, no_variance, count)
 

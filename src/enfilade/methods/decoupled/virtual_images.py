@@ -26,7 +26,7 @@ __all__ = ["IN_VIRTUAL_IMAGE", "VirtualImages"]
 
 IN_VIRTUAL_IMAGE = np.uint32(1 << 30)  # added to the index of shapes seen in mirrors or through glass
 CLEAR = SurfaceClass.TRANSPARENT
-SHARP = (SurfaceClass.MIRROR, CLEAR)
+IMAGING = (SurfaceClass.MIRROR, CLEAR)
 SKY_DISTANCE = 1e4  # of the sky seen in a mirror, in distances of the mirror
 CHOICES = REFLECT, TRANSMIT = 0.000001, 0.999999  # random numbers that select the lobe: one an image
 MAX_INTERFACES = 8  # mirrors and panes along a path
@@ -55,7 +55,7 @@ class VirtualImages:
         # Spawn a path at each mirror and pane, and another one at each pane: lanes of the second image.
         count = geometry.shape_index.size
         surface = geometry.surface.ravel()
-        lane = np.flatnonzero(np.concatenate([np.isin(surface, SHARP), surface == CLEAR])).astype(np.uint32)
+        lane = np.flatnonzero(np.concatenate([np.isin(surface, IMAGING), surface == CLEAR])).astype(np.uint32)
         if not len(lane):
             return [geometry, geometry]
         shape_index = np.tile(geometry.shape_index.ravel(), 2)
@@ -105,8 +105,8 @@ class VirtualImages:
         """
         ends: list[Path] = []
         chosen = dr.full(Float, choice, dr.width(path.lane))
-        for ahead, shape_index, *_, is_image, is_sharp in self._interfaces(path, chosen):
-            ends.append(compact(ahead, dr.compress(is_image & ~is_sharp & (shape_index > 0))))
+        for ahead, shape_index, *_, is_image, forms_image in self._interfaces(path, chosen):
+            ends.append(compact(ahead, dr.compress(is_image & ~forms_image & (shape_index > 0))))
         return merged(ends)
 
     def _interfaces(self, path: Path, choice: Any) -> Iterator[tuple[Path, Any, Any, Any, Any, Any]]:
@@ -118,8 +118,8 @@ class VirtualImages:
             dr.eval(choice)
             found = self._extend(path, choice)
             yield found
-            ahead, *_, is_sharp = found
-            path = compact(ahead, dr.compress(is_sharp))
+            ahead, *_, forms_image = found
+            path = compact(ahead, dr.compress(forms_image))
             if not dr.width(path.lane):
                 break
             # A pane seen in a mirror shows the surface behind it.
@@ -135,7 +135,7 @@ class VirtualImages:
             Of the following surface.
         is_image : Bool
             Whether the interface forms an image.
-        is_sharp : Bool
+        forms_image : Bool
             Whether the following surface may form another one.
         """
         # Scatter.
@@ -148,15 +148,22 @@ class VirtualImages:
 
         # Intersect.
         surfaces = self._renderer.intersect(ahead.rays, ahead.bounce).surfaces
-        is_sharp = Bool(False)
-        for sharp in SHARP:
-            is_sharp |= surfaces.surface == int(sharp)
+        forms_image = Bool(False)
+        for kind in IMAGING:
+            forms_image |= surfaces.surface == int(kind)
         shape_index = dr.select(surfaces.is_hit, surfaces.shape_index, 0)
         # Give the sky a single normal, so that the filter treats it as one surface.
         normal = dr.select(surfaces.is_hit, surfaces.normal, Array3f(0.0, 0.0, 1.0))
         is_image = sample.is_alive & sample.is_image
-        is_sharp &= surfaces.is_hit & is_image
-        return ahead, shape_index, Array3f(normal), Float(surfaces.distance), Bool(is_image), Bool(is_sharp)
+        forms_image &= surfaces.is_hit & is_image
+        return (
+            ahead,
+            shape_index,
+            Array3f(normal),
+            Float(surfaces.distance),
+            Bool(is_image),
+            Bool(forms_image),
+        )
 
 
 def _lengths(camera: Camera) -> npt.NDArray[np.float32]:

@@ -37,7 +37,7 @@ CLEAR = {"SmoothDielectric", "ThinDielectric"}
 GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24
 # Largest roughness (alpha) of a lobe that shows images: it blurs them by 0.3 degrees.
-SHARP_ALPHA = 0.0025
+IMAGING_ALPHA = 0.0025
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
 ALBEDO_SAMPLES, ALBEDO_SEED = 1 << 18, 1
@@ -365,11 +365,11 @@ def _is_narrow(bsdf: Any) -> bool:
     if bsdf.class_name() == "Principled":
         is_metal = _constant(bsdf, "metallic") == 1.0 and _constant(bsdf, "clearcoat") == 0.0
         alpha = _constant(bsdf, "roughness") ** 2
-        return (is_metal or _rough_ior(bsdf) > 0.0) and alpha <= SHARP_ALPHA
+        return (is_metal or _rough_ior(bsdf) > 0.0) and alpha <= IMAGING_ALPHA
     if bsdf.class_name() not in {"RoughConductor", "RoughDielectric"}:
         return False
     return any(
-        all(_constant(bsdf, name) <= SHARP_ALPHA for name in names)
+        all(_constant(bsdf, name) <= IMAGING_ALPHA for name in names)
         for names in (("alpha",), ("alpha_u", "alpha_v"))
     )
 

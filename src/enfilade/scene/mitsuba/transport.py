@@ -56,7 +56,7 @@ class LightTransport:
         direction = mi.DirectionSample3f(self._scene, si, origin)
         emitter_pdf = self._scene.pdf_emitter_direction(origin, direction, ~bounce.is_delta)
         apart = self.sharp_emitters.pdf(emitter, direction.d, emitter_pdf)
-        emitter_pdf = dr.select(bounce.is_soft, apart, emitter_pdf)
+        emitter_pdf = dr.select(bounce.soft_only, apart, emitter_pdf)
         return Array3f(emitted * dr.select(bounce.is_delta, 1.0, mis_weight(bounce.pdf, emitter_pdf)))
 
     def estimate(self, sample: BsdfSample, sampler: Any, path_depth: int) -> tuple[Any, Any]:
