@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
+from enfilade.arrays import Array3f, Bool, UInt, lanes, opaque, rows
 from enfilade.kernels.guiding import LEAST_ODDS, OCTANTS, REGIONS, PathGuide
 from enfilade.kernels.random import samplers
 from enfilade.kernels.rays import camera_rays, pixel_centres, points_at
@@ -147,7 +147,7 @@ def find_regions(
 
     # Take pixels at equal distances in the image.
     pixels = pixels[np.linspace(0, len(pixels) - 1, PIXELS).astype(np.int64)]
-    depths = Float(geometry.depth.ravel()[pixels])
+    depths = lanes(geometry.depth.ravel()[pixels])
     position = rows(points_at(geometry.camera, depths, lanes(pixels)))
     normal = geometry.normal.reshape(-1, 3)[pixels]
 

@@ -21,7 +21,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, Float, UInt
+from enfilade.arrays import Bool, Float, UInt, lanes
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe, registry_index
@@ -286,7 +286,7 @@ class Lobes:
         count = np.bincount(entry, minlength=size)
         total = np.bincount(entry, np.array(value)[valid], minlength=size)
         mean = np.where(count >= MIN_ALBEDO_SAMPLES, total / np.maximum(count, 1), 1.0)
-        return Float(mean.astype(np.float32))
+        return lanes(mean.astype(np.float32))
 
     def _reflectance(self, si: Any, bsdf: Any, wo: Any) -> Any:
         """Probability with which the sample of a rough interface reflects, at the facet that it met."""

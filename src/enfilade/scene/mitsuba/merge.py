@@ -17,6 +17,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from enfilade.arrays import lanes
 from enfilade.errors import SceneError
 from enfilade.records import F32, U32
 
@@ -215,14 +216,14 @@ def _merged(name: str, items: Sequence[_Placed]) -> Any:
     bases = np.cumsum([0, *counts[:-1]]).astype(np.uint32)
     parameters = mi.traverse(mesh)
     for key, (_, width) in items[0].buffers.items():
-        values: Any = mi.Float(np.concatenate([_values(item, key).ravel() for item in items]))
+        values = lanes(np.concatenate([_values(item, key).ravel() for item in items]))
         if key in parameters:
             parameters[key] = values
         else:
             mesh.add_attribute(key, width, values)
     ends = np.cumsum([len(item.indices) for item in items])[:-1]
     faces = zip(items, np.split(bases, ends), strict=True)
-    parameters["faces"] = mi.UInt32(
+    parameters["faces"] = lanes(
         np.concatenate([(_faces(item) + b[:, None, None]).ravel() for item, b in faces])
     )
     parameters.update()

@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from enfilade.arrays import Bool, UInt
+from enfilade.arrays import Bool, UInt, lanes
 from enfilade.records import SurfaceClass
 from enfilade.scene.mitsuba.merge import MergedScene
 
@@ -43,14 +43,14 @@ class Shapes:
         first, count = np.zeros((2, max(registry) + 1), np.uint32)
         first[registry] = np.cumsum([0, *sizes[:-1]])
         count[registry] = sizes
-        self._index = UInt(np.concatenate([*merged.sources, [0]]).astype(np.uint32))  # two lanes at least
-        self._first, self._last = UInt(first), UInt(np.maximum(count, 1) - 1)
+        self._index = lanes(np.concatenate([*merged.sources, [0]]).astype(np.uint32))  # two lanes at least
+        self._first, self._last = lanes(first), lanes(np.maximum(count, 1) - np.uint32(1))
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
         self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
         lamps = np.zeros(max(registry) + 1, bool)
         has_media = any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy)
         lamps[registry] = [is_lamp(shape) and not has_media for shape in shapes]
-        self._is_lamp = Bool(lamps)
+        self._is_lamp = lanes(lamps)
         self.names = merged.names
         self.may_be_null = bool(dr.any(self._is_null))
         self.has_lamps = bool(lamps.any())
@@ -111,7 +111,7 @@ def bsdf_table(scene: Any, value: Callable[[Any], Any], kind: Any = Bool) -> Any
     registry = [registry_index(mi.BSDFPtr(bsdf)) for bsdf in bsdfs]
     table = np.array(kind(0)).repeat(max(registry, default=0) + 1)
     table[registry] = [value(bsdf) for bsdf in bsdfs]
-    return kind(table)
+    return lanes(table)
 
 
 def surface_class(flags: Any, is_narrow: Any, is_emitter: Any, is_hit: Any) -> Any:
