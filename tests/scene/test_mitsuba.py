@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from enfilade.arrays import Array3f
+from enfilade.arrays import ALIGNMENT, Array3f, Bool, Float, UInt
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.errors import SceneError
 from enfilade.gbuffer import find_geometry
@@ -305,3 +305,16 @@ def test_a_mesh_with_nan_vertices_is_refused(tmp_path):
     (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{shape}{light}</scene>')
     with pytest.raises(SceneError, match=r'scene\.xml .*OBJ file "door\.obj": .*invalid vertex position'):
         MitsubaRenderer(tmp_path / "scene.xml")
+
+
+def test_arrays_of_a_scene_are_aligned_like_those_of_dr_jit(corner):
+    # Kernels differ by the alignment of their inputs, which NumPy's memory has by chance.
+    def arrays(state):
+        if isinstance(state, tuple):
+            return [array for of in state for array in arrays(of)]
+        return [np.asarray(state)] if isinstance(state, Float | UInt | Bool) and len(state) > 1 else []
+
+    renderer, _ = corner
+    found = arrays((renderer._shapes.state, renderer._lobes.state, renderer._transport.sharp_emitters.state))
+    assert len(found) > 12
+    assert {array.ctypes.data % ALIGNMENT for array in found} == {0}
