@@ -16,7 +16,7 @@ from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 from enfilade.scene.mitsuba.sun import find_sun
 from support.integrated import shaded, standard_errors, traced
 from support.mitsuba_scene import opened as opened_file
-from support.mitsuba_scene import placed, write
+from support.mitsuba_scene import placed, rgb, write
 
 SUN = np.array([0.6, 0.64, 0.48])
 LAMP = """<emitter type="point"><rgb name="intensity" value="{0}"/>
@@ -242,3 +242,13 @@ def test_a_lamp_may_have_any_texture(tmp_path):
     renderer = opened_file(write(tmp_path, placed("rectangle", "wall", (0, 0, 5), "", 4.0), lamp, sky=""))
     assert renderer.has_sharp_light
     assert not len(renderer.photons().flux)
+
+
+def test_small_lamps_are_found_beside_instances(tmp_path):
+    # Mitsuba can't sample points on instances.
+    group = '<shape type="shapegroup" id="group"><shape type="sphere"/></shape>'
+    instance = '<shape type="instance"><ref id="group"/></shape>'
+    light = f'<emitter type="area">{rgb("radiance", 7, 7, 7)}</emitter>'
+    lamp = placed("rectangle", "lamp", (0, 0, 2), light, 0.01)
+    wall = placed("rectangle", "wall", (0, 0, 5), "", 4.0)
+    assert opened_file(write(tmp_path, group, instance, lamp, wall, sky="")).has_sharp_light

@@ -11,11 +11,10 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque
+from enfilade.arrays import Array3f, Bool, Float, UInt, lanes, opaque, rows
 from enfilade.kernels.random import BELOW_ONE, Discrete, one_sequence
 from enfilade.scene.mitsuba.resampling import MOST_CANDIDATES, Contributions, resample
 from enfilade.scene.mitsuba.shadow_rays import ShadowRays, Target
-from enfilade.scene.mitsuba.shapes import registry_index
 from enfilade.scene.mitsuba.sun import find_sun
 
 SHADOW_RAYS = 4  # beside that to the sun
@@ -209,26 +208,28 @@ def _number(emitter: Any) -> Any:
 
 
 def _are_small(scene: Any, emitters: Sequence[Any]) -> npt.NDArray[np.bool_]:
-    """Whether emitters (N,) are small shapes, seen from what they light; one launch for all."""
+    """Whether emitters (N,) are small shapes, seen from what they light; one launch finds all distances."""
     found = np.zeros(len(emitters), np.bool_)
     places = [place for place, emitter in enumerate(emitters) if emitter.get_shape() is not None]
     if not places:
         return found
     shapes = [emitters[place].get_shape() for place in places]
-    number = np.array([registry_index(mi.ShapePtr(shape)) for shape in shapes], np.uint32)
 
     # Trace rays from all of each shape, as a Lambertian emitter sends them.
     sampler = one_sequence(DISTANCE_RAYS)
-    position, direction = (
-        mi.Point2f(*(lanes(np.tile(np.array(axis), len(shapes))) for axis in sampler.next_2d()))
-        for _ in range(2)
+    position, direction = mi.Point2f(sampler.next_2d()), mi.Point2f(sampler.next_2d())
+    starts = [shape.sample_position(0.0, position) for shape in shapes]
+    wide = dr.zeros(Array3f, DISTANCE_RAYS)  # a flat shape has one normal
+    points, normals = (
+        np.concatenate([rows(wide + Array3f(getattr(start, axis))) for start in starts])
+        for axis in ("p", "n")
     )
-    pointers: Any = dr.reinterpret_array(mi.ShapePtr, lanes(np.repeat(number, DISTANCE_RAYS)))
-    start = pointers.sample_position(0.0, position)
-    local = mi.warp.square_to_cosine_hemisphere(direction)
-    si = dr.zeros(mi.SurfaceInteraction3f, len(shapes) * DISTANCE_RAYS)
-    si.p, si.n = start.p, start.n
-    hit = scene.ray_intersect(si.spawn_ray(mi.Frame3f(mi.Vector3f(start.n)).to_world(local)))
+    local = rows(Array3f(mi.warp.square_to_cosine_hemisphere(direction)))
+    si = dr.zeros(mi.SurfaceInteraction3f, len(points))
+    si.p, si.n = mi.Point3f(lanes(points[None])), mi.Normal3f(lanes(normals[None]))
+    frame = mi.Frame3f(mi.Vector3f(si.n))
+    towards = frame.to_world(mi.Vector3f(lanes(np.tile(local, (len(shapes), 1))[None])))
+    hit = scene.ray_intersect(si.spawn_ray(towards))
 
     # Compare their widths with the mean distances.
     distance = np.array(dr.select(hit.is_valid(), hit.t, 0.0)).reshape(len(shapes), DISTANCE_RAYS)
