@@ -26,7 +26,7 @@ FLAG = re.compile(r"(?<![\w!-])--[a-z][a-z0-9-]*")
 FLAGS_OF_OTHER_PROGRAMS = {
     "podman": "--cap-drop --memory --network --pids-limit --read-only --rm --security-opt --tmpfs --volume",
     "openjd": "--run-dependencies",
-    "make bench": "--scenes --keep",
+    "make bench": "--scenes --keep --quick --sizes",
     "make case-studies": "--scenes --items --preset",
     "benchmarks/faults.py": "--count --quick",
 }
