@@ -77,6 +77,7 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
 
     activate("gpu" if is_gpu else "cpu")
     from enfilade.scene.mitsuba.files import check_scene
+    from enfilade.scene.mitsuba.load import OUT_OF_MEMORY
     from enfilade.scene.mitsuba.renderer import MitsubaRenderer
 
     if not is_gpu:  # CUDA maps the memory of the GPU into the address space
@@ -89,7 +90,7 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
     except SceneError as error:
         answer["error"] = str(error)
     except RuntimeError as error:  # of Mitsuba
-        if "alloc" in str(error):
+        if any(words in str(error).lower() for words in OUT_OF_MEMORY):
             raise
         answer["error"] = f"Mitsuba can't render {scene}: {error}"
     os.write(out, json.dumps(answer).encode())

@@ -14,7 +14,6 @@ lobe; it may be negative. A mask over a Lambertian BSDF has nothing but its null
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import drjit as dr
@@ -24,20 +23,25 @@ import numpy as np
 from enfilade.arrays import Bool, Float, UInt, lanes
 from enfilade.kernels.random import one_sequence
 from enfilade.renderer import Branch
+from enfilade.scene.mitsuba.bsdfs import (
+    base,
+    classes,
+    is_diffuse_on,
+    is_narrow,
+    is_turned,
+    mixes_delta_lobes,
+    rough_ior,
+)
 from enfilade.scene.mitsuba.shapes import bsdf_table, has_lobe, registry_index
 
 WHOLE = {"Principled", "PrincipledThin", "MaskBSDF", "Hair", "Measured", "PolarizedPlastic"}  # not split
-WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the BSDF nested in them
 # Attributes times these: shares of the base colour that the diffuse lobe does not reflect.
 NOT_DIFFUSE = {"metallic": 1.0, "spec_trans": 1.0, "diff_trans": 0.5}
 LAMBERTIAN = {"MaskBSDF", "TwoSidedBRDF", "SmoothDiffuse"}  # of these alone: Lambertian, perhaps masked
 
 COATED = {"SmoothPlastic", "TwoSidedBRDF"}  # of these alone: a smooth coat over a Lambertian lobe
 CLEAR = {"SmoothDielectric", "ThinDielectric"}
-GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
 ALMOST_ONE = 1.0 - 2.0**-24
-# Largest roughness (alpha) of a lobe that shows images: it blurs them by 0.3 degrees.
-IMAGING_ALPHA = 0.0025
 
 ALBEDO_BINS = 16  # of a BSDF's specular albedo, by the cosine of the viewer's direction, -1..1
 ALBEDO_SAMPLES, ALBEDO_SEED = 1 << 18, 1
@@ -60,26 +64,26 @@ class Lobes:
         self._diffuse, self._specular = mi.BSDFContext(), mi.BSDFContext()
         self._diffuse.type_mask = int(flags.Diffuse)
         self._specular.type_mask = int(flags.All) & ~int(flags.Diffuse)
-        self._whole = bsdf_table(scene, lambda bsdf: not _classes(bsdf).isdisjoint(WHOLE))
-        self._lambertian = bsdf_table(scene, lambda bsdf: _classes(bsdf).issubset(LAMBERTIAN))
+        self._whole = bsdf_table(scene, lambda bsdf: not classes(bsdf).isdisjoint(WHOLE))
+        self._lambertian = bsdf_table(scene, lambda bsdf: classes(bsdf).issubset(LAMBERTIAN))
         self._sides = (
-            bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.FrontSide)),
-            bsdf_table(scene, lambda bsdf: _is_diffuse_on(bsdf, flags.BackSide)),
+            bsdf_table(scene, lambda bsdf: is_diffuse_on(bsdf, flags.FrontSide)),
+            bsdf_table(scene, lambda bsdf: is_diffuse_on(bsdf, flags.BackSide)),
         )
-        self._masked = bsdf_table(scene, lambda bsdf: "MaskBSDF" in _classes(bsdf))
+        self._masked = bsdf_table(scene, lambda bsdf: "MaskBSDF" in classes(bsdf))
         self._has_masked = bool(dr.any(self._masked))
         self._bases = (
-            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(_base(bsdf, is_front=True))), UInt),
-            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(_base(bsdf, is_front=False))), UInt),
+            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(base(bsdf, is_front=True))), UInt),
+            bsdf_table(scene, lambda bsdf: registry_index(mi.BSDFPtr(base(bsdf, is_front=False))), UInt),
         )
-        self._turned = bsdf_table(scene, _is_turned)
+        self._turned = bsdf_table(scene, is_turned)
         self._clear = bsdf_table(scene, lambda bsdf: bsdf.class_name() in CLEAR)
-        self._rough_ior = bsdf_table(scene, _rough_ior, Float)
-        self._narrow = bsdf_table(scene, _is_narrow)
-        self._coated = bsdf_table(scene, lambda bsdf: _classes(bsdf) <= COATED)
+        self._rough_ior = bsdf_table(scene, rough_ior, Float)
+        self._narrow = bsdf_table(scene, is_narrow)
+        self._coated = bsdf_table(scene, lambda bsdf: classes(bsdf) <= COATED)
         self.has_coats = bool(dr.any(self._coated))
         self._has_whole = bool(dr.any(self._whole))
-        self._mixed = bsdf_table(scene, _mixes_delta_lobes)
+        self._mixed = bsdf_table(scene, mixes_delta_lobes)
         self._has_mixed = bool(dr.any(self._mixed))
         self._specular_albedo = self._mean_specular_albedo(scene)
 
@@ -328,80 +332,6 @@ def _number(bsdf: Any) -> Any:
 def _albedo_entry(number: Any, cosine: Any) -> Any:
     """Entries of the table of specular albedos; UInt."""
     return number * ALBEDO_BINS + UInt(dr.clip((0.5 + 0.5 * cosine) * ALBEDO_BINS, 0.0, ALBEDO_BINS - 1))
-
-
-def _classes(bsdf: Any) -> set[str]:
-    """Mitsuba's classes of a BSDF and of those nested in it."""
-    return {n.class_name() for n in mi.traverse(bsdf).hierarchy if isinstance(n, mi.BSDF)}
-
-
-def _nested(bsdf: Any) -> list[Any]:
-    """BSDFs nested directly in a BSDF."""
-    hierarchy = mi.traverse(bsdf).hierarchy.items()
-    return [node for node, (_, depth) in hierarchy if depth == 1 and isinstance(node, mi.BSDF)]
-
-
-def _constant(bsdf: Any, name: str) -> float:
-    """A parameter that is the same at all points; not a number if it is not, or if there is none."""
-    value = np.unique(np.array(mi.traverse(bsdf).get(f"{name}.value", [])))
-    return float(value[0]) if len(value) == 1 else math.nan
-
-
-def _rough_ior(bsdf: Any) -> float:
-    """Relative index of refraction of a rough interface; 0 of other BSDFs."""
-    is_glass = all(_constant(bsdf, name) == value for name, value in GLASS.items())
-    if not is_glass and bsdf.class_name() != "RoughDielectric":
-        return 0.0
-    parameters = mi.traverse(bsdf)
-    if "specular" in parameters:
-        return float(2.0 / (1.0 - math.sqrt(0.08 * parameters["specular"][0])) - 1.0)
-    return float(parameters["eta"][0])
-
-
-def _is_narrow(bsdf: Any) -> bool:
-    """Whether a BSDF is a metal or an interface with lobes that are narrow enough to show images."""
-    if bsdf.class_name() == "TwoSidedBRDF":
-        return all(map(_is_narrow, _nested(bsdf)))
-    if bsdf.class_name() == "Principled":
-        is_metal = _constant(bsdf, "metallic") == 1.0 and _constant(bsdf, "clearcoat") == 0.0
-        alpha = _constant(bsdf, "roughness") ** 2
-        return (is_metal or _rough_ior(bsdf) > 0.0) and alpha <= IMAGING_ALPHA
-    if bsdf.class_name() not in {"RoughConductor", "RoughDielectric"}:
-        return False
-    return any(
-        all(_constant(bsdf, name) <= IMAGING_ALPHA for name in names)
-        for names in (("alpha",), ("alpha_u", "alpha_v"))
-    )
-
-
-def _mixes_delta_lobes(bsdf: Any) -> bool:
-    """Whether a BSDF is or contains a blend of BSDFs, and has delta lobes."""
-    return "BlendBSDF" in _classes(bsdf) and has_lobe(bsdf.flags(), "Delta")
-
-
-def _is_turned(bsdf: Any) -> bool:
-    """Whether the base of a BSDF is below a two-sided BSDF, which turns directions to the front."""
-    if bsdf.class_name() in WRAPPERS:
-        return _is_turned(_nested(bsdf)[0])
-    is_two_sided = bsdf.class_name() == "TwoSidedBRDF"
-    return is_two_sided and any(side.class_name() in WRAPPERS for side in _nested(bsdf))
-
-
-def _base(bsdf: Any, *, is_front: bool) -> Any:
-    """The BSDF below masks and maps, and below a two-sided BSDF outside of these, on a side."""
-    if bsdf.class_name() in WRAPPERS:
-        return _base(_nested(bsdf)[0], is_front=is_front)
-    if _is_turned(bsdf):
-        return _base(_nested(bsdf)[0 if is_front else -1], is_front=True)
-    return bsdf
-
-
-def _is_diffuse_on(bsdf: Any, side: Any) -> bool:
-    """Whether a BSDF has a diffuse lobe on a side of the surface."""
-    parts = [bsdf.flags(i) for i in range(bsdf.component_count())]
-    return any(
-        has_lobe(part, "DiffuseReflection", "DiffuseTransmission") and part & int(side) for part in parts
-    )
 
 
 def _opacity(si: Any, bsdf: Any, active: Any) -> Any:

@@ -1,0 +1,90 @@
+"""What a Mitsuba BSDF is: its classes, the BSDFs nested in it, interfaces, and lobes that show images."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from enfilade.scene.mitsuba.shapes import has_lobe
+
+WRAPPERS = {"MaskBSDF", "BumpMap", "NormalMap"}  # their albedo is that of the BSDF nested in them
+GLASS = {"spec_trans": 1.0, "metallic": 0.0, "clearcoat": 0.0}  # parameters of a `principled` interface
+# Largest roughness (alpha) of a lobe that shows images: it blurs them by 0.3 degrees.
+IMAGING_ALPHA = 0.0025
+
+
+def classes(bsdf: Any) -> set[str]:
+    """Mitsuba's classes of a BSDF and of those nested in it."""
+    return {n.class_name() for n in mi.traverse(bsdf).hierarchy if isinstance(n, mi.BSDF)}
+
+
+def nested(bsdf: Any) -> list[Any]:
+    """BSDFs nested directly in a BSDF."""
+    hierarchy = mi.traverse(bsdf).hierarchy.items()
+    return [node for node, (_, depth) in hierarchy if depth == 1 and isinstance(node, mi.BSDF)]
+
+
+def constant(bsdf: Any, name: str) -> float:
+    """A parameter that is the same at all points; not a number if it is not, or if there is none."""
+    value = np.unique(np.array(mi.traverse(bsdf).get(f"{name}.value", [])))
+    return float(value[0]) if len(value) == 1 else math.nan
+
+
+def rough_ior(bsdf: Any) -> float:
+    """Relative index of refraction of a rough interface; 0 of other BSDFs."""
+    is_glass = all(constant(bsdf, name) == value for name, value in GLASS.items())
+    if not is_glass and bsdf.class_name() != "RoughDielectric":
+        return 0.0
+    parameters = mi.traverse(bsdf)
+    if "specular" in parameters:
+        return float(2.0 / (1.0 - math.sqrt(0.08 * parameters["specular"][0])) - 1.0)
+    return float(parameters["eta"][0])
+
+
+def is_narrow(bsdf: Any) -> bool:
+    """Whether a BSDF is a metal or an interface with lobes that are narrow enough to show images."""
+    if bsdf.class_name() == "TwoSidedBRDF":
+        return all(map(is_narrow, nested(bsdf)))
+    if bsdf.class_name() == "Principled":
+        is_metal = constant(bsdf, "metallic") == 1.0 and constant(bsdf, "clearcoat") == 0.0
+        alpha = constant(bsdf, "roughness") ** 2
+        return (is_metal or rough_ior(bsdf) > 0.0) and alpha <= IMAGING_ALPHA
+    if bsdf.class_name() not in {"RoughConductor", "RoughDielectric"}:
+        return False
+    return any(
+        all(constant(bsdf, name) <= IMAGING_ALPHA for name in names)
+        for names in (("alpha",), ("alpha_u", "alpha_v"))
+    )
+
+
+def mixes_delta_lobes(bsdf: Any) -> bool:
+    """Whether a BSDF is or contains a blend of BSDFs, and has delta lobes."""
+    return "BlendBSDF" in classes(bsdf) and has_lobe(bsdf.flags(), "Delta")
+
+
+def is_turned(bsdf: Any) -> bool:
+    """Whether the base of a BSDF is below a two-sided BSDF, which turns directions to the front."""
+    if bsdf.class_name() in WRAPPERS:
+        return is_turned(nested(bsdf)[0])
+    is_two_sided = bsdf.class_name() == "TwoSidedBRDF"
+    return is_two_sided and any(side.class_name() in WRAPPERS for side in nested(bsdf))
+
+
+def base(bsdf: Any, *, is_front: bool) -> Any:
+    """The BSDF below masks and maps, and below a two-sided BSDF outside of these, on a side."""
+    if bsdf.class_name() in WRAPPERS:
+        return base(nested(bsdf)[0], is_front=is_front)
+    if is_turned(bsdf):
+        return base(nested(bsdf)[0 if is_front else -1], is_front=True)
+    return bsdf
+
+
+def is_diffuse_on(bsdf: Any, side: Any) -> bool:
+    """Whether a BSDF has a diffuse lobe on a side of the surface."""
+    parts = [bsdf.flags(i) for i in range(bsdf.component_count())]
+    return any(
+        has_lobe(part, "DiffuseReflection", "DiffuseTransmission") and part & int(side) for part in parts
+    )
