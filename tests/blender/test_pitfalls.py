@@ -61,6 +61,14 @@ def test_an_image_is_read_by_its_content_not_by_its_name(exported):
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize(("name", "stored"), [("png", 255 * 0.5 * 0.4), ("exr", 0.2140)])
+def test_a_file_decides_on_alpha_and_its_colour_space_on_colours(shapes, name, stored):
+    # Cycles takes alpha of PNG files as straight, and decodes EXR files as they are told.
+    texture = mi.traverse(shapes[f"Contrary {name}"].bsdf())
+    data = next(value for key, value in texture if key.endswith("data"))
+    assert np.array(data)[..., :3].mean() == pytest.approx(stored, rel=0.01)
+
+
 def test_a_lamp_that_the_camera_sees_is_a_surface(exported, shapes):
     assert shapes["Panel"].is_emitter()
     assert shapes["Panel"].bsdf().class_name() == "SmoothDiffuse"

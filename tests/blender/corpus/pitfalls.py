@@ -32,6 +32,7 @@ def pitfalls(folder):
     _attributes_of_geometry()
     _named_by_default()
     _image_of_another_kind(folder)
+    _alpha_and_colours_against_the_file(folder)
     light("AREA", "Panel", (0.0, 2.9, 2.0), 50.0, target=(0.0, 0.0, 2.0)).visible_camera = True
 
 
@@ -137,3 +138,20 @@ def _image_of_another_kind(folder):
     (folder / "web.webp").rename(folder / "web.png")
     file = bpy.data.images.load(str(folder / "web.png"))
     cube("Web", (0.0, 1.5, 0.25), 0.5, shader("web", "BsdfDiffuse", Color=file)[0])
+
+
+def _alpha_and_colours_against_the_file(folder):
+    """A premultiplied PNG file of 0.5 and alpha 0.4, and an EXR file of 0.5 whose colour space is sRGB."""
+    for name, kind, settings in (("png", "PNG", {"alpha_mode": "PREMUL"}), ("exr", "OPEN_EXR", {})):
+        value = bpy.data.images.new(name, 8, 8, alpha=kind == "PNG", float_buffer=kind != "PNG")
+        value.colorspace_settings.name = "Non-Color"
+        value.pixels = 64 * [0.5, 0.5, 0.5, 0.4 if kind == "PNG" else 1.0]
+        value.file_format, value.filepath_raw = kind, str(folder / f"contrary.{name}")
+        value.save()
+        bpy.data.images.remove(value)
+        file = bpy.data.images.load(str(folder / f"contrary.{name}"))
+        file.colorspace_settings.name = "sRGB"
+        for key, mode in settings.items():
+            setattr(file, key, mode)
+        x = 1.0 if kind == "PNG" else 2.0
+        cube(f"Contrary {name}", (x, 1.5, 0.25), 0.5, shader(name, "BsdfDiffuse", Color=file)[0])
