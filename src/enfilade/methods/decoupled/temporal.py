@@ -33,6 +33,11 @@ MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another fram
 # counts as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal
 # edges.
 DISPLAYED_NOISE_SHARE = 0.5
+# The squared mean of samples over its variance: as many equal ones, beside black ones, have both. Below two,
+# one sample alone makes a pixel bright.
+MIN_EFFECTIVE_SAMPLES = 2.0
+SINGLE_WEIGHT = np.float32(0.05)  # of such a pixel beside those of other frames
+FIREFLY = 2.0  # times the average over time: brighter pixels of one sample are fireflies
 
 
 class TemporalAccumulation:
@@ -75,7 +80,9 @@ class TemporalAccumulation:
             deviation = to_float(shaded.deviation)
             here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
-            color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
+            color = accumulate_refined(
+                geometry, color, deviation, here, neighbours, exposure_ev=_exposure_ev(shot)
+            )
 
         # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
@@ -137,7 +144,10 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
 
 
 def accumulate_temporally(
-    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]]
+    geometry: Geometry,
+    here: UploadedImage,
+    others: Sequence[tuple[UploadedImage, float]],
+    own_weight: F32 | None = None,
 ) -> F32:
     """Average an AOV with that of neighbouring frames, reprojected along its own motion.
 
@@ -151,7 +161,9 @@ def accumulate_temporally(
     here
         The AOV of the frame.
     others
-        The same AOV of other frames, with weights relative to the frame's own.
+        The same AOV of other frames, with weights.
+    own_weight : (H, W) float32
+        Weights of the frame's own pixels, above 0; None for one.
 
     Returns
     -------
@@ -164,7 +176,8 @@ def accumulate_temporally(
     position = points_at(geometry.camera, here.depths)
     is_real = here.shape_indices < IN_VIRTUAL_IMAGE
     normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
-    total, weight = Array3f(color), dr.ones(Float, dr.width(color))
+    weight = dr.ones(Float, dr.width(color)) if own_weight is None else lanes(own_weight)
+    total = weight * color
     own = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, own)
     for other, given in others:
@@ -238,6 +251,7 @@ def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
 def accumulate_refined(
     geometry: Geometry,
     color: F32,
+    deviation: F32,
     here: UploadedImage,
     others: Sequence[tuple[UploadedImage, float]],
     *,
@@ -245,7 +259,8 @@ def accumulate_refined(
 ) -> F32:
     """Average the refined pixels of a frame with neighbouring frames.
 
-    Radiance above white stays: the sum of the frames' light is kept.
+    Radiance above white stays: the sum of the frames' light is kept. Only a pixel that one sample makes
+    bright, which the other frames do not confirm, has their average.
 
     Parameters
     ----------
@@ -253,6 +268,8 @@ def accumulate_refined(
         G-buffer of the frame.
     color : (H, W, 3) float32
         Linear radiance of the frame.
+    deviation : (H, W) float32
+        Standard deviation of the luminance; 0 where pixels are not refined.
     here, others
         Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
         to its own.
@@ -264,5 +281,11 @@ def accumulate_refined(
     (H, W, 3) float32
         Linear radiance; pixels that are not refined stay.
     """
-    change: F32 = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
-    return color + change * np.float32(2.0**-exposure_ev)
+    scale = np.float32(2.0**exposure_ev)
+    is_single = np.square(deviation) * MIN_EFFECTIVE_SAMPLES > np.square(luminance(color))
+    own_weight = np.where(is_single, SINGLE_WEIGHT, np.float32(1))
+    average = accumulate_temporally(geometry, here, others, own_weight)
+    own = image(here.values[0], *is_single.shape)
+    is_firefly = is_single & (luminance(own) > FIREFLY * luminance(average))
+    shown: F32 = np.where(is_firefly[..., None], average, color * scale + (average - own))
+    return shown / scale
