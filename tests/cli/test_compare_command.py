@@ -56,6 +56,14 @@ def test_a_table_and_heat_maps_in_a_folder(run, folders, tmp_path):
     assert colored[:, 55 * 8 :].mean() < 0.1
 
 
+def test_further_measures_are_printed(run, folders):
+    result = run("compare", *folders, "--flow", "none", "--measure", "psnr", "--measure", "flip")
+    scores = json.loads(run("compare", *folders, "--flow", "none", "--measure", "psnr", "--json").stdout)[
+        "scores"
+    ]
+    assert f"psnr {scores['psnr']:.4g} dB, flip 0." in result.stdout
+
+
 def captions_of(monkeypatch):
     written = []
     monkeypatch.setattr(

@@ -1,6 +1,6 @@
 """Tables have the figures of the summary, for any method."""
 
-from enfilade.reports.tables import comparison_table, percent, result_line, run_tables, seconds
+from enfilade.reports.tables import comparison_table, measures_line, percent, result_line, run_tables, seconds
 from support.console import as_text
 from support.synthetic_runs import synthetic_summary
 
@@ -41,6 +41,12 @@ def test_comparison():
     assert "identical" not in text
     assert text.count("infinite") == 2
     assert result_line(found) == "1.00 JND (noticed); 2.0 % of the pixels above 1 JND"
+
+
+def test_further_measures_have_their_units():
+    scores = {"psnr": None, "cvvdp": 9.3124, "flip": 0.01234, "mine": 1.0}
+    assert measures_line({"scores": scores}) == "psnr infinite, cvvdp 9.312 JOD, flip 0.01234, mine 1"
+    assert measures_line({"scores": {}}) == ""
 
 
 def test_numbers():

@@ -260,9 +260,8 @@ def _picture(painter: HeatmapPainter, frame: ComparedFrame) -> Any:
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
 
-    from enfilade.reports.tables import comparison_table, result_line
+    from enfilade.reports.tables import comparison_table, measures_line, result_line
 
-    click.echo(result_line(found))
-    if found["noise_note"]:
-        click.echo(found["noise_note"])
+    for line in filter(None, (result_line(found), found["noise_note"], measures_line(found))):
+        click.echo(line)
     Console().print(comparison_table(found))

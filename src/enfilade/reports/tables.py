@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 WORST_FRAMES = 8  # of a comparison
+UNITS = {"psnr": " dB", "cvvdp": " JOD"}  # of further measures
 
 
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
@@ -68,6 +69,13 @@ def result_line(found: Mapping[str, Any]) -> str:
     return f"{found['score_jnd']:.2f} JND ({found['meaning']}); {visible} % of the pixels above 1 JND"
 
 
+def measures_line(found: Mapping[str, Any]) -> str:
+    """Results of the further measures of a comparison in one line; empty where there are none."""
+    return ", ".join(
+        f"{name} {_figure(score, UNITS.get(name, ''))}" for name, score in found["scores"].items()
+    )
+
+
 def comparison_table(found: Mapping[str, Any]) -> Table:
     """Frames with the largest differences, and the whole sequence; of ``SequenceDifference.to_dict()``."""
     from enfilade.comparison import short_name
@@ -119,6 +127,10 @@ def seconds(value: float) -> str:
 def _difference(row: Mapping[str, Any], visible: float) -> list[str]:
     scores = [f"{row[key]:.3f}" for key in ("score_jnd", "steady_jnd", "transient_jnd")]
     return [*scores, percent(visible), psnr_text(row).removesuffix(" dB"), f"{row['velocity_deg_s']:.2f}"]
+
+
+def _figure(value: float | None, unit: str) -> str:
+    return "infinite" if value is None else f"{value:.4g}{unit}"
 
 
 def _table(title: str, columns: Iterable[str]) -> Table:
