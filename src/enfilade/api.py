@@ -208,6 +208,8 @@ def compare(
     ------
     ImageError
         A sequence can't be read, or the two can't be compared.
+    SettingsError
+        There is no such mode, flow or measure.
     """
     from enfilade.comparison import CompareOptions
     from enfilade.comparison import compare as compare_sequences

@@ -1,6 +1,7 @@
 """``enfilade compare`` on images from a folder."""
 
 import json
+from typing import get_args
 
 import av
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from PIL import Image
 
 from enfilade.cli.compare import command
-from enfilade.comparison import FlowChoice
+from enfilade.comparison.compare import Mode
+from enfilade.comparison.motion import FlowChoice
 from enfilade.images import encode_video, open_sequence, write_exr
 from enfilade.reports.heatmap import HeatmapPainter
 from enfilade.settings import VideoSettings
@@ -138,8 +140,9 @@ def test_both_modes(run, folders):
 
 def test_what_help_lists_is_what_there_is(run):
     # --help loads no NumPy, so it can't ask
-    (flow,) = (option for option in command.params if option.name == "flow")
-    assert tuple(choice.value for choice in FlowChoice) == tuple(flow.type.choices)
+    listed = {option.name: option.type for option in command.params}
+    for name, known in (("mode", Mode), ("flow", FlowChoice)):
+        assert tuple(listed[name].choices) == get_args(known)
     output = " ".join(run("compare", "--help").output.split())
     listed = run("compare", "--display", "list")
     assert listed.exit_code == 0

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from enfilade.comparison import compare
-from enfilade.errors import ImageError, InputError
+from enfilade.comparison import CompareOptions, compare
+from enfilade.errors import ImageError, InputError, SettingsError
 from enfilade.metric import SequenceAqm
 from enfilade.viewing import display_named
 from support.sequences import SIZE, Notes, compared, terms, textured
@@ -181,3 +181,9 @@ def test_what_the_metric_refuses_names_the_frame(sequence, monkeypatch):
     monkeypatch.setattr(SequenceAqm, "compare", refuse)
     with pytest.raises(ImageError, match=r"0001\.exr can't be compared: metric: no"):
         compared(folder, folder)
+
+
+@pytest.mark.parametrize(("name", "value"), [("flow", "no"), ("mode", "moden")])
+def test_an_unknown_mode_or_flow_is_refused_with_the_known_ones(name, value):
+    with pytest.raises(SettingsError, match=f"{name} = '{value}': choose one of "):
+        CompareOptions(**{name: value})

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from enfilade.comparison import CompareOptions, FlowChoice, SequenceDifference, compare
+from enfilade.comparison import CompareOptions, SequenceDifference, compare
 from enfilade.images import write_exr
 from enfilade.monitor import Silence
 from enfilade.runs.identity import FORMAT
@@ -82,7 +82,7 @@ def terms(
     **fields: Any,
 ) -> CompareOptions:
     metric = MetricSettings.from_table({"metering": metering, "mask_slope": mask_slope})
-    return CompareOptions(metric=metric, mode=mode, flow=FlowChoice(flow), **fields)
+    return CompareOptions(metric=metric, mode=mode, flow=flow, **fields)
 
 
 def compared(

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,6 +18,8 @@ from enfilade.settings import SECTIONS, MetricSettings, ViewingSettings
 
 if TYPE_CHECKING:
     from enfilade.comparison import ComparedFrame, CompareOptions, Show
+    from enfilade.comparison.compare import Mode
+    from enfilade.comparison.motion import FlowChoice
     from enfilade.reports.heatmap import HeatmapPainter
     from enfilade.viewing import Display, Viewing
 
@@ -152,12 +154,12 @@ def _options(
     *,
     display: str | None,
     fps: float | None,
-    mode: str,
+    mode: Mode,
     measures: tuple[str, ...],
-    flow: str,
+    flow: FlowChoice,
     layers: tuple[str, ...],
 ) -> CompareOptions:
-    from enfilade.comparison import CompareOptions, FlowChoice
+    from enfilade.comparison import CompareOptions
 
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
@@ -167,8 +169,8 @@ def _options(
         viewing=viewing,
         metric=settings[MetricSettings],
         display=None if display is None else _display(ctx, display, viewing),
-        mode=cast('Literal["modern", "paper"]', mode),
-        flow=FlowChoice(flow),
+        mode=mode,
+        flow=flow,
         fps=fps,
         exposure_ev=viewing.exposure_ev if "exposure_ev" in given_in(ctx, ViewingSettings) else None,
         layers=(layers[0], layers[-1]) if layers else (None, None),

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from enfilade.comparison.compare import ComparedFrame, CompareOptions, Show, compare
 from enfilade.comparison.measures.psnr import psnr_db
-from enfilade.comparison.motion import FlowChoice
 from enfilade.comparison.result import FrameDifference, SequenceDifference, short_name
 
 __all__ = [
     "CompareOptions",
     "ComparedFrame",
-    "FlowChoice",
     "FrameDifference",
     "SequenceDifference",
     "Show",

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -16,13 +16,15 @@ from enfilade.comparison.noise import NoiseFloor
 from enfilade.comparison.noise_estimate import NoiseEstimator
 from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.result import FrameDifference, SequenceDifference
-from enfilade.errors import ImageError, InputError
+from enfilade.errors import ImageError, InputError, SettingsError
 from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Aqm, Comparison, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.settings import MetricSettings, ViewingSettings
 from enfilade.viewing import Display, Viewing
+
+Mode: TypeAlias = Literal["modern", "paper"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +69,9 @@ class CompareOptions:
     display
         Replaces `viewing`: images stand pixel for pixel on a display.
     mode
-        Of the metric.
+        Of the metric: ``modern`` or ``paper``.
     flow
-        Origin of the motion vectors.
+        Origin of the motion vectors: ``auto``, ``layers``, ``estimate`` or ``none``.
     fps
         Frames per second shown; by default the reference's, the test's, or 30.
     exposure_ev
@@ -79,17 +81,27 @@ class CompareOptions:
     measures
         Further measures: ``psnr``, ``flip``, ``cvvdp``, or a :class:`~enfilade.comparison.measures.Measure`
         of your own.
+
+    Raises
+    ------
+    SettingsError
+        There is no such mode or flow.
     """
 
     viewing: ViewingSettings = field(default_factory=ViewingSettings)
     metric: MetricSettings = field(default_factory=MetricSettings)
     display: Display | None = None
-    mode: Literal["modern", "paper"] = "modern"
-    flow: FlowChoice = FlowChoice.AUTO
+    mode: Mode = "modern"
+    flow: FlowChoice = "auto"
     fps: float | None = None
     exposure_ev: float | None = None
     layers: tuple[str | None, str | None] = (None, None)
     measures: Sequence[str | Measure] = ()
+
+    def __post_init__(self) -> None:
+        for name, known in (("mode", get_args(Mode)), ("flow", get_args(FlowChoice))):
+            if (value := getattr(self, name)) not in known:
+                raise SettingsError(f"{name} = {value!r}: choose one of {', '.join(known)}")
 
     def conditions(self, size: tuple[int, int], fps: float) -> Viewing:
         """Viewing conditions of an image of a size."""

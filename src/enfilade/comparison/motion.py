@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +18,7 @@ from enfilade.metric.transient import moved
 from enfilade.records import F32, U8, Flow
 
 Layers = Mapping[str, npt.NDArray[Any]]
+FlowChoice: TypeAlias = Literal["auto", "layers", "estimate", "none"]
 
 CUT_DIFFERENCE = 0.1  # mean change of encoded luminance, 0..1: a cut, where backward motion is not known
 RESTING_DIFFERENCE = 0.02  # ... where it is known to be none: in a shot, the camera rests
@@ -43,15 +43,6 @@ class Moved:
     motion: F32 | None = None
     backward: F32 | None = None
     is_cut: bool = False
-
-
-class FlowChoice(Enum):
-    """Choice of the image flow."""
-
-    AUTO = "auto"
-    LAYERS = "layers"
-    ESTIMATE = "estimate"
-    NONE = "none"
 
 
 class Motion(Protocol):
@@ -82,7 +73,7 @@ def open_motion(
     ----------
     test, reference
     choice
-        ``AUTO`` takes layers where there are some and estimates otherwise.
+        ``auto`` takes layers where there are some and estimates otherwise.
     starts
         Indices of the frames that do not follow the one before; None: the flow and the images tell.
 
@@ -91,17 +82,17 @@ def open_motion(
     ImageError
         Layers are asked for, and neither sequence has any that are known.
     """
-    if choice in (FlowChoice.AUTO, FlowChoice.LAYERS):
+    if choice in ("auto", "layers"):
         for sequence, role in ((reference, "reference"), (test, "test")):
             kind = _kind_of(sequence)
             if kind is not None:
                 return _FromLayers(sequence, kind, role, starts)
-    if choice is FlowChoice.LAYERS:
+    if choice == "layers":
         raise ImageError(
             f"neither {reference.name(0)} nor {test.name(0)} has layers of image flow; known are: "
             f"{'; '.join(kind.text for kind in KINDS)}. --flow estimate needs none"
         )
-    if choice is FlowChoice.NONE:
+    if choice == "none":
         return _Still("image flow: none; the sequences are compared as static", starts)
     if len(reference) == 1:
         return _Still("image flow: none in a single image; it is compared as static", starts)
