@@ -239,6 +239,13 @@ def test_where_there_is_little_room_frames_are_left_out_evenly(runs):
     assert size <= 1.1 * most
 
 
+def test_no_frame_is_left_out_where_scaling_is_enough(runs, monkeypatch):
+    whole = film_of(runs / "run", 1e9)[1]
+    monkeypatch.setattr("enfilade.reports.film.LEAST_WIDTH_PX", 16)
+    for part in np.linspace(0.2, 0.7, 20):
+        assert len(film_of(runs / "run", part * whole)[0].frames) == 10
+
+
 def test_wide_pictures_are_scaled(runs, monkeypatch):
     monkeypatch.setattr("enfilade.reports.film.WIDEST_PX", 32)
     film, _ = film_of(runs / "run", 1e9)

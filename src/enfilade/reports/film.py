@@ -106,9 +106,9 @@ class Film:
         total = each * len(self._run.there)
         if total <= most:
             return 1
-        factor = max(math.sqrt(most / total), min(1.0, LEAST_WIDTH_PX / self.size[0]))
-        self.size = _scaled(self.size, factor)
-        return max(1, math.ceil(total * factor**2 / most))
+        factor, least = math.sqrt(most / total), min(1.0, LEAST_WIDTH_PX / self.size[0])
+        self.size = _scaled(self.size, max(factor, least))
+        return 1 if factor >= least else math.ceil(total * least**2 / most)
 
     def _compare(self, references: Sequence[Path], kept: set[int], monitor: Monitor) -> dict[str, Any]:
         """Compare all finished frames with the references, and add those that are kept."""
