@@ -129,19 +129,21 @@ def test_a_cut_between_shots_that_move_is_found_without_flow_to_the_last_frame(s
     assert min(f.steady.score for f in found.frames) > 0.1
 
 
-def test_the_last_frame_moves_as_the_one_before_where_it_tells_nothing(tmp_path):
-    images = [textured(-4.0 * f) for f in range(4)]
+def test_a_frame_without_motion_came_as_the_one_before_and_then_rests(tmp_path):
+    places = [0, 4, 8, 12, 12, 12]
+    images = [textured(-float(place)) for place in places]
     faulty = [image.copy() for image in images]
-    for f, image in enumerate(faulty):
-        image[10:30, 10 + 4 * f : 30 + 4 * f] *= 0.8  # on its surface
+    for place, image in zip(places, faulty, strict=True):
+        image[10:30, 10 + place : 30 + place] *= 0.8  # on its surface
     for name, frames in (("t", faulty), ("r", images)):
         for number, image in enumerate(frames):
             motion = moving_right(4.0 if number < 3 else 0.0)
             (tmp_path / name).mkdir(exist_ok=True)
             write_exr(tmp_path / name / f"{number:04}.exr", {"RGB": image, **motion})
     found = compared(tmp_path / "t", tmp_path / "r")
-    assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 4, abs=1e-3)
-    assert found.frames[3].velocity_deg_s == pytest.approx(found.frames[2].velocity_deg_s)
+    assert [f.transient.score for f in found.frames] == pytest.approx([0.0] * 6, abs=1e-3)
+    fast = found.frames[2].velocity_deg_s
+    assert [f.velocity_deg_s for f in found.frames] == pytest.approx([*[fast] * 4, 0.0, 0.0])
 
 
 def test_motion_that_changes_the_whole_image_is_no_cut(sequence):

@@ -188,11 +188,11 @@ class _FromLayers:
         before: F32 | None = None
         last: Flow | None = None
         for pair in pairs:
-            flow = self._read(pair.index)
+            read = flow = self._read(pair.index)
             if self._kind.is_forward_only and last is not None and not flow.has_forward:
                 # The last frame of a shot tells no motion: what came to it moved as in the frame before.
                 flow = replace(flow, backward=last.backward, has_backward=last.has_backward)
-            last = flow
+            last = read
             now = srgb_encode(pair.reference_relative)
             is_cut = before is not None and self._is_cut(pair.index, flow, now, before)
             yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
