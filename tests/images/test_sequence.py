@@ -94,9 +94,11 @@ def test_a_run_states_its_rate_and_where_shots_begin(tmp_path, selected, cuts, s
     path = {"fps": 23.976, "frames": None if selected is None else list(selected), "cuts": cuts}
     (tmp_path / "run.json").write_text(json.dumps({"identity": {"path": path}}))
     (tmp_path / "job.json").write_text(json.dumps({"settings": {"viewing": {"exposure_ev": 1.5}}}))
-    run = open_sequence(tmp_path)
-    assert means(run) == [1, 2, 5, 11]
-    assert (run.fps, run.exposure_ev, run.numbers, run.starts) == (23.976, 1.5, (1, 2, 5, 11), starts)
+    for folder in (tmp_path, tmp_path / "frames"):
+        run = open_sequence(folder)
+        assert means(run) == [1, 2, 5, 11]
+        assert (run.fps, run.exposure_ev, run.numbers, run.starts) == (23.976, 1.5, (1, 2, 5, 11), starts)
+        assert run.identity == {"path": path}
     part = open_sequence(tmp_path / "frames" / "00*1.exr")  # has the rate and exposure of its run
     assert (means(part), part.fps, part.exposure_ev, part.numbers) == ([1, 11], 23.976, 1.5, (1, 11))
     assert part.starts == (None if starts is None else {1})
@@ -121,6 +123,8 @@ def test_sources_that_are_not_there_are_named(tmp_path):
     Image.new("RGB", (6, 4)).save(tmp_path / "2.png")
     with pytest.raises(ImageError, match=r"\(#\.exr, #\.png\)"):
         open_sequence(tmp_path)
+    with pytest.raises(ImageError, match=r"/\* matches OpenEXR files \(1\.exr\) and others \(2\.png\)"):
+        open_sequence(tmp_path / "*")
 
 
 def test_frames_are_read_one_by_one_and_errors_name_the_frame(tmp_path):

@@ -54,9 +54,8 @@ def open_sequence(source: Path | str, *, layer: str | None = None) -> Sequence:
     files = files_of(path)
     if not files:
         raise ImageError(f"there is no file, folder or pattern with files {path}")
-    numbers = None if path.is_file() else _numbers(files)
-    home = files[0].parent
-    return _of_run(files, home.parent if home.name == FRAMES else home, numbers, layer)
+    _check_one_kind(path, files)
+    return _of_run(files, None if path.is_file() else _numbers(files), layer)
 
 
 def files_of(source: Path | str) -> list[Path]:
@@ -65,7 +64,7 @@ def files_of(source: Path | str) -> list[Path]:
     if path.is_dir():
         folder = _image_folder(path)
         # The frames of a run are OpenEXR files; a heatmap may be written beside them.
-        return _images(folder.glob("*" if folder == path else "*.exr"))
+        return _images(folder.glob("*.exr" if (_home(folder) / RUN_FILE).is_file() else "*"))
     if path.is_file():
         return [path]
     if not path.parent.is_dir():
@@ -81,19 +80,24 @@ def _image_folder(folder: Path) -> Path:
     return folder / FRAMES if (folder / RUN_FILE).is_file() else folder
 
 
+def _home(images: Path) -> Path:
+    """The folder of the run, if the images of a folder are of one."""
+    images = images.absolute()
+    return images.parent if images.name == FRAMES else images
+
+
 def _from_folder(folder: Path, layer: str | None) -> ImageFiles:
     files = files_of(folder)
     if not files:
         raise ImageError(f"{_image_folder(folder)} has no images of {', '.join(sorted(SUFFIXES))} in it")
     _check_one_sequence(files)
-    return _of_run(files, folder, _numbers(files), layer)
+    return _of_run(files, _numbers(files), layer)
 
 
-def _of_run(
-    files: list[Path], folder: Path, numbers: tuple[int, ...] | None, layer: str | None
-) -> ImageFiles:
-    """Images with the frame rate, exposure, shots and identity of the run in a folder, if there is one."""
-    run, job_file = folder / RUN_FILE, folder / JOB_FILE
+def _of_run(files: list[Path], numbers: tuple[int, ...] | None, layer: str | None) -> ImageFiles:
+    """Images with the frame rate, exposure, shots and identity of their run, if they are of one."""
+    home = _home(files[0].parent)
+    run, job_file = home / RUN_FILE, home / JOB_FILE
     identity = value_at(read_json(run), "identity") if run.is_file() else None
     job = read_json(job_file) if run.is_file() and job_file.is_file() else None
     return ImageFiles(
@@ -115,6 +119,15 @@ def _check_one_sequence(files: list[Path]) -> None:
         raise ImageError(
             f"{folder} has images whose names differ in more than a number ({listed}); give a pattern of one "
             f"sequence, such as {folder}/{patterns[0]} or {folder}/*{files[0].suffix}"
+        )
+
+
+def _check_one_kind(pattern: Path, files: list[Path]) -> None:
+    kinds = {file.suffix.lower() == ".exr": file.name for file in files}
+    if len(kinds) > 1:
+        raise ImageError(
+            f"{pattern} matches OpenEXR files ({kinds[True]}) and others ({kinds[False]}), which are not one "
+            "sequence; give a pattern with the suffix of one kind"
         )
 
 
