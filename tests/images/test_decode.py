@@ -78,6 +78,24 @@ def test_rgb_is_exact(tmp_path, name):
 
 
 @pytest.mark.parametrize(
+    ("name", "codec", "suffix"),
+    [("yuva444p", "ffv1", "mkv"), ("gbrap12le", "ffv1", "mkv"), ("yuva444p10le", "prores_ks", "mov")],
+)
+def test_transparent_frames_are_refused(tmp_path, name, codec, suffix):
+    pixels = np.full((48, 64, 4), 65535, np.uint16)
+    file = tmp_path / f"a.{suffix}"
+    for alpha in (65535, 32768):
+        pixels[20, 30, 3] = alpha
+        frame = av.VideoFrame.from_ndarray(pixels, format="rgba64le").reformat(format=name)
+        sequence = open_sequence(written(file, frame, codec=codec))
+        if alpha == 65535:
+            assert len(list(sequence)) == 2
+        else:
+            with pytest.raises(ImageError, match=r"frame 1 of .* has transparent pixels; put it over a back"):
+                list(sequence)
+
+
+@pytest.mark.parametrize(
     ("name", "value", "message"),
     [
         *(("color_trc", value, name) for value, name in ((16, "PQ"), (18, "HLG"), (9, "logarithmic"))),

@@ -84,6 +84,10 @@ class VideoFile:
                         f"frame {done + 1} of {self.file} has {frame.width}x{frame.height} pixels, not "
                         f"{self.width}x{self.height}"
                     )
+                if _is_transparent(frame):
+                    raise ImageError(
+                        f"{self.name(done)} has transparent pixels; put it over a background first"
+                    )
                 encoded = _encoded_rgb(self.file, frame)
                 yield encoded if self._is_linear else srgb_decode(encoded)
                 done += 1
@@ -120,6 +124,12 @@ def _shown_frames(file: Path, container: Any, stream: Any) -> int:
                 "write or copy it again"
             )
     return len(times)
+
+
+def _is_transparent(frame: Any) -> bool:
+    if not any(component.is_alpha for component in frame.format.components):
+        return False
+    return bool((frame.reformat(format="rgba").to_ndarray()[..., 3] < np.iinfo(np.uint8).max).any())
 
 
 def _encoded_rgb(file: Path, frame: Any) -> F32:
