@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import struct
 from fractions import Fraction
 
 import numpy as np
@@ -64,6 +65,15 @@ def test_same_input_same_bytes_and_attributes(tmp_path):
     write_exr(tmp_path / "b.exr", NOISE, attributes=dict(reversed(values.items())))
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
     assert read_attributes(tmp_path / "a.exr") == values
+
+
+def test_a_rate_over_zero_is_damage(tmp_path):
+    file = tmp_path / "a.exr"
+    write_exr(file, NOISE, attributes={"framesPerSecond": Fraction(24000, 1001)})
+    rate = struct.pack("<iI", 24000, 1001)
+    file.write_bytes(file.read_bytes().replace(rate, struct.pack("<iI", 24000, 0)))
+    with pytest.raises(ImageError, match=r"a\.exr is cut off or damaged"):
+        read_attributes(file)
 
 
 def test_a_file_that_is_cut_off_is_refused_by_name(tmp_path, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 
 import numpy as np
 import OpenEXR
@@ -106,6 +107,17 @@ def test_a_run_states_its_rate_and_where_shots_begin(tmp_path, selected, cuts, s
     assert (means(one), one.exposure_ev) == ([5], 1.5)
     (tmp_path / "run.json").write_text("[1]")  # of another program
     assert open_sequence(tmp_path).fps is None
+
+
+def test_frames_state_their_rate_where_no_run_does(tmp_path):
+    rgb = {"RGB": np.zeros((4, 6, 3), np.float16)}
+    rates = {Fraction(24000, 1001): 24000 / 1001, Fraction(0): None, "24": None, None: None}
+    for index, (rate, fps) in enumerate(rates.items()):
+        file = tmp_path / f"{index}.exr"
+        write_exr(file, rgb, attributes=None if rate is None else {"framesPerSecond": rate})
+        assert open_sequence(file).fps == fps
+    (tmp_path / "run.json").write_text(json.dumps({"identity": {"path": {"fps": 30.0}}}))
+    assert open_sequence(tmp_path / "0.exr").fps == 30.0
 
 
 def test_sources_that_are_not_there_are_named(tmp_path):

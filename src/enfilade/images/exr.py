@@ -227,7 +227,7 @@ def _failures(file: Path) -> Iterator[None]:
     try:
         with contextlib.redirect_stdout(sys.stderr):
             yield
-    except (RuntimeError, ValueError, TypeError, KeyError) as error:
+    except (RuntimeError, ValueError, TypeError, KeyError, ZeroDivisionError) as error:
         _read(file)  # OpenEXR does not report errors of the disk
         raise _damaged(file, str(error)) from error
 

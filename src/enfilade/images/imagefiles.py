@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ class ImageFiles:
     files : list of Path
         In order, at least one.
     fps : float or None
-        Mean frames per second, None if unknown.
+        Mean frames per second; by default ``framesPerSecond`` of the first OpenEXR file. None if unknown.
     exposure_ev : float or None
         Stops with which a run's frames are shown, which are scene-linear; None if it is no run.
     numbers : tuple of int or None
@@ -65,7 +66,10 @@ class ImageFiles:
         self._last: tuple[Path | None, dict[str, Any]] = None, {}  # OpenEXR frame read last
         self._beauty = self.note = ""
         if self.files[0].suffix.lower() == ".exr":
-            _check_primaries(self.files[0])
+            attributes = read_attributes(self.files[0])
+            _check_primaries(self.files[0], attributes)
+            if self.fps is None:
+                self.fps = _fps_of(attributes)
             self._beauty, self.note = choose_layer(self.files[0], self.layer)
         self.height, self.width = self._read(self.files[0]).shape[:2]
 
@@ -103,8 +107,13 @@ class ImageFiles:
         return beauty(file, self._layers_of(file), self._beauty)
 
 
-def _check_primaries(file: Path) -> None:
-    stated = read_attributes(file).get("chromaticities")
+def _fps_of(attributes: Mapping[str, Any]) -> float | None:
+    rate = attributes.get("framesPerSecond")
+    return float(rate) if isinstance(rate, Fraction) and rate > 0 else None
+
+
+def _check_primaries(file: Path, attributes: Mapping[str, Any]) -> None:
+    stated = attributes.get("chromaticities")
     if stated is None:
         return
     values = np.ravel(np.asarray(stated, np.float64))
