@@ -17,7 +17,6 @@ from enfilade.comparison.noise_estimate import NoiseEstimator
 from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.result import FrameDifference, SequenceDifference
 from enfilade.errors import ImageError, InputError, SettingsError
-from enfilade.kernels.tone import srgb_encode
 from enfilade.metric import Aqm, Comparison, SequenceAqm
 from enfilade.monitor import Monitor
 from enfilade.records import F32
@@ -38,19 +37,14 @@ class ComparedFrame:
     difference : FrameDifference
     jnd : (H, W) float32
         Map of visible differences.
-    reference_relative : (H, W) float32
-        Luminance of the reference, 1 = white.
+    grey : (H, W) float32
+        Luminance of the reference, encoded for an sRGB display, 0..1.
     """
 
     index: int
     difference: FrameDifference
     jnd: F32
-    reference_relative: F32
-
-    @property
-    def grey(self) -> F32:
-        """The reference, encoded for a display, (H, W) float32, 0..1."""
-        return srgb_encode(self.reference_relative)
+    grey: F32
 
 
 Show = Callable[[Iterator[ComparedFrame], Viewing], object]
@@ -212,10 +206,10 @@ class _Comparer:
             of_halves = _compared(self._aqm_of_floor, pair.halves, moved, velocity)
             self._floor.append((of_halves.score, of_halves.percent_visible, pair.halves.squared_error))
         for measure, values in self._measures:
-            values.append(measure.measure(pair.displayed))
+            values.append(measure.measure(pair))
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
         difference = _difference(pair, found, speed)
-        return ComparedFrame(pair.index, difference, found.jnd, pair.reference_relative)
+        return ComparedFrame(pair.index, difference, found.jnd, pair.reference_grey)
 
     def noise_floor(self) -> NoiseFloor | None:
         if not self._floor:
@@ -232,8 +226,8 @@ class _Comparer:
 def _compared(aqm: SequenceAqm, pair: Pair, moved: Moved, velocity: F32 | None) -> Comparison:
     try:
         return aqm.compare(
-            pair.test,
-            pair.reference,
+            pair.test_cd_m2,
+            pair.reference_cd_m2,
             velocity=velocity,
             backward_flow_px=moved.backward,
             is_cut=moved.is_cut,

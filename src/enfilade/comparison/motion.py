@@ -13,7 +13,6 @@ from enfilade.comparison.optical_flow import FlowEstimator
 from enfilade.comparison.pairs import Pair
 from enfilade.errors import ImageError
 from enfilade.images import Sequence
-from enfilade.kernels.tone import srgb_encode
 from enfilade.metric.transient import moved
 from enfilade.records import F32, U8, Flow
 
@@ -193,7 +192,7 @@ class _FromLayers:
                 # The last frame of a shot tells no motion: what came to it moved as in the frame before.
                 flow = replace(flow, backward=last.backward, has_backward=last.has_backward)
             last = read
-            now = srgb_encode(pair.reference_relative)
+            now = pair.reference_grey
             is_cut = before is not None and self._is_cut(pair.index, flow, now, before)
             yield pair, Moved(flow.motion, None if is_cut else flow.backward, is_cut)
             before = now
@@ -237,7 +236,7 @@ class _Estimated:
         before = now = None
         waiting: Pair | None = None
         for pair in pairs:
-            after = self._estimator.luma(pair.reference_relative)
+            after = self._estimator.luma(pair.reference_grey)
             if waiting is not None and now is not None:
                 yield waiting, self._moved(waiting.index, now, before, after)
             waiting, before, now = pair, now, after
@@ -263,7 +262,7 @@ class _Still:
         """Pairs without motion. Where no run tells, a cut is where the image changes altogether."""
         before: F32 | None = None
         for pair in pairs:
-            now = srgb_encode(pair.reference_relative)
+            now = pair.reference_grey
             yield pair, Moved(is_cut=self._is_cut(pair.index, now, before))
             before = now
 

@@ -21,7 +21,7 @@ from scipy.ndimage import convolve
 from enfilade.comparison.motion import Moved
 from enfilade.comparison.noise import NoiseEstimate
 from enfilade.comparison.pairs import Pair
-from enfilade.kernels.tone import srgb_decode, srgb_encode
+from enfilade.kernels.tone import srgb_decode
 from enfilade.metric import Aqm, sequence_score
 from enfilade.metric.transient import moved
 from enfilade.records import F32
@@ -72,7 +72,7 @@ class NoiseEstimator:
         """
         if not {pair.index, pair.index + 1} & self._chosen:
             return
-        image = srgb_encode(pair.reference_relative).astype(np.float32)
+        image = pair.reference_grey
         last, self._last = self._last, image
         if last is None or motion.is_cut or pair.index not in self._chosen or np.array_equal(image, last):
             return
@@ -95,7 +95,7 @@ class NoiseEstimator:
             for _ in range(2)
         )
         change = noisy - before if self._aqm.has_transient else None
-        return self._aqm.compare(noisy, pair.reference, velocity=velocity, change=change).score
+        return self._aqm.compare(noisy, pair.reference_cd_m2, velocity=velocity, change=change).score
 
     def _noise(self, image: F32, sigma: float) -> F32:
         return np.float32(sigma) * self._random.standard_normal(image.shape, np.float32)

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from enfilade.errors import InputError
-from enfilade.kernels.tone import srgb_encode
 from enfilade.records import F32, U8, Flow
 
 WIDEST_PX = 1024  # larger images are halved before the search: 0.1 s a flow at most
@@ -51,23 +50,22 @@ class FlowEstimator:
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._grid = _grid(self._reduced_size)
 
-    def luma(self, linear: F32) -> U8:
-        """Image as the search takes it: 8 bits, encoded as for a screen, at its own size.
+    def luma(self, grey: F32) -> U8:
+        """Image as the search takes it: 8 bits, at its own size.
 
         Parameters
         ----------
-        linear : (H, W) float32
-            Relative luminance, 1 = white; clipped.
+        grey : (H, W) float32
+            Luminance, encoded for an sRGB display, 1 = white; clipped.
 
         Raises
         ------
         InputError
             The image has another size than was announced.
         """
-        if linear.shape != self._size[::-1]:
-            raise InputError(f"flow: the image has shape {linear.shape}, not {self._size[::-1]}")
-        encoded = srgb_encode(np.clip(linear, 0.0, 1.0))
-        levels: U8 = np.rint(encoded * np.float32(255.0)).astype(np.uint8)
+        if grey.shape != self._size[::-1]:
+            raise InputError(f"flow: the image has shape {grey.shape}, not {self._size[::-1]}")
+        levels: U8 = np.rint(np.clip(grey, 0.0, 1.0) * np.float32(255.0)).astype(np.uint8)
         if self._reduced_size != self._size:
             levels = np.asarray(
                 cv2.resize(levels, self._reduced_size, interpolation=cv2.INTER_AREA), np.uint8

@@ -21,17 +21,17 @@ from enfilade.comparison.matching import (
     note_on_paths,
     note_on_seeds,
 )
-from enfilade.comparison.measures.displayed import DisplayedPair
+from enfilade.comparison.measures.displayed import DisplayedPair, on_screen
 from enfilade.errors import ImageError
 from enfilade.images import open_sequence
-from enfilade.kernels.tone import display_luminance, srgb_encode
+from enfilade.kernels.tone import luminance, srgb_encode
 from enfilade.monitor import Monitor
 from enfilade.records import F32
 from enfilade.viewing import Viewing
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class Pair(DisplayedPair):
     """One frame of each sequence, as the display shows them.
 
     Attributes
@@ -42,12 +42,8 @@ class Pair:
         Of the test's frame.
     number : int
         Of the test's frame; counted from 1 where it has none of its own.
-    test, reference : (H, W) float32
-        Luminance, cd/m2.
-    reference_relative : (H, W) float32
-        Of the reference, 1 = white.
-    exposed_test, exposed_reference : (H, W, 3) float32
-        Linear Rec.709 after exposure and clipping, 0..1.
+    reference_grey : (H, W) float32
+        Luminance of the reference, 1 = white, encoded for an sRGB display.
     is_identical : bool
         Whether no channel of any pixel differs, before clipping.
     halves : Pair or None
@@ -58,11 +54,7 @@ class Pair:
     index: int
     name: str
     number: int
-    test: F32
-    reference: F32
-    reference_relative: F32
-    exposed_test: F32
-    exposed_reference: F32
+    reference_grey: F32
     is_identical: bool
     halves: Pair | None = None
 
@@ -73,22 +65,11 @@ class Pair:
         With two references A and B, the mean of (test - A)(test - B): their independent noise averages out
         of it. It is negative where that noise hides the error.
         """
-        if np.array_equal(self.exposed_test, self.exposed_reference):
+        if np.array_equal(self.test, self.reference):
             return 0.0
-        against = [self.exposed_reference]
-        if self.halves is not None:
-            against = [self.halves.exposed_test, self.halves.exposed_reference]
-        test = srgb_encode(self.exposed_test)
-        errors = [test - srgb_encode(reference) for reference in against]
+        against = [self.reference] if self.halves is None else [self.halves.test, self.halves.reference]
+        errors = [self.test - reference for reference in against]
         return float(np.vdot(errors[0], errors[-1])) / errors[0].size
-
-    @property
-    def displayed(self) -> DisplayedPair:
-        """The pair for further measures."""
-        test, reference = (
-            srgb_encode(image).astype(np.float32) for image in (self.exposed_test, self.exposed_reference)
-        )
-        return DisplayedPair(test, reference, self.test, self.reference)
 
 
 class Pairs:
@@ -182,22 +163,17 @@ class Pairs:
         return replace(pair, halves=halves, is_identical=is_identical)
 
     def _of_two(self, index: int, test: F32, reference: F32, viewing: Viewing) -> Pair:
-        exposed = [np.clip(image, 0.0, 1.0) for image in (test, reference)]
-        relative = [
-            display_luminance(image, exposure_ev=0.0, peak_cd_m2=1.0, black_cd_m2=0.0) for image in exposed
-        ]
-        span, black = np.float32(viewing.peak_cd_m2 - viewing.black_cd_m2), np.float32(viewing.black_cd_m2)
-        shown = [image * span + black for image in relative]
+        shown = [on_screen(image, viewing) for image in (test, reference)]
         numbers = self.test.numbers
         return Pair(
+            test=shown[0][0],
+            reference=shown[1][0],
+            test_cd_m2=shown[0][1],
+            reference_cd_m2=shown[1][1],
             index=index,
             name=self.test.name(index),
             number=index + 1 if numbers is None else numbers[index],
-            test=shown[0],
-            reference=shown[1],
-            reference_relative=relative[1],
-            exposed_test=exposed[0],
-            exposed_reference=exposed[1],
+            reference_grey=srgb_encode(luminance(np.clip(reference, 0.0, 1.0))),
             is_identical=np.array_equal(test, reference),
         )
 

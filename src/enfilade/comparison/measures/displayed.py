@@ -53,13 +53,15 @@ def display_pair(test: F32, reference: F32, viewing: Viewing, *, exposure_ev: fl
             raise InputError(f"the {name} has shape {image.shape}; the viewing conditions ask for {shape}")
         if not np.isfinite(image).all():
             raise InputError(f"the {name} holds pixels that are NaN or infinite; it can't be compared")
-    of_test, of_reference = (_on_screen(image, viewing, exposure_ev) for image in (test, reference))
+    exposed = (image * np.float32(2.0**exposure_ev) for image in (test, reference))
+    of_test, of_reference = (on_screen(image, viewing) for image in exposed)
     return DisplayedPair(of_test[0], of_reference[0], of_test[1], of_reference[1])
 
 
-def _on_screen(linear: F32, viewing: Viewing, exposure_ev: float) -> tuple[F32, F32]:
-    exposed = np.clip(linear * np.float32(2.0**exposure_ev), 0.0, 1.0)
+def on_screen(exposed: F32, viewing: Viewing) -> tuple[F32, F32]:
+    """An exposed image, (H, W, 3) linear Rec.709, encoded for an sRGB display, and its luminance, cd/m2."""
+    clipped = np.clip(exposed, 0.0, 1.0)
     luminance = display_luminance(
-        exposed, exposure_ev=0.0, peak_cd_m2=viewing.peak_cd_m2, black_cd_m2=viewing.black_cd_m2
+        clipped, exposure_ev=0.0, peak_cd_m2=viewing.peak_cd_m2, black_cd_m2=viewing.black_cd_m2
     )
-    return srgb_encode(exposed).astype(np.float32), luminance
+    return srgb_encode(clipped), luminance
