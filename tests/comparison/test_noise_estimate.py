@@ -107,7 +107,8 @@ def test_noise_that_hardly_matters_is_not_mentioned(sequence):
     assert found.noise_note == ""
 
 
-def test_nothing_is_said_without_motion(sequence):
+def test_nothing_is_estimated_without_motion(sequence, monkeypatch):
+    monkeypatch.delattr("enfilade.comparison.noise_estimate.noise_sigma")
     frames = frames_with(0.03, 2)
     for reference in (sequence("one", frames[:1]), sequence("several", frames)):
         found = compared(reference, reference, flow="none")

@@ -12,7 +12,7 @@ import numpy as np
 
 from enfilade.comparison.measures import Measure, open_measure
 from enfilade.comparison.motion import FlowChoice, Moved, open_motion
-from enfilade.comparison.noise import NoiseFloor
+from enfilade.comparison.noise import NoiseEstimate, NoiseFloor
 from enfilade.comparison.noise_estimate import NoiseEstimator
 from enfilade.comparison.pairs import Pair, open_pairs
 from enfilade.comparison.result import FrameDifference, SequenceDifference
@@ -156,7 +156,7 @@ def compare(
         )
     for note in notes:
         monitor.message(note)
-    comparer = _Comparer(conditions, options, len(pairs))
+    comparer = _Comparer(conditions, options, len(pairs), is_moving=motion.kind != "none")
     found: list[FrameDifference] = []
 
     def compared() -> Iterator[ComparedFrame]:
@@ -178,12 +178,12 @@ def compare(
         motion.kind,
         scores=comparer.scores(),
         noise_floor=comparer.noise_floor(),
-        noise_estimate=None if motion.kind == "none" else comparer.noise.estimate(),
+        noise_estimate=comparer.noise_estimate(),
     )
 
 
 class _Comparer:
-    def __init__(self, viewing: Viewing, options: CompareOptions, count: int) -> None:
+    def __init__(self, viewing: Viewing, options: CompareOptions, count: int, *, is_moving: bool) -> None:
         self._viewing = viewing
         pursuit = options.metric.metering
         if options.mode == "paper":
@@ -192,7 +192,7 @@ class _Comparer:
             aqm = Aqm.modern(viewing, pursuit=pursuit)
         self._aqm, self._aqm_of_floor = SequenceAqm(aqm), SequenceAqm(aqm)
         self._floor: list[tuple[float, float, float]] = []  # score, percent visible, squared error
-        self.noise = NoiseEstimator(aqm, viewing, count)
+        self._noise = NoiseEstimator(aqm, viewing, count) if is_moving else None
         self.bands_cpd = aqm.bands_cpd
         opened = [open_measure(m, viewing) if isinstance(m, str) else m for m in options.measures]
         self._measures: list[tuple[Measure, list[float | None]]] = [(measure, []) for measure in opened]
@@ -200,11 +200,11 @@ class _Comparer:
     def compare(self, pair: Pair, moved: Moved) -> ComparedFrame:
         velocity = None if moved.motion is None else self._viewing.velocity_deg_s(moved.motion)
         found = _compared(self._aqm, pair, moved, velocity)
-        if pair.halves is None:
-            self.noise.add(pair, moved, velocity)
-        else:
+        if pair.halves is not None:
             of_halves = _compared(self._aqm_of_floor, pair.halves, moved, velocity)
             self._floor.append((of_halves.score, of_halves.percent_visible, pair.halves.squared_error))
+        elif self._noise is not None:
+            self._noise.add(pair, moved, velocity)
         for measure, values in self._measures:
             values.append(measure.measure(pair))
         speed = 0.0 if velocity is None else float(np.hypot(velocity[..., 0], velocity[..., 1]).mean())
@@ -218,6 +218,9 @@ class _Comparer:
         return NoiseFloor(
             scores, percent_visible=float(np.mean(visible)), squared_error=float(np.mean(squared))
         )
+
+    def noise_estimate(self) -> NoiseEstimate | None:
+        return None if self._noise is None else self._noise.estimate()
 
     def scores(self) -> dict[str, float]:
         return {measure.name: measure.pool(values) for measure, values in self._measures}
