@@ -229,3 +229,13 @@ def test_a_run_says_where_shots_begin_and_what_is_missing(tmp_path, flow):
         found = compared(test, reference, flow=flow)
         transients.append([f.transient.score > 0.1 for f in found.frames])
     assert transients == [[False, False, True, False], [False, False, True, True]]
+
+
+@pytest.mark.parametrize("flow", ["estimate", "none"])
+def test_a_light_that_goes_on_in_a_shot_of_a_run_is_no_cut(tmp_path, flow):
+    images = [textured(level=level) for level in (0.1, 0.1, 0.6, 0.6)]
+    test = write_run(tmp_path / "t", flickering(images), (1, 2, 3, 4))
+    reference = write_run(tmp_path / "r", images, (1, 2, 3, 4))
+    transient = [f.transient.score for f in compared(test, reference, flow=flow).frames]
+    assert transient[0] == 0.0
+    assert min(transient[1:]) > 0.5

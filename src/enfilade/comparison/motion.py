@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.comparison.matching import is_exr
 from enfilade.comparison.optical_flow import FlowEstimator
 from enfilade.comparison.pairs import Pair
 from enfilade.errors import ImageError
@@ -95,7 +96,7 @@ def open_motion(
         return _Still("image flow: none; the sequences are compared as static", starts)
     if len(reference) == 1:
         return _Still("image flow: none in a single image; it is compared as static", starts)
-    return _Estimated(reference.width, reference.height, starts or frozenset())
+    return _Estimated(reference.width, reference.height, starts)
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ KINDS = (
 
 
 def _kind_of(sequence: Sequence) -> _Kind | None:
-    if not sequence.name(0).lower().endswith(".exr"):
+    if not is_exr(sequence):
         return None
     layers = sequence.layers(0)
     return next((kind for kind in KINDS if kind.read(layers) is not None), None)
@@ -161,7 +162,12 @@ def _blocks(image: F32) -> F32:
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
 
 
-def _change(image: F32, before: F32, backward: F32) -> float:
+def _change(image: F32, before: F32) -> float:
+    """Mean change of blocks since the last frame."""
+    return float(np.abs(_blocks(image - before)).mean())
+
+
+def _change_along(image: F32, before: F32, backward: F32) -> float:
     """Mean change of blocks since the last frame, fetched along a flow, where that stays in the image."""
     fetched, is_inside = moved(before, backward)
     covered = float(_blocks(is_inside.astype(np.float32)).mean())
@@ -201,8 +207,8 @@ class _FromLayers:
         if self._starts is not None:
             return index in self._starts
         if self._kind.is_forward_only:
-            return _change(now, before, flow.backward) > CUT_DIFFERENCE
-        return not flow.has_backward and _change(now, before, flow.backward) > RESTING_DIFFERENCE
+            return _change_along(now, before, flow.backward) > CUT_DIFFERENCE
+        return not flow.has_backward and _change(now, before) > RESTING_DIFFERENCE
 
     def _read(self, index: int) -> Flow:
         name = self._sequence.name(index)
@@ -223,7 +229,7 @@ class _FromLayers:
 class _Estimated:
     kind = "estimate"
 
-    def __init__(self, width: int, height: int, starts: frozenset[int]) -> None:
+    def __init__(self, width: int, height: int, starts: frozenset[int] | None) -> None:
         self._estimator = FlowEstimator(width, height)
         self._starts = starts
         self.text = (
@@ -244,10 +250,11 @@ class _Estimated:
             yield waiting, self._moved(waiting.index, now, before, None)
 
     def _moved(self, index: int, now: U8, before: U8 | None, after: U8 | None) -> Moved:
-        previous = None if index in self._starts else before
-        following = None if index + 1 in self._starts else after
+        starts = self._starts or frozenset()
+        previous = None if index in starts else before
+        following = None if index + 1 in starts else after
         flow = self._estimator.flow(now, previous, following)
-        is_cut = index > 0 and not flow.has_backward
+        is_cut = index > 0 and not flow.has_backward if self._starts is None else index in starts
         return Moved(flow.motion, flow.backward if flow.has_backward else None, is_cut)
 
 
@@ -269,5 +276,4 @@ class _Still:
     def _is_cut(self, index: int, now: F32, before: F32 | None) -> bool:
         if self._starts is not None:
             return index in self._starts
-        nowhere = np.zeros((*now.shape, 2), np.float32)
-        return before is not None and _change(now, before, nowhere) > CUT_DIFFERENCE
+        return before is not None and _change(now, before) > CUT_DIFFERENCE

@@ -88,11 +88,10 @@ class NoiseEstimator:
 
     def _score(self, pair: Pair, image: F32, sigma: float, velocity: F32 | None) -> float:
         """Score of the frame with synthetic noise, as one of a sequence whose last frame had other noise."""
-        span = self._viewing.peak_cd_m2 - self._viewing.black_cd_m2
+        black = np.float32(self._viewing.black_cd_m2)
+        span = np.float32(self._viewing.peak_cd_m2 - self._viewing.black_cd_m2)
         noisy, before = (
-            (span * srgb_decode(np.clip(image + self._noise(image, sigma), 0.0, 1.0))).astype(np.float32)
-            + np.float32(self._viewing.black_cd_m2)
-            for _ in range(2)
+            span * srgb_decode(np.clip(image + self._noise(image, sigma), 0.0, 1.0)) + black for _ in range(2)
         )
         change = noisy - before if self._aqm.has_transient else None
         return self._aqm.compare(noisy, pair.reference_cd_m2, velocity=velocity, change=change).score

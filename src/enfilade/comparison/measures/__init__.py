@@ -7,7 +7,7 @@
 >>> pair = display_pair(grey * 1.1, grey, Viewing(64, 48))
 >>> measure = Psnr()
 >>> round(measure.pool([measure.measure(pair)]), 1)
-30.2
+29.9
 """
 
 from __future__ import annotations

@@ -31,7 +31,8 @@ class ColorVideoVdp:
 
     Notes
     -----
-    Keeps all frames until the end as half floats: 12 bytes for a pixel of a pair.
+    Keeps all frames until the end as half floats, and copies them then: 24 bytes for a pixel of a pair,
+    besides the memory of ``cvvdp``.
     """
 
     name = "cvvdp"

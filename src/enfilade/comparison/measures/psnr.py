@@ -15,10 +15,6 @@ def psnr_db(squared_error: float) -> float:
     return math.inf if squared_error == 0.0 else -10.0 * math.log10(squared_error)
 
 
-def _rms(ratio_db: float) -> float:
-    return float(10.0 ** (-ratio_db / 20.0))
-
-
 class Psnr:
     """-10 log10 of the mean squared error over pixels and channels, sRGB-encoded, 1 = white.
 
@@ -34,5 +30,5 @@ class Psnr:
 
     def pool(self, values: Sequence[float | None]) -> float:
         """PSNR of the whole sequence: of the mean squared error over all frames."""
-        squared = [_rms(value) ** 2 for value in values if value is not None]
+        squared = [10.0 ** (-value / 10.0) for value in values if value is not None]
         return psnr_db(sum(squared) / len(squared))
