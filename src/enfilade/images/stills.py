@@ -6,6 +6,7 @@ the rest, because it decodes tiled and JPEG-compressed TIFF to wrong pixels with
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import struct
 import warnings
@@ -35,6 +36,7 @@ UNREADABLE = (  # raised by Pillow and PyAV on damaged files
     OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, EOFError, struct.error,
     zlib.error, Image.DecompressionBombError, av.FFmpegError,
 )  # fmt: skip
+WEBP_QUALITY = 92  # 0 to 100
 WEBP_EFFORT = 4  # 0 to 6: beyond it, time grows faster than files shrink
 DECODED = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))  # linear, of each 8-bit value
 
@@ -66,19 +68,24 @@ def read_image(file: Path) -> F32:
     return srgb_decode(rgba[..., :3].astype(np.float32) / np.float32(65535.0))
 
 
-def encode_webp(image: U8, *, quality: int | None) -> bytes:
-    """Encode an image as WebP.
+def to_bytes(encoded: F32) -> U8:
+    """Encoded values, clipped to 0..1, in 8 bits."""
+    values: U8 = np.rint(np.clip(encoded, 0.0, 1.0) * np.float32(255.0)).astype(np.uint8)
+    return values
+
+
+def embedded(image: U8, *, is_lossless: bool = False) -> str:
+    """An image as a page holds it: WebP in base64.
 
     Parameters
     ----------
     image : (H, W, 3) or (H, W, 4) uint8
         sRGB-encoded; the fourth channel is opacity.
-    quality
-        0 to 100; None: without loss.
+    is_lossless
     """
-    out, options = BytesIO(), {"quality": 50, "lossless": True} if quality is None else {"quality": quality}
-    Image.fromarray(image).save(out, "WEBP", method=WEBP_EFFORT, **options)
-    return out.getvalue()
+    out, quality = BytesIO(), 50 if is_lossless else WEBP_QUALITY
+    Image.fromarray(image).save(out, "WEBP", method=WEBP_EFFORT, quality=quality, lossless=is_lossless)
+    return base64.b64encode(out.getvalue()).decode()
 
 
 def resized(image: U8, size: tuple[int, int], *, is_mixed: bool) -> U8:

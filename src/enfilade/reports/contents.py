@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -67,7 +66,7 @@ def contents(run: ReportedRun, film: Film, reference: Mapping[str, Any] | None) 
         "identity": _identity(run),
         "columns": panels,
         "numbers": run.numbers,
-        "data": json.dumps(_data(run, film, charted)).replace("<", "\\u003c"),
+        "data": _data(run, film, charted),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     }
 

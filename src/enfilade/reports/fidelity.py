@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.comparison.objects import ObjectDifference, compare_objects
-from enfilade.images.stills import encode_webp
+from enfilade.images.stills import embedded, to_bytes
 from enfilade.images.view import ViewTransform, open_view
 from enfilade.records import F32, U8, U32
 from enfilade.reports.page import write_page
@@ -22,7 +20,6 @@ from enfilade.scene.blender.notes import TITLES, grouped
 from enfilade.settings import Settings, VideoSettings, ViewingSettings
 
 LISTED = 40  # objects
-WEBP_QUALITY = 92
 
 
 def differences_of(check: ImportCheck) -> list[ObjectDifference]:
@@ -77,7 +74,7 @@ def write_check(imported: ImportedScene, check: ImportCheck, differences: Sequen
             for name, of in (("Cycles", check.cycles), ("Mitsuba", check.imported))
         ],
         "notes": [(TITLES[group.kind], group) for group in notes],
-        "data": json.dumps({"frames": frames, "boxes": boxes}).replace("<", "\\u003c"),
+        "data": {"frames": frames, "boxes": boxes},
     }
     file = imported.folder / CHECK_PAGE
     write_page(file, "check", variables)
@@ -89,13 +86,11 @@ def _frame(of: CheckedFrame, view: ViewTransform) -> dict[str, Any]:
     pictures = [_displayed(halves, view) for halves in (of.cycles, of.imported)]
     difference = np.abs(pictures[0].astype(np.int16) - pictures[1]).astype(np.uint8)
     named = zip(("cycles", "imported", "difference"), (*pictures, difference), strict=True)
-    encoded = {name: base64.b64encode(encode_webp(p, quality=WEBP_QUALITY)).decode() for name, p in named}
-    return {"number": of.number, **encoded}
+    return {"number": of.number, **{name: embedded(picture) for name, picture in named}}
 
 
 def _displayed(halves: tuple[F32, F32], view: ViewTransform) -> U8:
-    shown: U8 = (view.encode((halves[0] + halves[1]) * np.float32(0.5)) * 255.0 + 0.5).astype(np.uint8)
-    return shown
+    return to_bytes(view.encode((halves[0] + halves[1]) * np.float32(0.5)))
 
 
 def _box(index: U32, number: int) -> list[float] | None:

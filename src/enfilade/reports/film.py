@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from enfilade.comparison import ComparedFrame, CompareOptions, compare
 from enfilade.comparison.measures import DisplayedPair
-from enfilade.images.stills import encode_webp, resized
+from enfilade.images.stills import embedded, resized
 from enfilade.images.view import ViewTransform
 from enfilade.monitor import Monitor, Silence
 from enfilade.records import F32, U8
@@ -141,7 +140,7 @@ class Film:
         for layer in LAYERS:
             if layer.name in pictures:
                 picture = resized(pictures[layer.name], self.size, is_mixed=not layer.is_overlay)
-                found[layer.name] = base64.b64encode(encode_webp(picture, quality=layer.quality)).decode()
+                found[layer.name] = embedded(picture, is_lossless=layer.is_overlay)
         return found
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from enfilade.errors import SettingsError
 from enfilade.images import encode_video
-from enfilade.kernels.tone import srgb_decode
+from enfilade.images.stills import DECODED, to_bytes
 from enfilade.records import F32, U8
 from enfilade.reports.charts import Figure, pixels, save_picture
 from enfilade.reports.scales import VISIBLE
@@ -94,7 +94,7 @@ class HeatmapPainter:
             Encoded sRGB.
         """
         picture: U8 = np.full((self.height, self.width, 3), int(BACKGROUND[1:3], 16), np.uint8)
-        painted = np.rint(overlay(jnd, grey) * np.float32(255.0)).astype(np.uint8)
+        painted = to_bytes(overlay(jnd, grey))
         rows, columns = self._map_size
         picture[:rows, :columns] = painted.repeat(self._scale, axis=0).repeat(self._scale, axis=1)
         below = rows + self._caption_height
@@ -153,8 +153,7 @@ def write_heatmap_video(file: Path, pictures: Iterable[U8], *, size: tuple[int, 
     codec = VIDEO_CODECS.get(file.suffix.lower())
     if codec is None:
         raise SettingsError(f"{file}: a heat map is written as {', '.join(VIDEO_CODECS)}, or into a folder")
-    decoded = srgb_decode(np.arange(256, dtype=np.float32) / np.float32(255.0))
-    linear = (decoded[picture] for picture in pictures)
+    linear = (DECODED[picture] for picture in pictures)
     settings = VideoSettings(codec=codec)
     encode_video(file, linear, fps=fps, width=size[0], height=size[1], settings=settings, exposure_ev=0.0)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.comparison import ComparedFrame
+from enfilade.images.stills import to_bytes
 from enfilade.images.view import ViewTransform
 from enfilade.records import F32, U8, Provenance
 from enfilade.reports import heatmap
@@ -17,7 +18,6 @@ from enfilade.reports.run import DeliveredFrame
 from enfilade.reports.scales import DIFFERENCE, VELOCITY, VISIBLE, Scale
 from enfilade.viewing import Viewing
 
-QUALITY = 92  # of WebP
 LEGEND_STEPS = 33  # colours
 
 
@@ -44,11 +44,6 @@ class Layer:
     legend: dict[str, Any] = field(default_factory=dict)
     is_overlay: bool = False
 
-    @property
-    def quality(self) -> int | None:
-        """Quality of the WebP encoding; None: lossless."""
-        return None if self.is_overlay else QUALITY
-
 
 def painted(frame: DeliveredFrame, view: ViewTransform, viewing: Viewing) -> dict[str, U8]:
     """Paint the layers of a frame: result, provenance and velocity, as far as its file has them.
@@ -65,7 +60,7 @@ def painted(frame: DeliveredFrame, view: ViewTransform, viewing: Viewing) -> dic
     dict of str to (H, W, 3) uint8
         Encoded sRGB, by the layer's name; provenance has opacity as a fourth channel.
     """
-    pictures = {"result": _bytes(view.encode(frame.color))}
+    pictures = {"result": to_bytes(view.encode(frame.color))}
     if frame.provenance is not None:
         pictures["provenance"] = _provenance_colors()[frame.provenance]
     if frame.flow is not None:
@@ -78,7 +73,7 @@ def painted(frame: DeliveredFrame, view: ViewTransform, viewing: Viewing) -> dic
 
 def painted_difference(compared: ComparedFrame, difference_percent: F32) -> dict[str, U8]:
     """Paint the difference of a frame from the reference, visible and absolute, (H, W) percent of white."""
-    visible = _bytes(heatmap.overlay(compared.jnd, compared.grey))
+    visible = to_bytes(heatmap.overlay(compared.jnd, compared.grey))
     return {"visible": visible, "difference": DIFFERENCE.paint(difference_percent)}
 
 
@@ -88,11 +83,6 @@ def _provenance_colors() -> U8:
     for name, color in PROVENANCE_COLORS.items():
         table[Provenance[name.upper()]] = (*bytes.fromhex(color[1:]), 255)
     return table
-
-
-def _bytes(encoded: F32) -> U8:
-    values: U8 = np.rint(np.clip(encoded, 0.0, 1.0) * np.float32(255.0)).astype(np.uint8)
-    return values
 
 
 def _legend(scale: Scale, paint: Callable[[F32], U8]) -> dict[str, Any]:
@@ -105,7 +95,7 @@ def _legend(scale: Scale, paint: Callable[[F32], U8]) -> dict[str, Any]:
 
 
 def _visible_on_grey(jnd: F32) -> U8:
-    return _bytes(heatmap.overlay(jnd, np.full_like(jnd, 0.5)))
+    return to_bytes(heatmap.overlay(jnd, np.full_like(jnd, 0.5)))
 
 
 LAYERS = (

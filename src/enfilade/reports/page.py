@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -107,7 +108,7 @@ def write_page(file: Path, name: str, variables: Mapping[str, Any]) -> None:
     file
     name
     variables
-        Of the template; ``parts`` and ``version`` are added.
+        Of the template; ``parts`` and ``version`` are added. ``data`` becomes JSON for the script.
 
     Raises
     ------
@@ -117,7 +118,8 @@ def write_page(file: Path, name: str, variables: Mapping[str, Any]) -> None:
     folder = files("enfilade.reports") / TEMPLATES
     parts = {part: (folder / part).read_text() for part in ("report.css", f"{name}.js")}
     template = _environment().get_template(f"{name}.html.j2")
-    text = template.render(variables, parts=parts, version=__version__)
+    data = json.dumps(variables["data"]).replace("<", "\\u003c")
+    text = template.render({**variables, "data": data}, parts=parts, version=__version__)
     with whole_file(file) as beside:
         beside.write_text(text, encoding="utf-8")
 

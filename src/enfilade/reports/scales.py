@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from enfilade.images.stills import to_bytes
 from enfilade.records import F32, U8
 
 STEPS = 1024
@@ -60,7 +61,7 @@ class Scale:
 
     def paint(self, values: F32) -> U8:
         """Colour a map: (H, W) float32, 0 or more, to (H, W, 3) uint8 sRGB."""
-        painted: U8 = np.rint(self.ramp * np.float32(255.0)).astype(np.uint8)[self.step(values)]
+        painted: U8 = to_bytes(self.ramp)[self.step(values)]
         return painted
 
 
