@@ -130,10 +130,10 @@ def draw(ax: Any, panel: Panel) -> None:
     ax.set_ylim(0.0, panel.top)
 
 
-def legend(ax: Any, columns: int = 5) -> None:
+def legend(ax: Any) -> None:
     """Put the legend above the panel on the right, where no data is."""
     place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.99), "borderaxespad": 0.2}
-    ax.legend(ncols=columns, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2, **place)
+    ax.legend(ncols=5, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2, **place)
 
 
 def svg(panel: Panel, span: tuple[float, float]) -> str:

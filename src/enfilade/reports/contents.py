@@ -9,7 +9,7 @@ from typing import Any
 
 from enfilade.reports.charts import SVG_AXES, Panel, svg
 from enfilade.reports.film import Film
-from enfilade.reports.panels import quality_panel, run_panels, time_panel
+from enfilade.reports.panels import marked_keyframes, quality_panel, run_panels, time_panel
 from enfilade.reports.plots import split_percent_of
 from enfilade.reports.run import ReportedRun
 from enfilade.reports.tables import percent, psnr_text, rays_columns, seconds, time_rows, traced_columns
@@ -213,11 +213,7 @@ def _identity(run: ReportedRun) -> list[tuple[str, str]]:
 def _data(run: ReportedRun, film: Film, panels: Sequence[Panel]) -> dict[str, Any]:
     """Data of the player: pictures, and the values of all charts at their frames."""
     numbers = [frame["number"] for frame in film.frames]
-    keyframes = {row["frame"] for row in run.summary["per_frame"] if row["keyframe"] > 0.0}
-    if len(keyframes) == len(
-        run.summary["per_frame"]
-    ):  # every frame is traced whole: there is nothing to tell
-        keyframes = set()
+    keyframes = set(marked_keyframes(run.summary["per_frame"]))
     return {
         "fps": run.identity["path"]["fps"],
         "size": film.size,

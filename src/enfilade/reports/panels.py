@@ -23,18 +23,21 @@ def run_panels(summary: Mapping[str, Any], split_percent: float | None = None) -
     split_percent
         Visible pixels, percent, above which segments are split; None: unknown.
     """
-    rows = summary["per_frame"]
-    speeds = {row["frame"]: row["velocity_deg_s"] for row in rows if row["velocity_deg_s"] is not None}
-    keyframes = [row["frame"] for row in rows if row["keyframe"] and row["frame"] in speeds]
-    if len(keyframes) == len(speeds):  # every frame is traced whole: there is nothing to mark
-        keyframes = []
+    analyzed = [row for row in summary["per_frame"] if row["velocity_deg_s"] is not None]
+    speeds = {row["frame"]: row["velocity_deg_s"] for row in analyzed}
     effort = _rays_panel(summary) if summary["rays"] else _traced_panel(summary)
     found = [
-        _velocity_panel(speeds, keyframes),
+        _velocity_panel(speeds, marked_keyframes(analyzed)),
         effort,
         _predictions_panel(summary["segments"], split_percent),
     ]
     return [panel for panel in found if any(series.values for series in panel.series)]
+
+
+def marked_keyframes(rows: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Frames with keyframe pixels, from ``per_frame`` of a summary; none where all are traced whole."""
+    found = [row["frame"] for row in rows if row["keyframe"]]
+    return [] if len(found) == len(rows) else found
 
 
 def plan_panels(plan: Mapping[str, Any]) -> list[Panel]:
