@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from enfilade.errors import ImageError
-from enfilade.images.codecs import codec_named
+from enfilade.images.codecs import Codec, codec_named
 from enfilade.images.container import written_container
 from enfilade.images.view import ViewTransform, open_view
 from enfilade.images.ycbcr import FULL_RANGE, LIMITED_RANGE, Plane, frame_of, planes_from_rgb, quantized
@@ -64,12 +64,7 @@ def encode_video(
     RunFolderError, NoSpaceError
         The file can't be written. An older one stays.
     """
-    codec = codec_named(settings.codec)
-    pixel_format = codec.pixel_format_for(width, height)
-    options = codec.options_for(settings.quality)
-    view = open_view(settings, exposure_ev)
-    rate = exact_fps(fps)
-    codec.check_rate(rate)
+    codec, pixel_format, options, view, rate = _chosen(settings, fps, (width, height), exposure_ev)
     os.environ.setdefault("SVT_LOG", "1")  # the only way to restrict SVT-AV1's output on stderr to errors
     with written_container(file) as container:
         stream = container.add_stream(codec.encoder, rate=rate, options=options)
@@ -93,11 +88,7 @@ def check_encodable(
     settings: VideoSettings, *, fps: float, width: int, height: int, exposure_ev: float
 ) -> None:
     """Raise before rendering the SettingsError that :func:`encode_video` would raise after it."""
-    codec = codec_named(settings.codec)
-    codec.pixel_format_for(width, height)
-    codec.check_rate(exact_fps(fps))
-    codec.options_for(settings.quality)
-    open_view(settings, exposure_ev)
+    _chosen(settings, fps, (width, height), exposure_ev)
 
 
 def exact_fps(fps: float | Fraction) -> Fraction:
@@ -117,6 +108,16 @@ def exact_fps(fps: float | Fraction) -> Fraction:
         if ntsc > 0 and abs(float(ntsc) - fps) < NTSC_TOLERANCE:
             return ntsc
     return Fraction(fps).limit_denominator(1001)
+
+
+def _chosen(
+    settings: VideoSettings, fps: float | Fraction, size: tuple[int, int], exposure_ev: float
+) -> tuple[Codec, str, dict[str, str], ViewTransform, Fraction]:
+    """Codec, pixel format, options of the encoder, view and frame rate, all checked."""
+    codec, rate = codec_named(settings.codec), exact_fps(fps)
+    pixel_format, options = codec.pixel_format_for(*size), codec.options_for(settings.quality)
+    codec.check_rate(rate)
+    return codec, pixel_format, options, open_view(settings, exposure_ev), rate
 
 
 @contextmanager
