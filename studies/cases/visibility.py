@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from enfilade.kernels.tone import display_luminance
-from enfilade.metric import Aqm, Pursuit
+from enfilade.metric import Aqm
 from enfilade.metric.pooling import POOLING_EXPONENT
 from enfilade.records import F32, Mask
 from enfilade.settings import MetricSettings, Settings, ViewingSettings
@@ -79,13 +79,12 @@ class Viewer:
             valid=valid,
             noise_variance=None if noise is None else (noise * slope**2).astype(np.float32),
             noise_blur_px=noise_blur_px,
-            pursuit=Pursuit.BOTH,
         ).jnd
 
     def modern(self, test: F32, reference: F32, velocity_deg_s: F32 | None) -> F32:
         """JND map by the modern mode, of single frames (no flicker)."""
         images = self.luminance(test), self.luminance(reference)
-        return self._modern.compare(*images, velocity=velocity_deg_s, pursuit=Pursuit.BOTH).jnd
+        return self._modern.compare(*images, velocity=velocity_deg_s).jnd
 
     @cached_property
     def _paper(self) -> Aqm:

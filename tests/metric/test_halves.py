@@ -78,8 +78,6 @@ def test_masked_pixels_do_not_count(aqm, textured):
     one, other = (LuminanceHalves(i, i) for i in (textured, darker_patch(textured)))
     found = aqm.compare(other, one, valid=valid)
     assert found.jnd.max() == 0.0
-    held, valid[:] = valid.copy(), False
-    np.testing.assert_array_equal(found.valid, held)  # the metric keeps its own copy
 
 
 def test_a_uniform_difference_stands_still_wherever_the_image_moves(aqm):

@@ -55,13 +55,14 @@ def bars(*, upright):
 
 
 @pytest.mark.parametrize(("eye", "left"), [(Pursuit.NONE, 0.05), (Pursuit.BOTH, 0.4)])
-def test_a_pan_forgives_upright_bars_only(paper, eye, left):
+def test_a_pan_forgives_upright_bars_only(viewing, eye, left):
     # At 20 deg/s to the right (3.5 on a retina that follows) upright bars blur along their frequency
     # vector, level ones do not.
+    observer = Aqm.paper(viewing, pursuit=eye)
     pan, scores = moving((128, 160), 20.0, 0.0), {}
     for upright in (True, False):
         pair = bars(upright=upright)
-        still, panned = (paper.compare(*pair, velocity=v, pursuit=eye).score for v in (None, pan))
+        still, panned = (observer.compare(*pair, velocity=v).score for v in (None, pan))
         scores[upright] = still, panned
     assert scores[True][0] == pytest.approx(scores[False][0], rel=0.02)
     assert scores[True][1] < left * scores[True][0]
@@ -85,11 +86,12 @@ def test_a_uniform_shift_does_not_move(paper):
     assert moved.score == pytest.approx(still.score, rel=1e-3)
 
 
-def test_both_hypotheses_take_the_larger_sensitivity(paper, textured):
+def test_both_hypotheses_take_the_larger_sensitivity(viewing, textured):
     test = textured.copy()
     test[40:70, 50:90] *= 0.8
     velocity = moving(textured.shape, 4.0, 1.0)
-    maps = {eye: paper.compare(test, textured, velocity=velocity, pursuit=eye).jnd for eye in Pursuit}
+    observers = {eye: Aqm.paper(viewing, pursuit=eye) for eye in Pursuit}
+    maps = {eye: of.compare(test, textured, velocity=velocity).jnd for eye, of in observers.items()}
     either = np.maximum(maps[Pursuit.PURSUIT], maps[Pursuit.NONE])
     # A channel more sensitive in one hypothesis, another in the other: together they may see more.
     assert (maps[Pursuit.BOTH] >= either * 0.98).all()
@@ -110,7 +112,8 @@ def test_bands_add_up_to_the_score(paper, textured):
     test = textured.copy()
     test[40:90, 20:100] *= 0.9
     compared = paper.compare(test, textured)
-    assert sum(j**3.5 for j in compared.band_jnd) ** (1 / 3.5) == pytest.approx(compared.score, rel=0.05)
+    pooled = sum(j**3.5 for j in compared.steady.band_jnd) ** (1 / 3.5)
+    assert pooled == pytest.approx(compared.score, rel=0.05)
     np.testing.assert_allclose(compared.probability, 1 - 0.25**compared.jnd, atol=1e-5)
 
 

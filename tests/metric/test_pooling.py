@@ -24,7 +24,7 @@ def test_channels_pool_with_exponent_3_5():
     expected = (1 + 3**3.5 + 2**3.5) ** (1 / 3.5)
     np.testing.assert_allclose(found.jnd, expected, rtol=1e-5)
     assert found.score == found.steady.score == pytest.approx(expected, rel=1e-5)
-    assert found.band_jnd == pytest.approx(((1 + 3**3.5) ** (1 / 3.5), 2.0), rel=1e-5)
+    assert found.steady.band_jnd == pytest.approx(((1 + 3**3.5) ** (1 / 3.5), 2.0), rel=1e-5)
     assert found.transient.score == 0.0
 
 
@@ -35,7 +35,7 @@ def test_steady_and_transient_parts_add_up():
     found = pool.comparison()
     scores = found.steady.score, found.transient.score, found.score
     assert scores == pytest.approx((2.0, 0.5, 2.5), rel=1e-5)
-    assert found.band_jnd == pytest.approx((2.5,))
+    assert (found.steady.band_jnd, found.transient.band_jnd) == ((2.0,), (0.5,))
 
 
 def test_percent_counts_valid_pixels_only():

@@ -29,7 +29,7 @@ class Aqm:
     metric : PaperMetric or ModernMetric
         The stages, in their order.
     pursuit : Pursuit
-        Eye movement while the image moves; `compare` may override it.
+        Eye movement while the image moves.
 
     Notes
     -----
@@ -105,7 +105,6 @@ class Aqm:
         noise_variance: F32 | None = None,
         noise_blur_px: F32 | None = None,
         change: F32 | None = None,
-        pursuit: Pursuit | None = None,
     ) -> Comparison:
         """Predict the visible differences between two images, and their probabilities of detection.
 
@@ -129,8 +128,6 @@ class Aqm:
         change : (H, W) float32, optional
             Change of test - reference since the last frame, at the same point of the same surface,
             cd/m2 (`metric.transient`); 0 where not valid. None: none. The paper's mode takes none.
-        pursuit : Pursuit, optional
-            Instead of the one given to the constructor.
 
         Returns
         -------
@@ -153,7 +150,7 @@ class Aqm:
             check_map("change", change, shape, None, is_signed=True)
             if not self.has_transient:
                 raise InputError("metric: change is given to the paper's mode, which compares frames alone")
-        is_valid = np.ones(shape, dtype=np.bool_) if valid is None else valid.copy()
+        is_valid = np.ones(shape, dtype=np.bool_) if valid is None else valid
         pair = Pair(
             *fill_undefined(test, reference, is_valid),
             valid=is_valid,
@@ -162,7 +159,7 @@ class Aqm:
             noise_blur_px=noise_blur_px,
             change=change,
         )
-        return self._metric.compare(pair, (pursuit or self.pursuit).hypotheses)
+        return self._metric.compare(pair, self.pursuit.hypotheses)
 
 
 def _masked(values: F32 | None, valid: Mask) -> F32 | None:

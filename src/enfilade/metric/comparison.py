@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from enfilade.records import F32, Mask
+from enfilade.records import F32
 
 MISS_AT_ONE_JND = 0.25  # §6: 1 JND is seen in 75 % of cases
 
@@ -17,8 +17,14 @@ class Part:
 
     Attributes
     ----------
-    score, band_jnd
+    score : float
         As in `Comparison`, of this part alone, JND.
+    band_jnd : tuple of float
+        Per radial band, finest first and base last: J of the band's channels pooled over
+        orientations and, as a mean, over the valid area, (mean sum_l J_kl^b)^(1/b), in JND; b is
+        the exponent of pooling over channels, 3.5 in the paper's mode and 1 in the modern one.
+        In the paper's mode the bands add up to the score, score^3.5 = sum_k band_jnd_k^3.5, but for
+        interpolation (a few percent).
     """
 
     score: float
@@ -34,28 +40,19 @@ class Comparison:
     jnd : (H, W) float32
         Differences pooled over the channels (in the modern mode also over the aperture around each
         pixel), in just noticeable differences; 0 where not valid.
-    valid : (H, W) bool
-        Pixels that were compared.
     percent_visible : float
         Valid pixels above 1 JND, percent; 0 when none is valid.
-    band_jnd : tuple of float
-        Per radial band, finest first and base last: J of the band's channels pooled over
-        orientations and, as a mean, over the valid area, (mean sum_l J_kl^b)^(1/b), in JND; b is
-        the exponent of pooling over channels, 3.5 in the paper's mode and 1 in the modern one.
     score : float
         One number for the image, JND: the map pooled over the valid pixels, (mean J^3.5)^(1/3.5).
         It lies between the mean and the largest JND, nearer to the largest: small strong errors
-        weigh more than faint large ones. In the paper's mode the bands add up to it,
-        score^3.5 = sum_k band_jnd_k^3.5, but for interpolation (a few percent).
+        weigh more than faint large ones.
     steady, transient : Part
         Errors that stay, and their change since the last frame. Without a change all is steady.
         The two add up channel by channel, as bands do.
     """
 
     jnd: F32
-    valid: Mask
     percent_visible: float
-    band_jnd: tuple[float, ...]
     score: float
     steady: Part
     transient: Part

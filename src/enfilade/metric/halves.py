@@ -78,8 +78,10 @@ class HalvesAqm:
         ----------
         test, reference : LuminanceHalves
             The noise of all four images is independent.
-        velocity, valid, pursuit
+        velocity, valid
             As in `Aqm.compare`.
+        pursuit
+            Eye movement while the image moves.
 
         Returns
         -------
@@ -91,7 +93,7 @@ class HalvesAqm:
         InputError
             As `Aqm.compare`.
         """
-        is_valid = np.ones(self._bank.image_shape, np.bool_) if valid is None else valid.copy()
+        is_valid = np.ones(self._bank.image_shape, np.bool_) if valid is None else valid
         filled = []
         for one, other in ((test.first, reference.first), (test.second, reference.second)):
             check_pair(self._bank.image_shape, one, other, velocity, valid)

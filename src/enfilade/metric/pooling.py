@@ -71,9 +71,7 @@ class Pool:
             score = self._score(jnd)
         return Comparison(
             jnd=jnd,
-            valid=self._valid,
             percent_visible=percent_visible(jnd, self._valid),
-            band_jnd=self._band_jnd(False, True),
             score=score,
             steady=Part(steady, self._band_jnd(False)),
             transient=Part(transient, self._band_jnd(True)),
@@ -101,6 +99,5 @@ class Pool:
         total = float(raised(np.square(jnd)).sum(dtype=np.float64))
         return float((total / count) ** (1.0 / POOLING_EXPONENT))
 
-    def _band_jnd(self, *kinds: bool) -> tuple[float, ...]:
-        sums = zip(*(self._band_sums[kind] for kind in kinds), strict=True)
-        return tuple(sum(of_kinds) ** (1.0 / self._exponent) for of_kinds in sums)
+    def _band_jnd(self, kind: bool) -> tuple[float, ...]:
+        return tuple(total ** (1.0 / self._exponent) for total in self._band_sums[kind])
