@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -14,6 +15,7 @@ from enfilade.runs import scheduler
 from enfilade.runs.executor import InProcess, Order, Workers, open_worker
 from enfilade.runs.failure import FailureKind
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import Job
 from enfilade.runs.render import prepare
 from enfilade.runs.scheduler import open_executor
 from enfilade.settings import LimitSettings
@@ -100,6 +102,16 @@ def test_in_process_a_worker_is_kept_until_it_is_discarded(begun, tmp_path):
     assert "Traceback" in failure.log
     executor.discard(0)
     assert executor._worker is None
+
+
+def test_loading_the_scene_counts_in_no_pass(begun, monkeypatch):
+    load = Job.open_renderer
+    monkeypatch.setattr(Job, "open_renderer", lambda job: (time.sleep(1.0), load(job))[1])
+    executor = InProcess(*begun)
+    executor.begin(0, Order(Task("analysis", 0)))
+    began = time.monotonic()
+    line = executor.wait(None)[0].result
+    assert time.monotonic() - began > sum(spent["wall_s"] for spent in line["cost"].values()) + 1.0
 
 
 def test_an_interrupt_that_a_loop_of_drjit_caught_ends_the_run(begun, monkeypatch):

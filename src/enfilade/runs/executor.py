@@ -160,6 +160,7 @@ class InProcess:
                 self.discard(0)
                 self._worker = open_worker(self._job, self._run, order.reduction)
                 self._reduction = order.reduction
+            self._worker.prepare(order.task)  # loading counts in no pass
             return [Ended(0, self._worker.do(order.task))]
         except Exception as error:
             # Dr.Jit makes another error of an interrupt in a loop that it records.
