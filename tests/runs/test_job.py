@@ -70,6 +70,14 @@ def test_a_folder_may_be_moved_with_the_files_in_it(tmp_path):
     assert read_job(moved).settings[VideoSettings].ocio == ""
 
 
+def test_a_configuration_of_opencolorio_is_found_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    job = toy_job(tmp_path)
+    for given, kept in (("ocio://default", "ocio://default"), ("my.ocio", str(tmp_path / "my.ocio"))):
+        write_job(tmp_path / "run", dataclasses.replace(job, settings=settings(video={"ocio": given})))
+        assert read_job(tmp_path / "run").settings[VideoSettings].ocio == kept
+
+
 def test_a_method_is_given_by_name_or_class():
     assert name_of("paper") == name_of(Paper) == "paper"
     with pytest.raises(SettingsError, match="is no class"):

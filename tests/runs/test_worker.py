@@ -54,6 +54,14 @@ def test_a_video_needs_no_scene(opened, monkeypatch):
         Worker(job, run).prepare(Task("light", 0))
 
 
+def test_only_tasks_of_the_video_open_its_view(opened, monkeypatch):
+    job, run = opened
+    monkeypatch.setattr("enfilade.runs.job.view_identity", lambda _: pytest.fail("the view was opened"))
+    Worker(job, run).do(Task("analysis", 0))
+    with pytest.raises(pytest.fail.Exception):
+        Worker(job, run).do(Task("clips", 0))
+
+
 class Talkative(Method):
     """A method whose tasks return given metadata."""
 

@@ -18,6 +18,7 @@ from enfilade.runs.job import Job
 from enfilade.settings import LAYERS, OutputSettings, VideoSettings, ViewingSettings
 
 ANALYSIS, CLIPS, VIDEO = Pass("analysis"), Pass("clips", reads=(FRAMES,)), Pass("video", is_shared=False)
+VIDEO_PASSES = (CLIPS.name, VIDEO.name)
 ANALYZED_FRAMES = 16  # of an analysis task
 CLIP_FRAMES = 240  # of a clip; x264 starts anew after 250
 SKY_DEPTH = 1e10  # layer Z where nothing is hit, as in Blender

@@ -236,7 +236,8 @@ def write_job(folder: Path, job: Job) -> None:
     home = folder.resolve()
 
     def in_folder(name: str) -> str:
-        return str(Path(name).relative_to(home)) if Path(name).is_relative_to(home) else name
+        file = Path(name).absolute()
+        return str(file.relative_to(home) if file.is_relative_to(home) else file)
 
     table = _relocated(job.to_json(), in_folder)
     with suppress(RunFolderError):  # there is none yet, or it is damaged
@@ -261,14 +262,18 @@ def read_table(folder: Path) -> dict[str, Any]:
 
 
 def _relocated(table: dict[str, Any], place: Callable[[str], str]) -> dict[str, Any]:
-    """A job as plain values, with the files of its scene and view at other places."""
+    """A job as plain values, with the files of its scene and view at other places.
+
+    The names of OpenColorIO's own configurations, such as ``ocio://default``, are no files.
+    """
     scene, video = table["scene"], table["settings"]["video"]
+    ocio = video.get("ocio", "")
     return {
         **table,
         "scene": {**scene, "file": place(scene["file"])},
         "settings": {
             **table["settings"],
-            "video": {**video, "ocio": place(video["ocio"]) if video.get("ocio") else ""},
+            "video": {**video, "ocio": place(ocio) if ocio and "://" not in ocio else ocio},
         },
     }
 

@@ -14,7 +14,7 @@ from enfilade.errors import DamagedFileError, EnfiladeError, SettingsError, Unfi
 from enfilade.files import whole_file
 from enfilade.methods.base import FRAMES, Pass, Task, TaskId
 from enfilade.monitor import Monitor
-from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO, analysis_tasks, video_tasks
+from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO, VIDEO_PASSES, analysis_tasks, video_tasks
 from enfilade.runs.executor import Executor, InProcess, Order, Workers
 from enfilade.runs.failure import Failure, FailureKind
 from enfilade.runs.folder import RunFolder
@@ -52,8 +52,7 @@ def is_done(job: Job, run: RunFolder, task: Task) -> bool:
     line = run.line(task.pass_name, job.path.numbers[task.frame])
     if line is None:
         return False
-    is_video = task.pass_name in (CLIPS.name, VIDEO.name)
-    return not is_video or bool(line["video"] == job.video_identity)
+    return task.pass_name not in VIDEO_PASSES or bool(line["video"] == job.video_identity)
 
 
 def tasks_left(job: Job, run: RunFolder, tasks: Iterable[Task]) -> list[Task]:
@@ -62,7 +61,7 @@ def tasks_left(job: Job, run: RunFolder, tasks: Iterable[Task]) -> list[Task]:
     Files of frames and of the video are needed, and records that a pass with tasks to do reads.
     """
     left: list[Task] = []
-    needed = {FRAMES, CLIPS.name, VIDEO.name}
+    needed = {FRAMES, *VIDEO_PASSES}
     undone = [task for task in tasks if not is_done(job, run, task)]
     for of in reversed(passes_of(job)):
         own = [task for task in undone if task.pass_name == of.name]

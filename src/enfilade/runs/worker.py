@@ -20,6 +20,7 @@ from enfilade.runs.delivery import (
     ANALYZED_FRAMES,
     CLIPS,
     VIDEO,
+    VIDEO_PASSES,
     write_clip,
     write_frame,
     write_video,
@@ -57,7 +58,7 @@ class Worker:
 
     def prepare(self, task: Task) -> None:
         """Load the scene, unless the task needs none."""
-        if task.pass_name not in (CLIPS.name, VIDEO.name):
+        if task.pass_name not in VIDEO_PASSES:
             _ = self._walk
 
     def do(self, task: Task) -> dict[str, Any]:
@@ -72,8 +73,10 @@ class Worker:
         ------
         EnfiladeError
         """
-        metadata: Mapping[str, Any] = {"video": self._job.video_identity}
+        metadata: Mapping[str, Any] = {}
         files: list[Path] = []
+        if task.pass_name in VIDEO_PASSES:
+            metadata = {"video": self._job.video_identity}
         with self._stopwatch.timed(task.pass_name):
             match task.pass_name:
                 case ANALYSIS.name:
