@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from enfilade.errors import EnfiladeError, NoSpaceError, SettingsError, UnfinishedError
-from enfilade.methods.base import Method, Pass, Task, TaskId
+from enfilade.methods.base import Method, Output, Pass, Task, TaskId
+from enfilade.records import Frame, Provenance
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.render import render
 from enfilade.runs.scheduler import shortened
@@ -151,9 +153,24 @@ class Hasty(Circular):
         inputs.record("light", 0)
 
 
+class Doubled(Circular):
+    """Two tasks that write the same files, of different sizes."""
+
+    passes = (Pass("frames", Frame),)
+
+    def tasks(self, _analysis):
+        return [Task("frames", 0), Task("frames", 1)]
+
+    def run(self, task, _inputs, walk):
+        shape = walk.path.height, walk.path.width
+        color = np.random.default_rng(0).random((*shape, 3), np.float32) * task.frame
+        frame = Frame(color, np.full(shape, Provenance.REUSED, np.uint8))
+        return Output({0: frame, 1: frame})
+
+
 @pytest.fixture
 def own_methods(monkeypatch):
-    kinds = {"circular": Circular, "hasty": Hasty}
+    kinds = {"circular": Circular, "hasty": Hasty, "doubled": Doubled}
     monkeypatch.setattr("enfilade.runs.job.open_method", lambda name: kinds[name]())
 
 
@@ -163,6 +180,10 @@ def test_defects_of_a_method_are_said(tmp_path):
         render(toy_job(tmp_path, 2, method="circular"), tmp_path / "circular", Recorder())
     with pytest.raises(UnfinishedError, match=r"no finished task has written light/0001\.exr"):
         render(toy_job(tmp_path, 2, method="hasty"), tmp_path / "hasty", Recorder())
+    with pytest.raises(
+        EnfiladeError, match="frames 1: finished 3 times, and not done yet; several tasks write"
+    ):
+        render(toy_job(tmp_path, 2, method="doubled"), tmp_path / "doubled", Recorder())
 
 
 def test_long_lists_of_tasks_are_shortened():

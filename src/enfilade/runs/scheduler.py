@@ -94,9 +94,11 @@ def work(
     NoSpaceError
         The disk is full. All finished tasks stay.
     EnfiladeError
-        An error of the input or of a method; a file that is damaged again and again.
+        An error of the input or of a method; a file that is damaged, or a task that is lost, again and
+        again.
     """
     damages: Counter[str] = Counter()
+    finished: Counter[TaskId] = Counter()
     executor: Executor | None = None
     run.refresh()
     try:
@@ -106,9 +108,11 @@ def work(
             left = tasks_left(job, run, mine)
             if not left:
                 return
+            _check_progress(job, [task for task in left if finished[task.id] >= ATTEMPTS])
             executor = executor or open_executor(job, run, workers)
             damaged = _Loop(job, run, left, executor, monitor, mine).run()
             if damaged is None:
+                finished.update(task.id for task in left)
                 if left[0].pass_name == ANALYSIS.name:
                     _warn(job, run, monitor)
                 continue
@@ -127,6 +131,16 @@ def work(
     finally:
         if executor is not None:
             executor.close()
+
+
+def _check_progress(job: Job, again: Sequence[Task]) -> None:
+    """Refuse to do tasks again that were finished several times."""
+    if again:
+        names = shortened([f"{task.pass_name} {job.path.numbers[task.frame]}" for task in again])
+        raise EnfiladeError(
+            f"{names}: finished {ATTEMPTS} times, and not done yet; several tasks write one file, a host has "
+            "another version of OpenColorIO, or something else removes or changes their files"
+        )
 
 
 def _warn(job: Job, run: RunFolder, monitor: Monitor) -> None:
