@@ -37,6 +37,14 @@ def test_a_plan(tmp_path):
     assert list(made.to_dict()) == [field.name for field in dataclasses.fields(made)]
 
 
+def test_velocities_are_those_of_the_viewing_conditions(tmp_path):
+    near, far = (
+        plan(toy_job(tmp_path, viewing={"distance_m": distance_m}), Stages()) for distance_m in (0.5, 1.0)
+    )
+    assert near.mean_speed_deg_s == pytest.approx([2.0 * speed for speed in far.mean_speed_deg_s])
+    assert min(far.mean_speed_deg_s[1:]) > 0.0
+
+
 def test_the_scene_is_loaded_once(tmp_path, monkeypatch):
     """Loading and tracing kernels are the larger part of the cost of a plan."""
     opened, really = [], Job.open_renderer

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from enfilade.files import write_json
 from enfilade.runs import stopwatch
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import JOB_FILE
 from enfilade.runs.statistics import statistics
 from enfilade.runs.stopwatch import Stopwatch
+from enfilade.viewing import Viewing
 
 PIXELS = 10 * 10
 IDENTITY = {
@@ -15,7 +18,7 @@ IDENTITY = {
     "path": {"frames": [5, 7, 9], "size": [10, 10], "fps": 24.0},
 }
 FACTS = [
-    ("analysis", 5, {"frames": [{"speed_deg_s": speed} for speed in (1.0, 2.0, 3.0)]}),
+    ("analysis", 5, {"frames": [{"speed_px": speed} for speed in (1.0, 2.0, 3.0)]}),
     ("keyframes", 5, {"rays": {"camera": 400}, "dropped": 2}),
     ("segments", 5, {"segments": [{"first": 5, "last": 9}], "rays": {"camera": 100, "metric": 50}}),
     ("frames", 5, {"provenance": {"keyframe": 100, "slow": 0, "specular": 0, "disoccluded": 0}}),
@@ -26,6 +29,8 @@ FACTS = [
 @pytest.fixture
 def run(tmp_path):
     with RunFolder.create(tmp_path / "run", IDENTITY) as run:
+        tables = {"viewing": {"distance_m": 1.0}, "video": {}}
+        write_json(run.folder / JOB_FILE, {"scene": {"file": "scene.xml"}, "settings": tables})
         yield run
 
 
@@ -45,9 +50,10 @@ def test_statistics_of_a_running_run(run):
     table = found["time_s"]
     assert (table["total_s"], table["per_frame_s"], table["cpu_s"]) == (7.5, 2.5, 11.25)
     assert table["stages"]["frames"] == {"wall_s": 2.0, "cpu_s": 4.0}
+    viewing = Viewing(10, 10, distance_m=1.0, fps=24.0)  # which the method does not read
     assert [(row["frame"], row["velocity_deg_s"], row["traced"]) for row in found["per_frame"]] == [
-        (5, 1.0, 100.0),
-        (9, 3.0, 20.0),
+        (5, viewing.velocity_deg_s(1.0), 100.0),
+        (9, viewing.velocity_deg_s(3.0), 20.0),
     ]
     assert found["rays_per_frame"] == [{"frame": 5, "camera": 5.0, "metric": 0.5}]
     assert found["rays"] == pytest.approx({"camera": 5.0 / 3, "metric": 0.5 / 3})

@@ -147,7 +147,7 @@ def synthetic_run(
     with RunFolder.create(folder, {**known, **identity}) as run:
         job = {"scene": {"file": "scene.xml"}, "settings": Settings().to_tables()}
         write_json(folder / "job.json", job)
-        analysis = [{"speed_deg_s": 0.5 * number} for number in FRAMES]
+        analysis = [{"speed_px": 0.5 * number} for number in FRAMES]
         _finish(run, "analysis", FRAMES[0], {"frames": analysis})
         for number in FRAMES if finished is None else finished:
             _finish(run, "probe", number, metadata or {"rays": {"probe_rays": 2 * SIZE[0] * SIZE[1]}})

@@ -27,7 +27,8 @@ class FrameStatistics:
     speed_px : float
         Mean length of the motion vectors, pixels per frame.
     speed_deg_s : float
-        The same in degrees per second.
+        The same in degrees per second, under the viewing conditions that the method reads; the paper's by
+        default.
     slow_percent : float
         Pixels slower than v_t (``[masks] slow_deg_s``).
     specular_percent : float

@@ -20,7 +20,7 @@ from enfilade.renderer import Renderer
 from enfilade.runs.delivery import ANALYSIS, CLIPS, analysis_tasks, video_tasks
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.graph import TaskGraph
-from enfilade.runs.job import Job
+from enfilade.runs.job import Job, write_job
 from enfilade.runs.scheduler import passes_of
 from enfilade.runs.statistics import statistics
 from enfilade.runs.worker import Worker, analysis_of
@@ -137,6 +137,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     analysis = _analyzed(job, renderer, monitor)
     if analysis.warning:
         monitor.message(analysis.warning)
+    viewing = replace(job, path=analysis.path).viewing
     small, large = _dry_runs(job, method, renderer, monitor)
     tasks = [*analysis_tasks(len(path)), *method.tasks(analysis), *video_tasks(len(path))]
     counts = Counter(task.pass_name for task in tasks)
@@ -149,7 +150,7 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     return Plan(
         method=method.name,
         frames=path.numbers,
-        mean_speed_deg_s=tuple(of.speed_deg_s for of in analysis.frames),
+        mean_speed_deg_s=tuple(viewing.velocity_deg_s(of.speed_px) for of in analysis.frames),
         slow_percent=tuple(of.slow_percent for of in analysis.frames),
         specular_percent=tuple(of.specular_percent for of in analysis.frames),
         keyframes=tuple(path.numbers[k] for k in sorted(method.keyframes(analysis))),
@@ -268,6 +269,7 @@ def _dry_run(job: Job, method: Method, renderer: Renderer) -> DryRun:
         tempfile.TemporaryDirectory(prefix="enfilade-") as place,
         RunFolder.create(Path(place) / "run", job.identity()) as run,
     ):
+        write_job(run.folder, job)
         worker = Worker(job, run, method=method, renderer=renderer)
         frames = len(job.path)
         _do(job, run, worker, analysis_tasks(frames))

@@ -8,6 +8,9 @@ from typing import Any
 from enfilade.methods.base import FRAMES
 from enfilade.runs.delivery import ANALYSIS, VIDEO
 from enfilade.runs.folder import RunFolder
+from enfilade.runs.job import read_table
+from enfilade.settings import ViewingSettings
+from enfilade.viewing import Viewing
 
 TRACED = ("slow", "specular", "disoccluded", "keyframe")  # of `records.Provenance`, in the order of Table 1
 
@@ -28,7 +31,7 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     """
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
-    per_frame = _per_frame(path, lines, speeds_deg_s(path, lines))
+    per_frame = _per_frame(path, lines, _speeds_deg_s(path, lines, _viewing(run)))
     traced_percent = {name: sum(row[name] for row in per_frame) / max(len(per_frame), 1) for name in TRACED}
     rays = _rays(path, lines)
     kinds = dict.fromkeys(kind for row in rays for kind in row if kind != "frame")
@@ -51,17 +54,6 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     }
 
 
-def speeds_deg_s(path: Mapping[str, Any], lines: Iterable[Mapping[str, Any]]) -> dict[int, float]:
-    """Mean image velocity of the frames that are analyzed, deg/s, by index on the path."""
-    places = {number: index for index, number in enumerate(path["frames"])}
-    return {
-        places[line["frame"]] + offset: float(table["speed_deg_s"])
-        for line in lines
-        if line["pass"] == ANALYSIS.name
-        for offset, table in enumerate(line["frames"])
-    }
-
-
 def add_costs(costs: Iterable[Mapping[str, Mapping[str, float]]]) -> dict[str, dict[str, float]]:
     """Sum the costs of tasks, by stage."""
     total: dict[str, dict[str, float]] = {}
@@ -71,6 +63,27 @@ def add_costs(costs: Iterable[Mapping[str, Mapping[str, float]]]) -> dict[str, d
             for kind, seconds in spent.items():
                 into[kind] += seconds
     return total
+
+
+def _viewing(run: RunFolder) -> Viewing:
+    """Viewing conditions of the video, on which the results of not every method depend."""
+    settings = ViewingSettings.from_table(read_table(run.folder)["settings"].get("viewing", {}))
+    path = run.identity["path"]
+    width, height = path["size"]
+    return settings.conditions(width, height, path["fps"])
+
+
+def _speeds_deg_s(
+    path: Mapping[str, Any], lines: Iterable[Mapping[str, Any]], viewing: Viewing
+) -> dict[int, float]:
+    """Mean image velocity of the frames that are analyzed, deg/s, by index on the path."""
+    places = {number: index for index, number in enumerate(path["frames"])}
+    return {
+        places[line["frame"]] + offset: viewing.velocity_deg_s(float(table["speed_px"]))
+        for line in lines
+        if line["pass"] == ANALYSIS.name
+        for offset, table in enumerate(line["frames"])
+    }
 
 
 def _per_frame(
