@@ -4,12 +4,14 @@ import ctypes
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import drjit as dr
 import pytest
 
+import enfilade
 from enfilade.device import activate
-from enfilade.errors import DeviceError
+from enfilade.errors import DeviceError, RunFolderError
 from enfilade.installation import examine
 
 HEAVY = ("mitsuba", "drjit", "matplotlib", "av", "OpenEXR", "scipy", "PyOpenColorIO")
@@ -41,6 +43,7 @@ def pretend(monkeypatch, *, llvm, cuda=False, optix=True, version=(19, 1, 7)):
     monkeypatch.setattr(dr, "has_backend", has.__getitem__)
     monkeypatch.setattr(dr.detail, "llvm_version", lambda: version)
     monkeypatch.setattr(dr.detail, "cuda_version", lambda: (12, 8))
+    monkeypatch.delitem(sys.modules, "enfilade.arrays", raising=False)  # which is bound to a device
     chosen = []
     monkeypatch.setattr(dr, "set_backend", chosen.append)
     return chosen
@@ -89,6 +92,19 @@ def test_a_gpu_that_can_not_trace_rays_is_not_taken(monkeypatch):
     gpu = next(check for check in examine() if check.name == "NVIDIA GPU")
     assert not gpu.is_ok
     assert not gpu.is_required
+
+
+def test_a_process_has_one_device(monkeypatch, tmp_path):
+    chosen = pretend(monkeypatch, llvm=True, cuda=True)
+    monkeypatch.setattr("enfilade.device.active", lambda: "that of the arrays")
+    for kind, own, other in ((dr.llvm, "cpu", "GPU"), (dr.cuda, "gpu", "CPU")):
+        monkeypatch.setitem(sys.modules, "enfilade.arrays", SimpleNamespace(Float=kind.ad.Float))
+        assert activate("auto") == activate(own) == "that of the arrays"
+        with pytest.raises(DeviceError, match=f"start a new process for the {other}"):
+            activate(other.lower())
+        with pytest.raises(RunFolderError):  # a report takes the device that there is
+            enfilade.report(tmp_path)
+    assert chosen == []
 
 
 @pytest.mark.parametrize("before", [None, "1,3"])

@@ -53,7 +53,8 @@ def render(
         A :class:`Settings`, or tables such as ``{"decoupled": {"quality": 5.0}}``. Exposure and view of an
         imported file stand below tables; a :class:`Settings` replaces them.
     device
-        ``cpu``, ``gpu``, or ``auto``: the GPU where there is one.
+        ``cpu``, ``gpu``, or ``auto``: the GPU where there is one. A process has one device, that of its first
+        call; ``auto`` stays there.
     executor
         ``in-process``, ``processes``, ``ray`` or ``ray:ADDRESS``. The processes import your main module:
         guard its work by ``if __name__ == "__main__"``.
@@ -72,7 +73,7 @@ def render(
     InputError
         The scene, the path, a setting, or a folder that holds another run.
     DeviceError
-        No usable LLVM or CUDA.
+        No usable LLVM or CUDA, or the process has another device.
     NoSpaceError
         The disk is full. All finished tasks stay.
     UnfinishedError
@@ -247,7 +248,7 @@ def report(
     ------
     RunFolderError, ImageError, SettingsError
     """
-    activate("cpu")
+    activate("auto")  # "cpu" would hide the GPUs from later calls of this process
     from enfilade.reports.page import write_report
 
     return write_report(Path(run), reference=reference, second_reference=second_reference, out=out)

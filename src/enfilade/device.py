@@ -1,6 +1,6 @@
 """The processor that runs the kernels: the CPU through LLVM, or an NVIDIA GPU through CUDA.
 
-The choice is made once, before the first kernel: Dr.Jit binds its array types at import.
+The choice is made once in a process, before the first kernel: Dr.Jit binds its array types at import.
 """
 
 from __future__ import annotations
@@ -56,13 +56,22 @@ def activate(choice: Choice = "auto") -> Device:
     Parameters
     ----------
     choice
-        ``"cpu"``, ``"gpu"``, or ``"auto"``: the GPU where there is one that can trace rays.
+        ``"cpu"``, ``"gpu"``, or ``"auto"``: that of this process, if its arrays are bound already; else the
+        GPU where there is one that can trace rays.
 
     Raises
     ------
     DeviceError
-        Dr.Jit can't be loaded, LLVM is missing or too old, or a GPU was asked for and there is none.
+        Dr.Jit can't be loaded, LLVM is missing or too old, or a GPU was asked for and there is none; the
+        arrays of this process are bound to another device.
     """
+    if bound := _bound():
+        if choice not in ("auto", bound):
+            raise DeviceError(
+                f"the arrays of this process are bound to the {bound.upper()}; start a new process for the "
+                f"{choice.upper()}"
+            )
+        return active()
     if choice == "cpu":
         with _hidden_gpus():
             dr, device = load(), _llvm()
@@ -77,6 +86,15 @@ def activate(choice: Choice = "auto") -> Device:
             device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version()))
     dr.set_backend(device.backend)
     return device
+
+
+def _bound() -> str:
+    """Device to which the arrays of this process are bound; empty before the first import of them."""
+    arrays = sys.modules.get("enfilade.arrays")
+    if arrays is None:
+        return ""
+    dr = load()
+    return "gpu" if dr.backend_v(arrays.Float) == dr.JitBackend.CUDA else "cpu"
 
 
 def why_no_gpu(dr: Any) -> str:

@@ -13,26 +13,21 @@ References are in a folder of their own; see `studies/bench/references.py`.
 from __future__ import annotations
 
 import json
-import os
 import resource
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from enfilade.cli.progress import watch
-from enfilade.device import Choice, activate
-from enfilade.errors import EnfiladeError, InputError
+from enfilade.device import Choice
+from enfilade.errors import InputError
 from enfilade.files import read_json, write_json
 from enfilade.methods.walkthrough import Walkthrough
-from enfilade.resource_limits import die_with
 from enfilade.runs.delivery import ANALYSIS, CLIPS, VIDEO
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.identity import digest_of
@@ -41,6 +36,7 @@ from enfilade.runs.render import render
 from enfilade.runs.statistics import add_costs
 from enfilade.settings import MetricSettings, SampleFilter, ViewingSettings
 from studies.bench import colorvideovdp
+from studies.bench.alone import alone
 from studies.bench.configurations import Configuration, with_seeds
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import GAUSSIAN_OF_BOX, available, measure, windows_of_run
@@ -126,7 +122,7 @@ def bench(
     job.check()
     names, left_out = available(measures, job)
     started = time.monotonic()
-    windows = _alone(reference_device, _prepare, job, place, reference_spp, quiet=quiet)
+    windows = alone(reference_device, _prepare, job, place, reference_spp, quiet=quiet)
     references = References(place.store, job, windows)
     prepared_s = time.monotonic() - started
     runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
@@ -295,10 +291,10 @@ class _Bench:
         if _is_finished(one.job, folder) and file.is_file():
             return
         before = _ledger_cpu_s(folder)
-        spent = _alone("cpu", _render, one.job, folder, quiet=self._quiet)
+        spent = alone("cpu", _render, one.job, folder, quiet=self._quiet)
         if spent["kernels"]:  # now they are in the cache on disk
             shutil.rmtree(folder)
-            before, spent = 0.0, _alone("cpu", _render, one.job, folder, quiet=self._quiet)
+            before, spent = 0.0, alone("cpu", _render, one.job, folder, quiet=self._quiet)
         spent["start_cpu_s"] = spent.pop("cpu_s") - (_ledger_cpu_s(folder) - before)
         write_json(file, {"cost": spent, "origin": {**origin(), "machine": machine()}})
 
@@ -356,28 +352,6 @@ def _uncharged(one: Configuration) -> tuple[str, ...]:
     if not one.is_baseline:
         return UNCHARGED
     return BASELINES_UNCHARGED if "accumulated" in one.variant else (*BASELINES_UNCHARGED, GBUFFER)
-
-
-def _alone(device: Choice, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Call a function in a new process, which ends with this one.
-
-    The device is chosen before the arguments are unpickled: Dr.Jit's array types bind to it at import.
-    """
-    context = get_context("spawn")
-    with ProcessPoolExecutor(
-        1, mp_context=context, initializer=_begin, initargs=(os.getpid(), device)
-    ) as pool:
-        try:
-            return pool.submit(function, *arguments, **options).result()
-        except BrokenProcessPool as error:
-            raise EnfiladeError(
-                "a process of the bench was killed, perhaps for lack of memory; the same command continues"
-            ) from error
-
-
-def _begin(parent: int, device: Choice) -> None:
-    die_with(parent)
-    activate(device)
 
 
 def _is_finished(job: Job, folder: Path) -> bool:
