@@ -7,6 +7,7 @@ import pytest
 
 from enfilade.camera.path import CameraPath, Segment
 from enfilade.camera.pinhole import Camera, look_at
+from enfilade.errors import CameraPathError
 from enfilade.records import Flow, Frame, Geometry, Halves, Shading, SurfaceClass, Warped
 
 H, W = 3, 4
@@ -110,9 +111,20 @@ def test_a_path_falls_into_shots():
     assert CameraPath((CAMERA,), (1,), 24.0).shots() == [range(1)]
 
 
-def test_every_camera_has_a_number():
-    with pytest.raises(ValueError, match="2 cameras with 1 numbers"):
-        CameraPath((CAMERA, CAMERA), (1,), 24.0)
+@pytest.mark.parametrize(
+    ("cameras", "numbers", "cuts", "words"),
+    [
+        ((), (), (), "0 cameras"),
+        ((CAMERA,) * 2, (1,), (), "2 cameras with 1 numbers"),
+        ((CAMERA,) * 3, (1, 3, 3), (), "frame 3 follows frame 3"),
+        ((CAMERA,) * 3, (1, 3, 2), (), "frame 2 follows frame 3"),
+        ((CAMERA,) * 3, (1, 2, 3), (1, 3), r"cuts at \[3\]; they are indices from 0 to 2"),
+        ((CAMERA, dataclasses.replace(CAMERA, width=9)), (1, 2), (), "several image sizes"),
+    ],
+)
+def test_paths_whose_frames_would_overwrite_each_other_are_refused(cameras, numbers, cuts, words):
+    with pytest.raises(CameraPathError, match=words):
+        CameraPath(cameras, numbers, 24.0, frozenset(cuts))
 
 
 @pytest.mark.parametrize("first", [0, 3])

@@ -5,8 +5,10 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 from enfilade.camera.pinhole import Camera
+from enfilade.errors import CameraPathError
 
 REST = 3  # frames of one pose: the camera rests
 
@@ -51,6 +53,11 @@ class CameraPath:
         Frames per second.
     cuts : frozenset of int
         Indices of frames that begin a new shot: no data is reused across a cut.
+
+    Raises
+    ------
+    CameraPathError
+        There is no camera, the cameras differ in size, the numbers do not rise, or a cut is no frame.
     """
 
     cameras: tuple[Camera, ...]
@@ -59,8 +66,18 @@ class CameraPath:
     cuts: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
-        if len(self.cameras) != len(self.numbers):
-            raise ValueError(f"{len(self.cameras)} cameras with {len(self.numbers)} numbers")
+        if not self.cameras or len(self.cameras) != len(self.numbers):
+            raise CameraPathError(
+                f"{len(self.cameras)} cameras with {len(self.numbers)} numbers; give a number to each of one "
+                "camera or more"
+            )
+        if len(sizes := {(camera.width, camera.height) for camera in self.cameras}) > 1:
+            raise CameraPathError(f"cameras of several image sizes, {sorted(sizes)}; give one size to all")
+        for before, after in pairwise(self.numbers):  # files of frames are named by them
+            if after <= before:
+                raise CameraPathError(f"frame {after} follows frame {before}; the numbers must rise")
+        if wrong := [cut for cut in self.cuts if cut not in range(len(self))]:
+            raise CameraPathError(f"cuts at {wrong}; they are indices from 0 to {len(self) - 1}")
 
     def __len__(self) -> int:
         return len(self.cameras)
