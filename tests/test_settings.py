@@ -3,7 +3,9 @@
 import dataclasses
 import json
 import math
+from functools import partial
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -64,6 +66,23 @@ def test_settings_survive_their_tables():
     through_json = json.loads(json.dumps(settings.to_tables()))
     assert Settings.from_tables(through_json) == settings
     assert Settings.from_tables({}) == Settings()
+
+
+def test_sections_check_the_types_of_their_values():
+    for kind, values in (
+        (KeyframeSettings, {"placement": "uniform"}),
+        (SamplingSettings, {"spp": 2.0}),
+        (SamplingSettings, {"spp": np.bool_(True)}),
+        (ViewingSettings, {"distance_m": "0.5"}),
+        (AntialiasSettings, {"separate_shapes": 1}),
+        (OutputSettings, {"layers": ["Z"]}),
+    ):
+        for made in (kind, partial(Settings().replace, kind)):
+            with pytest.raises(SettingsError, match=rf"\[{kind.table}\] .* expected"):
+                made(**values)
+    assert json.dumps(SamplingSettings(spp=np.uint8(3)).to_table()["spp"]) == "3"
+    assert json.dumps(ViewingSettings(distance_m=1).to_table()["distance_m"]) == "1.0"
+    assert ViewingSettings(distance_m=np.float32(0.5)) == ViewingSettings()
 
 
 @given(st.integers(1, 1_048_576), st.floats(0.0, 0.9), st.sampled_from(list(Placement)), st.booleans())

@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from enfilade.viewing import Viewing
 
 S = TypeVar("S", bound="Section")
+
+NUMBERS: dict[type, type] = {int: Integral, float: Real}  # types that stand for them
 
 
 def option(
@@ -74,7 +77,10 @@ class Section:
 
     def __post_init__(self) -> None:
         for f in fields(self):
-            _check(f, getattr(self, f.name), f"[{self.table}] {f.name}")
+            where = f"[{self.table}] {f.name}"
+            value = _typed(type(f.default), getattr(self, f.name), where)
+            object.__setattr__(self, f.name, value)
+            _check(f, value, where)
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Self:
@@ -494,7 +500,7 @@ class Settings:
         Raises
         ------
         SettingsError
-            A value is out of range.
+            A value is of a wrong type, or out of range.
         """
         return Settings(*self._sections.values(), dataclasses.replace(self[kind], **values))
 
@@ -561,14 +567,20 @@ def _converted(f: dataclasses.Field[Any], value: Any, cls: type[Section]) -> Any
         if value not in choices:
             raise SettingsError(f"{where} = {value!r}: choose one of {', '.join(choices)}")
         return kind(value)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value) if abs(value) < 1e300 else math.inf  # which the check refuses
     joined_by = f.metadata["joined_by"]
     if joined_by and isinstance(value, list) and all(isinstance(part, str) for part in value):
         return joined_by.join(value)
-    if type(value) is not kind:
-        raise SettingsError(f"{where} = {value!r}: expected {kind.__name__}")
     return value
+
+
+def _typed(kind: type, value: Any, where: str) -> Any:
+    """A value of a type; whole numbers are taken for floats, and numbers of NumPy become Python's."""
+    if not isinstance(value, NUMBERS.get(kind, kind)) or (isinstance(value, bool) and kind is not bool):
+        raise SettingsError(f"{where} = {value!r}: expected {kind.__name__}")
+    try:
+        return kind(value) if kind in NUMBERS else value
+    except OverflowError:
+        return math.inf  # which the check refuses
 
 
 def _check(f: dataclasses.Field[Any], value: Any, where: str) -> None:
