@@ -120,6 +120,7 @@ def test_folders_are_replaced_on_demand_only(run, shot, tmp_path):
     ("flags", "words"),
     [
         (("--frames", "1,5"), "takes one range"),
+        (("--check", "--check-frames", "many"), "can't read 'many'"),
         (("--size", "0x0"), "0x0 is no image size"),
         (("--size", "99999x99999"), "each side must be 1 to 16384"),
         (("--set", "decoupled.quality=5"), "has no effect on an import"),
@@ -131,6 +132,7 @@ def test_wrong_input(run, shot, tmp_path, flags, words):
     result = run("import", shot(camera=""), "--out", tmp_path / "s", *flags)
     assert result.exit_code == 2
     assert words in result.stderr
+    assert not (tmp_path / "s").exists()
 
 
 def test_without_blender(run, shot, tmp_path, monkeypatch):

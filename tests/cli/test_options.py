@@ -90,6 +90,19 @@ def test_flags_without_effect_are_refused(run, jobs, camera_path):
     assert not jobs
 
 
+def test_flags_without_effect_on_other_commands_are_refused(run, jobs, camera_path):
+    prepare = ("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run", "--prepare")
+    for line, said in (
+        (("encode", "run", "--set", "trace.seed=5"), "has no effect on a video, which does not read [trace]"),
+        (("compare", "a", "b", "--set", "trace.seed=1"), "has no effect on a comparison, which does not"),
+        ((*prepare, "--workers", "2"), "--workers has no effect with --prepare"),
+        ((*prepare, "--threads", "0"), "--threads has no effect with --prepare"),
+        ((*prepare, "--executor", "cloud"), "--executor has no effect with --prepare"),
+    ):
+        result = run(*line)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.output
+
+
 def test_the_job(run, jobs, camera_path):
     run(
         *("render", "s.xml", "--path", camera_path, "--out", camera_path.parent / "run"),

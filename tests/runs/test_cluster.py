@@ -119,7 +119,7 @@ def joined(tmp_path, monkeypatch, listening):
     at = f"127.0.0.1:{listening.getsockname()[1]}"
 
     def join(*nodes, count=None, threads=0, address=at, device="cpu"):
-        monkeypatch.setitem(sys.modules, "ray", ray := Ray(*nodes) if nodes else None)
+        monkeypatch.setitem(sys.modules, "ray", ray := Ray(*nodes))
         run, workers = RunFolder.read(tmp_path / "run"), Workers("ray", count, threads)
         return ray, Cluster(run, LimitSettings(), workers, address=address, device=device)
 
@@ -143,8 +143,9 @@ def test_clusters_that_can_not_be_used(joined, monkeypatch):
     def unreachable(_ray, **_how):
         raise ConnectionError("timed out")
 
+    monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(EnfiladeError, match=r"pip install ray"):
-        joined()
+        Workers("ray").check(LimitSettings())
     with pytest.raises(EnfiladeError, match=r"no GPU, .* add --device cpu"):
         joined(BIG, device="gpu")
     monkeypatch.setattr(Ray, "init", unreachable)

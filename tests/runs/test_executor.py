@@ -7,6 +7,7 @@ import time
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import drjit as dr
 import pytest
 
 from enfilade.errors import RunFolderError, SettingsError
@@ -124,8 +125,11 @@ def test_an_interrupt_that_a_loop_of_drjit_caught_ends_the_run(begun, monkeypatc
         executor.wait(None)
 
 
-def test_a_time_limit_needs_processes(begun):
-    job, run = begun
-    job = dataclasses.replace(job, settings=job.settings.replace(LimitSettings, task_timeout_s=5.0))
+def test_a_time_limit_needs_processes():
     with pytest.raises(SettingsError, match="add --executor processes"):
-        open_executor(job, run, Workers("in-process"))
+        Workers("in-process").check(LimitSettings(task_timeout_s=5.0))
+
+
+def test_this_process_takes_its_threads(begun):
+    open_executor(*begun, Workers(threads=3))
+    assert dr.thread_count() == 3

@@ -25,7 +25,15 @@ from enfilade.runs.folder import RunFolder
 from enfilade.runs.job import Job, read_job
 from enfilade.runs.render import Shard, prepare, render, render_shard
 from enfilade.scene.opener import Scene
-from enfilade.settings import SECTIONS, OutputSettings, Settings, TraceSettings, VideoSettings, WarpSettings
+from enfilade.settings import (
+    SECTIONS,
+    LimitSettings,
+    OutputSettings,
+    Settings,
+    TraceSettings,
+    VideoSettings,
+    WarpSettings,
+)
 from support.toy_method import Light, Toy
 from support.toys import Recorder, attempts, digest, flip, little_room, order, slide, toy_job
 
@@ -220,9 +228,14 @@ def test_a_refused_run_leaves_nothing_behind(job, tmp_path, monkeypatch):
     monkeypatch.setattr(Scene, "preflight", refuse)
     with pytest.raises(SceneError, match="it crashed"):
         render(job, tmp_path / "deep" / "run", Silence(), has_preflight=True)
+    with pytest.raises(SettingsError, match="task_timeout_s"):  # before the scene is loaded
+        render(
+            changed(job, LimitSettings, task_timeout_s=5.0), tmp_path / "run", Silence(), has_preflight=True
+        )
     with pytest.raises(SettingsError, match="view"):
         prepare(changed(job, VideoSettings, view="Film"), tmp_path / "deep" / "run")
     assert not (tmp_path / "deep").exists()
+    assert not (tmp_path / "run").exists()
     prepare(job, tmp_path / "run")
     render(job, tmp_path / "run", Silence(), has_preflight=True)  # not again for a run that was begun
 

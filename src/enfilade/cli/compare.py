@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.options import check_png, given_in, json_option, quiet_option, settings_of, settings_options
+from enfilade.cli.options import (
+    check_effect,
+    check_png,
+    given_in,
+    json_option,
+    quiet_option,
+    settings_of,
+    settings_options,
+)
 from enfilade.errors import SettingsError
 from enfilade.settings import SECTIONS, MetricSettings, ViewingSettings
 
@@ -164,6 +172,7 @@ def _options(
     if len(layers) > 2:
         raise SettingsError(f"--layer is given {len(layers)} times; give it once, or for TEST and REFERENCE")
     settings = settings_of(ctx, SECTIONS)
+    check_effect(ctx, "a comparison", ViewingSettings, MetricSettings)
     viewing = settings[ViewingSettings]
     return CompareOptions(
         viewing=viewing,

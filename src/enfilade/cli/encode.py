@@ -7,8 +7,15 @@ from pathlib import Path
 import click
 
 from enfilade.cli.group import debug_option
-from enfilade.cli.options import VIDEO_FLAGS, quiet_option, settings_of, settings_options, tables_of
-from enfilade.settings import SECTIONS
+from enfilade.cli.options import (
+    VIDEO_FLAGS,
+    check_effect,
+    quiet_option,
+    settings_of,
+    settings_options,
+    tables_of,
+)
+from enfilade.settings import SECTIONS, VideoSettings, ViewingSettings
 
 
 @click.command("encode", short_help="Encode the frames of a run once more.")
@@ -35,6 +42,7 @@ def command(
     Nothing is rendered, and the run stays as it is.
     """
     settings_of(ctx, SECTIONS)  # raises on wrong values
+    check_effect(ctx, "a video", VideoSettings, ViewingSettings)
     tables = tables_of(ctx, SECTIONS)
     from enfilade.cli.progress import watch
     from enfilade.runs.encode import encode

@@ -15,7 +15,7 @@ from enfilade.cli.group import debug_option, ending_on_sigterm
 from enfilade.cli.options import (
     IMPORT_FLAGS,
     Size,
-    assigned,
+    check_effect,
     json_option,
     quiet_option,
     settings_of,
@@ -73,6 +73,7 @@ def command(
     is_replaced: bool,
     size: tuple[int, int] | None,
     frames: str | None,
+    check_frames: str | None,
     as_json: bool,
     quiet: bool,
     **checking: Any,
@@ -83,25 +84,25 @@ def command(
     listed, with what it means in the picture. Scripts in the file are not run.
     """
     settings = settings_of(ctx, SECTIONS)
-    for flag, table in assigned(ctx).items():
-        if table not in (BlenderSettings.table, LimitSettings.table):
-            raise SettingsError(f"{flag} has no effect on an import, which does not read [{table}]")
-    if checking["check_frames"] is not None and not checking["is_checked"]:
+    check_effect(ctx, "an import", BlenderSettings, LimitSettings)
+    if check_frames is not None and not checking["is_checked"]:
         raise SettingsError("--check-frames needs --check")
     blender = settings[BlenderSettings]
+    from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
     from enfilade.runs.source import choices_of
     from enfilade.scene.blender.importer import import_file
     from enfilade.scene.blender.source import Source
 
     choices = choices_of(blender, size, None if frames is None else _span(frames))
+    numbers = None if check_frames is None else parse_frames(check_frames)
     with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         imported = import_file(
             source, folder, choices, settings[LimitSettings], monitor,
             program=blender.program, is_strict=blender.strict, is_replaced=is_replaced,
         )  # fmt: skip
     try:
-        checked = _checked(imported, source, settings, choices, quiet=quiet, **checking)
+        checked = _checked(imported, source, settings, choices, numbers, quiet=quiet, **checking)
     except EnfiladeError:
         click.echo(f"The imported scene is kept in {folder}; its check failed.", err=True)
         raise
@@ -119,16 +120,15 @@ def _checked(
     source: Path,
     settings: Settings,
     choices: Choices,
+    numbers: tuple[int, ...] | None,
     *,
     quiet: bool,
     is_checked: bool,
-    check_frames: str | None,
     check_spp: int,
 ) -> dict[str, Any]:
     """Render and compare frames, and write the page; returns its place and the differences, or nothing."""
     if not is_checked:
         return {}
-    from enfilade.camera import parse_frames
     from enfilade.cli.progress import watch
     from enfilade.device import activate
     from enfilade.reports.fidelity import differences_of, write_check
@@ -136,7 +136,6 @@ def _checked(
     from enfilade.scene.blender.find import find_blender
 
     activate("auto")
-    numbers = None if check_frames is None else parse_frames(check_frames)
     blender, limits = find_blender(settings[BlenderSettings].program), settings[LimitSettings]
     with ending_on_sigterm(), watch(quiet=quiet) as monitor:
         made = check_import(

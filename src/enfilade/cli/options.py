@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import Field, fields
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -27,9 +27,6 @@ from enfilade.settings import (
     ViewingSettings,
     read_tables,
 )
-
-if TYPE_CHECKING:
-    from enfilade.runs.executor import Workers
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -312,21 +309,16 @@ def choose_device(device: Choice) -> None:
         click.echo(f"note    rendered on the CPU: {note}", err=True)
 
 
-def workers_of(executor: str, workers: int | None, threads: int) -> Workers:
-    """The workers that a command asks for; this process takes its threads now, if it is one.
+def check_effect(ctx: click.Context, what: str, *read: type[Section]) -> None:
+    """Refuse flags and assignments for sections that a command does not read; a file may have them.
 
     Raises
     ------
     SettingsError
-        There is no such executor, or it has not as many workers.
     """
-    from enfilade.device import load
-    from enfilade.runs.executor import Workers
-
-    made = Workers(executor, workers, threads)
-    if executor == "in-process" and threads:
-        load().set_thread_count(threads)
-    return made
+    for flag, table in assigned(ctx).items():
+        if table not in {kind.table for kind in read}:
+            raise SettingsError(f"{flag} has no effect on {what}, which does not read [{table}]")
 
 
 def check_png(flag: str, file: Path | None) -> None:

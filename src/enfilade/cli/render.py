@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.jobs import job_of
@@ -17,8 +18,8 @@ from enfilade.cli.options import (
     output_options,
     settings_options,
     worker_options,
-    workers_of,
 )
+from enfilade.errors import SettingsError
 
 if TYPE_CHECKING:
     from enfilade.runs.job import Job
@@ -72,8 +73,13 @@ def command(
     SCENE is Mitsuba 3's XML. A .blend, glTF, USD, FBX or OBJ file is imported by Blender into the run folder
     first, with its camera, exposure and view; `--set blender.camera=NAME` and the like choose from it.
     """
+    if is_prepared:
+        _check_prepare(ctx)
     mark_resumable(ctx)
     choose_device(inputs.pop("device"))
+    from enfilade.runs.executor import Workers
+
+    team = Workers(executor, workers, threads)
     job = job_of(ctx, run=folder, quiet=quiet, **inputs)
     from enfilade.cli.progress import watch
     from enfilade.runs.render import prepare, render
@@ -83,12 +89,21 @@ def command(
         begun = {"folder": str(folder), "method": job.method, "frames": len(job.path)}
         click.echo(json.dumps(begun, indent=2) if as_json else f"run     {folder}")
         return
-    team = workers_of(executor, workers, threads)
     with watch(quiet=quiet) as monitor:
         if job.method == "reference":
             monitor.message(reference_forecast(job))
         summary = render(job, folder, monitor, team, is_verified=is_verified, has_preflight=True)
     show_run(folder, summary, as_json=as_json)
+
+
+def _check_prepare(ctx: click.Context) -> None:
+    """Refuse options of the rendering with --prepare, which renders nothing."""
+    for option in ctx.command.params:
+        is_given = ctx.get_parameter_source(option.name or "") is ParameterSource.COMMANDLINE
+        if is_given and option.name in ("executor", "workers", "threads", "is_verified"):
+            raise SettingsError(
+                f"{option.opts[0]} has no effect with --prepare, which renders nothing; leave it out"
+            )
 
 
 def reference_forecast(job: Job) -> str:

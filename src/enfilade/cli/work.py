@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from enfilade.cli.group import debug_option, mark_resumable
-from enfilade.cli.options import device_option, quiet_option, worker_options, workers_of
+from enfilade.cli.options import device_option, quiet_option, worker_options
 from enfilade.device import Choice, activate
 from enfilade.errors import RunFolderError, SettingsError
 
@@ -56,12 +56,13 @@ def command(
         raise SettingsError("--shard needs --pass")
     mark_resumable(ctx)
     activate(_device_of(run) if device == "auto" else device)
-    workers = workers_of(**team)
     from enfilade.cli.progress import OpenJdMonitor, watch
     from enfilade.cli.render import show_run
+    from enfilade.runs.executor import Workers
     from enfilade.runs.job import read_job
     from enfilade.runs.render import Shard, render, render_shard
 
+    workers = Workers(team["executor"], team["workers"], team["threads"])
     with watch(quiet=quiet or is_openjd) as silent:
         monitor = OpenJdMonitor(click.echo) if is_openjd else silent
         if pass_name is None:

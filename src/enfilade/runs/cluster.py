@@ -41,17 +41,15 @@ class Cluster:
     Raises
     ------
     EnfiladeError
-        Ray is not installed, the cluster does not answer, or has no GPU where one is needed.
+        The cluster does not answer, or has no GPU where one is needed.
     """
 
     def __init__(
         self, run: RunFolder, limits: LimitSettings, workers: Workers, *, address: str, device: str
     ) -> None:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        try:
-            import ray
-        except ImportError as error:
-            raise EnfiladeError("--executor ray needs Ray: install it with: pip install ray") from error
+        import ray
+
         self._ray = ray
         self._in_hand: dict[Any, int] = {}
         threads = max(workers.threads, 1)

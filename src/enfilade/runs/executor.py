@@ -6,10 +6,11 @@ import gc
 import math
 import traceback
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 from enfilade.arrays import release_memory
-from enfilade.errors import RunFolderError, SettingsError
+from enfilade.errors import EnfiladeError, RunFolderError, SettingsError
 from enfilade.methods.base import Task
 from enfilade.runs.failure import Failure
 from enfilade.runs.folder import RunFolder
@@ -62,6 +63,24 @@ class Workers:
             raise SettingsError(
                 f"--workers {self.count}: in-process is one worker; add --executor processes, or leave it out"
             )
+
+    def check(self, limits: LimitSettings) -> None:
+        """Refuse what can be known to be wrong before any work.
+
+        Raises
+        ------
+        SettingsError
+            A limit has no effect on these workers.
+        EnfiladeError
+            Ray is not installed.
+        """
+        if self.executor == EXECUTORS[0] and limits.task_timeout_s:
+            raise SettingsError(
+                "[limits] task_timeout_s has no effect on tasks in this process; add --executor processes, "
+                "or leave it out"
+            )
+        if self.executor.startswith("ray") and find_spec("ray") is None:
+            raise EnfiladeError("--executor ray needs Ray: install it with: pip install ray")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
 from enfilade.runs.statistics import statistics
-from enfilade.settings import VideoSettings
+from enfilade.settings import LimitSettings, VideoSettings
 
 SUMMARY_FILE = "summary.json"
 
@@ -69,13 +69,15 @@ def render(
     UnfinishedError
         Some tasks failed again and again; the rest is done.
     """
+    workers = workers or Workers()
+    workers.check(job.settings[LimitSettings])
     with _created(job, folder, has_preflight=has_preflight) as run:
         for note in (*run.notes, *_video_notes(job)):
             monitor.message(note)
         for name in run.damaged() if is_verified else ():
             run.forget(name)
             monitor.message(f"{name} is missing or damaged: its task is done again, if it is still needed")
-        work(job, run, workers or Workers(), monitor)
+        work(job, run, workers, monitor)
         run.sweep()  # of workers that were killed
         summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
         write_json(folder / SUMMARY_FILE, summary)
@@ -134,7 +136,8 @@ def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers 
     UnfinishedError
         An earlier pass is not finished, or some tasks failed again and again.
     """
-    job = read_job(folder)
+    job, workers = read_job(folder), workers or Workers()
+    workers.check(job.settings[LimitSettings])
     names = [of.name for of in passes_of(job)]
     if shard.pass_name not in names:
         raise SettingsError(
@@ -143,7 +146,7 @@ def render_shard(folder: Path, shard: Shard, monitor: Monitor, workers: Workers 
     with RunFolder.share(folder) as run:
         for note in run.notes:
             monitor.message(note)
-        work(job, run, workers or Workers(), monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
+        work(job, run, workers, monitor, chosen=lambda tasks: _of_shard(job, run, tasks, shard))
 
 
 def _of_shard(job: Job, run: RunFolder, tasks: Sequence[Task], shard: Shard) -> list[Task]:

@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from enfilade.device import active
-from enfilade.errors import DamagedFileError, EnfiladeError, SettingsError, UnfinishedError
+from enfilade.device import active, load
+from enfilade.errors import DamagedFileError, EnfiladeError, UnfinishedError
 from enfilade.files import whole_file
 from enfilade.methods.base import FRAMES, Pass, Task, TaskId
 from enfilade.monitor import Monitor
@@ -157,18 +157,15 @@ def open_executor(job: Job, run: RunFolder, workers: Workers) -> Executor:
     Raises
     ------
     EnfiladeError
-        Ray is not installed, or its cluster does not answer; a limit has no effect here.
+        The Ray cluster does not answer.
     """
     kind, _, address = workers.executor.partition(":")
     device = "gpu" if active().backend == "cuda" else "cpu"
     limits = job.settings[LimitSettings]
     executor: Executor
     if kind == "in-process":
-        if limits.task_timeout_s:
-            raise SettingsError(
-                "[limits] task_timeout_s has no effect on tasks in this process; add --executor processes, "
-                "or leave it out"
-            )
+        if workers.threads:
+            load().set_thread_count(workers.threads)
         executor = InProcess(job, run)
     elif kind == "processes":
         from enfilade.runs.processes import Processes
