@@ -8,6 +8,7 @@ import pytest
 from enfilade.errors import EnfiladeError, NoSpaceError, SettingsError, UnfinishedError
 from enfilade.methods.base import Method, Output, Pass, Task, TaskId
 from enfilade.records import Frame, Provenance
+from enfilade.runs.executor import Ended, InProcess
 from enfilade.runs.folder import RunFolder
 from enfilade.runs.render import render
 from enfilade.runs.scheduler import shortened
@@ -82,6 +83,37 @@ def test_full_disks_and_wrong_input_end_the_run_at_once(tmp_path, rendered, whol
     rendered()
     assert digest(tmp_path / "run") == whole
     assert attempts(tmp_path)["light-1"] == 1
+
+
+class Batches(InProcess):
+    """Two workers whose results come together."""
+
+    slots = 2
+
+    def __init__(self, job, run, _workers):
+        super().__init__(job, run)
+        self._batch = []
+
+    def begin(self, slot, order):
+        self._batch.append((slot, order))
+
+    def wait(self, timeout_s):
+        batch, self._batch = self._batch, []
+        ended = []
+        for slot, task in batch:
+            super().begin(slot, task)
+            ended.append(Ended(slot, super().wait(timeout_s)[0].result))
+        return ended
+
+
+def test_results_beside_a_fatal_failure_are_kept(tmp_path, rendered, monkeypatch):
+    monkeypatch.setattr("enfilade.runs.scheduler.open_executor", Batches)
+    order(tmp_path, light_1="refuse")
+    with pytest.raises(SettingsError):
+        rendered()
+    assert attempts(tmp_path) == {"light-1": 1, "light-2": 1}
+    rendered()
+    assert attempts(tmp_path)["light-2"] == 1
 
 
 def test_after_a_lack_of_memory_fewer_paths_are_in_flight(tmp_path, rendered, whole):

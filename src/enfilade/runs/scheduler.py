@@ -218,7 +218,9 @@ class _Loop:
                 time.sleep(delay_s or 0.0)
                 continue
             damaged = None
-            for ended in self._executor.wait(delay_s):
+            results = self._executor.wait(delay_s)
+            # Successes first: a fatal failure ends the run.
+            for ended in sorted(results, key=lambda ended: isinstance(ended.result, Failure)):
                 order = self._in_hand.pop(ended.slot)
                 if not isinstance(ended.result, Failure):
                     self._finish(order.task, ended.result)
