@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,13 +112,14 @@ def plan(
         As of :func:`render`.
     """
     activate(device)
+    from enfilade.files import scratch_folder
     from enfilade.methods.opener import name_of
     from enfilade.runs.plan import plan as plan_job
     from enfilade.runs.source import job_of
 
     monitor = monitor or Silence()
-    with tempfile.TemporaryDirectory(prefix="enfilade-plan-") as run:
-        job = job_of(scene, path, settings or {}, name_of(method), Path(run), monitor)
+    with scratch_folder("enfilade-plan") as run:
+        job = job_of(scene, path, settings or {}, name_of(method), run, monitor)
         return plan_job(job, monitor)
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import multiprocessing
+import signal
+import tempfile
 
 import pytest
 
@@ -11,7 +14,7 @@ from enfilade.camera.pinhole import Camera
 from enfilade.errors import InputError, SettingsError
 from enfilade.runs.job import Job
 from enfilade.runs.plan import DryRun, excerpt_of, forecast, forecast_rays, plan, scaled
-from support.toys import Recorder, slide, toy_job
+from support.toys import Recorder, order, slide, toy_job
 
 
 class Stages(Recorder):
@@ -35,6 +38,25 @@ def test_a_plan(tmp_path):
         *(("dry run", n, 2) for n in range(3)),
     ]
     assert list(made.to_dict()) == [field.name for field in dataclasses.fields(made)]
+
+
+def test_folders_of_a_killed_plan_are_removed_by_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    spawn = multiprocessing.get_context("spawn")
+    killed = spawn.Process(target=_killed_in_a_dry_run, args=(tmp_path,))
+    killed.start()
+    killed.join()
+    assert killed.exitcode == -signal.SIGKILL
+    assert list(tmp_path.glob("*enfilade*"))
+    plan(toy_job(tmp_path / "job"), Stages())
+    assert not list(tmp_path.glob("*enfilade*"))
+
+
+def _killed_in_a_dry_run(folder):
+    tempfile.tempdir = str(folder)
+    job = toy_job(folder / "job")
+    order(folder / "job", light_1="kill")
+    plan(job, Stages())
 
 
 def test_velocities_are_those_of_the_viewing_conditions(tmp_path):

@@ -19,6 +19,7 @@ from enfilade.cli.options import (
     output_options,
     settings_options,
 )
+from enfilade.files import scratch_folder
 from enfilade.settings import MaskSettings
 
 if TYPE_CHECKING:
@@ -49,13 +50,11 @@ def command(
     """
     check_png("--plot", plot)
     choose_device(inputs.pop("device"))
-    import tempfile
-
     from enfilade.cli.progress import watch
     from enfilade.runs.plan import plan
 
-    with tempfile.TemporaryDirectory(prefix="enfilade-plan-") as run:
-        job = job_of(ctx, run=Path(run), quiet=quiet, **inputs)
+    with scratch_folder("enfilade-plan") as run:
+        job = job_of(ctx, run=run, quiet=quiet, **inputs)
         with watch(quiet=quiet) as monitor:
             made = plan(job, monitor, has_preflight=True).to_dict()
     if as_json:

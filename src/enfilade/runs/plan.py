@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from enfilade.camera.path import CameraPath
+from enfilade.files import scratch_folder
 from enfilade.methods.analysis import Analysis, analyze
 from enfilade.methods.base import Method, Task
 from enfilade.methods.walkthrough import Walkthrough
@@ -266,8 +265,8 @@ def _dry_runs(job: Job, method: Method, renderer: Renderer, monitor: Monitor) ->
 def _dry_run(job: Job, method: Method, renderer: Renderer) -> DryRun:
     """Do all tasks of a job in this process."""
     with (
-        tempfile.TemporaryDirectory(prefix="enfilade-") as place,
-        RunFolder.create(Path(place) / "run", job.identity()) as run,
+        scratch_folder("enfilade-dry-run") as folder,
+        RunFolder.create(folder, job.identity()) as run,
     ):
         write_job(run.folder, job)
         worker = Worker(job, run, method=method, renderer=renderer)
