@@ -38,15 +38,12 @@ class Device:
         Dr.Jit's name of it.
     variant : str
         Mitsuba's name of the matching variant.
-    version : tuple of int
-        Version of LLVM, or of CUDA.
     note : str
         Reason why a GPU that is present is not used; empty otherwise.
     """
 
     backend: Literal["llvm", "cuda"]
     variant: str
-    version: tuple[int, ...]
     note: str = ""
 
 
@@ -83,7 +80,7 @@ def activate(choice: Choice = "auto") -> Device:
         if reason:
             device = replace(_llvm(), note="" if reason == NO_GPU else reason)
         else:
-            device = Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version()))
+            device = Device("cuda", "cuda_ad_rgb")
     dr.set_backend(device.backend)
     return device
 
@@ -159,7 +156,7 @@ def active() -> Device:
         from drjit.auto.ad import Float
 
         if dr.backend_v(Float) == dr.JitBackend.CUDA:
-            return Device("cuda", "cuda_ad_rgb", tuple(dr.detail.cuda_version()))
+            return Device("cuda", "cuda_ad_rgb")
     return _llvm()
 
 
@@ -172,4 +169,4 @@ def _llvm() -> Device:
     if version[0] < LLVM_MINIMUM:
         found = ".".join(map(str, version))
         raise DeviceError(f"LLVM {found} is too old, {LLVM_MINIMUM} is needed; {INSTALL_LLVM}")
-    return Device("llvm", "llvm_ad_rgb", version)
+    return Device("llvm", "llvm_ad_rgb")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from enfilade import __version__
 from enfilade.camera import load_path
 from enfilade.errors import RunFolderError
 from enfilade.files import read_json, write_json
-from enfilade.methods.analysis import Analysis, analyze, to_table
+from enfilade.methods.analysis import Analysis, analyze
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
 from enfilade.renderer import Renderer
@@ -155,7 +155,7 @@ class Case:
 
     def _analyzed(self, name: str, walk: Walkthrough) -> Analysis:
         frames = counted(range(len(walk.path)), "analysis", self.monitor)
-        tables = self.result(name, lambda: [to_table(analyze(walk, frame)) for frame in frames]).value
+        tables = self.result(name, lambda: [asdict(analyze(walk, frame)) for frame in frames]).value
         return Analysis.from_tables(walk.path, walk.settings, tables)
 
     def _job(self, size: tuple[int, int], spp: int) -> Job:

@@ -27,7 +27,7 @@ def test_a_task_waits_for_its_needs():
     assert taken(graph) == ("c", 9)
     assert graph.unfinished == [last]
     graph.finish(last)
-    assert len(graph) == 0
+    assert graph.unfinished == []
 
 
 def test_finished_needs_are_no_tasks():
@@ -103,7 +103,7 @@ def test_any_graph_is_done_in_an_order_that_is_allowed(seed):
             tasks.append(Task(of.name, frame, frame // 20, tuple(needs)))
     order = {of.name: (index, of.is_barrier) for index, of in enumerate(passes)}
     graph, done, hands, blocks = TaskGraph(passes, chance.sample(tasks, len(tasks))), set(), {}, {}
-    while len(graph):
+    while graph.unfinished:
         slot = chance.randrange(3)
         if slot in hands:
             task = hands.pop(slot)

@@ -75,7 +75,7 @@ def command(
 
 def _device_of(run: Path) -> Choice:
     """The device that a run was begun on: another would be refused."""
-    from enfilade.runs.folder import identity_of
+    from enfilade.runs.identity import identity_of
 
     try:
         variant = str(identity_of(run)["scene"]["variant"])

@@ -34,7 +34,7 @@ class View:
         following: Camera | None,
         viewing: Viewing,
         *,
-        is_at_rest: bool = False,
+        is_at_rest: bool,
     ) -> None:
         self.geometry = geometry
         self._is_at_rest = is_at_rest

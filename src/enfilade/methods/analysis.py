@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -78,7 +78,7 @@ class Analysis:
 
     @classmethod
     def from_tables(cls, path: CameraPath, settings: Settings, tables: Iterable[Mapping[str, Any]]) -> Self:
-        """Build from :func:`to_table` of every frame."""
+        """Build from the statistics of every frame as tables, as the ledger has them."""
         return cls(path, settings, tuple(FrameStatistics(**table) for table in tables))
 
     @property
@@ -127,8 +127,3 @@ class Analysis:
 def keyframes_of(segments: Sequence[Segment]) -> list[int]:
     """Keyframes at the ends of segments, in order."""
     return sorted({s.first for s in segments} | {s.last for s in segments})
-
-
-def to_table(statistics: FrameStatistics) -> dict[str, float | bool]:
-    """Statistics as a table, fit for JSON."""
-    return asdict(statistics)

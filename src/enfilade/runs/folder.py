@@ -26,8 +26,6 @@ from enfilade.runs.identity import FORMAT, RUN_FILE, check_place, check_same, di
 from enfilade.runs.ledger import LEDGER_FILE, Ledger, digest_line
 from enfilade.runs.lock import Lock
 
-__all__ = ["RunFolder", "check_place", "identity_of"]
-
 RECORD_SUFFIXES = (".exr", ".npz")
 LATE_S, LOOK_S = 5.0, 0.5  # a network file system may show files of other hosts late
 

@@ -42,10 +42,6 @@ class TaskGraph:
         for task in self._tasks.values():
             self._add(task)
 
-    def __len__(self) -> int:
-        """Number of tasks that are neither finished nor given up."""
-        return len(self._unfinished) - len(self._given_up)
-
     @property
     def unfinished(self) -> list[Task]:
         """Tasks that are neither finished nor given up, in order."""

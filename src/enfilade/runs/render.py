@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,7 +15,8 @@ from enfilade.methods.base import Task
 from enfilade.monitor import Monitor
 from enfilade.runs.delivery import ANALYSIS
 from enfilade.runs.executor import Workers
-from enfilade.runs.folder import RunFolder, check_place
+from enfilade.runs.folder import RunFolder
+from enfilade.runs.identity import check_place
 from enfilade.runs.job import Job, read_job, write_job
 from enfilade.runs.ledger import LEDGER_FILE
 from enfilade.runs.scheduler import is_done, passes_of, shortened, work
@@ -79,7 +79,7 @@ def render(
             monitor.message(f"{name} is missing or damaged: its task is done again, if it is still needed")
         work(job, run, workers, monitor)
         run.sweep()  # of workers that were killed
-        summary = {**statistics(run), "peak_memory_bytes": _peak_memory_bytes()}
+        summary = statistics(run)
         write_json(folder / SUMMARY_FILE, summary)
     return summary
 
@@ -209,9 +209,3 @@ def _video_notes(job: Job) -> list[str]:
     odd = odd_size_note(video.codec, job.path.width, job.path.height)
     view = f"noise is measured after the sRGB curve, clipped at 1, not after the view of {video.ocio}"
     return [note for note in (odd, view if video.ocio else "") if note]
-
-
-def _peak_memory_bytes() -> int:
-    """Peak memory of this process, or of the largest of its children so far."""
-    whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return 1024 * max(resource.getrusage(who).ru_maxrss for who in whom)

@@ -290,8 +290,8 @@ class _Loop:
         last = self._failures[self._set_aside[-1].id][-1]
         raise UnfinishedError(
             f"{len(names)} tasks failed {ATTEMPTS} times each: {shortened(names)} ({last.text}); their logs "
-            f"are in {self._run.folder / FAILED}. {len(self._graph)} more tasks are left; the same command "
-            "continues",
+            f"are in {self._run.folder / FAILED}. {len(self._graph.unfinished)} more tasks are left; the "
+            "same command continues",
             tuple(names),
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from enfilade.arrays import release_memory
 from enfilade.cache import LruCache, images_within_memory
 from enfilade.errors import RunFolderError
 from enfilade.images.records import read_record, write_record
-from enfilade.methods.analysis import Analysis, analyze, to_table
+from enfilade.methods.analysis import Analysis, analyze
 from enfilade.methods.base import FRAMES, Method, Output, Pass, Task
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.renderer import Renderer
@@ -81,7 +82,7 @@ class Worker:
             match task.pass_name:
                 case ANALYSIS.name:
                     frames = range(task.frame, min(task.frame + ANALYZED_FRAMES, len(self._job.path)))
-                    metadata = {"frames": [to_table(analyze(self._walk, frame)) for frame in frames]}
+                    metadata = {"frames": [asdict(analyze(self._walk, frame)) for frame in frames]}
                 case CLIPS.name:
                     files = [write_clip(self._run, self._job, task.frame)]
                 case VIDEO.name:
