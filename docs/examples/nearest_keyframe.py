@@ -59,7 +59,7 @@ class NearestKeyframe(Method):
 def completed(walk, frame, color, where, purpose):
     """An image whose pixels of a mask are path traced, through their centres as the G-buffer."""
     spp = walk.settings[SamplingSettings].spp
-    traced = walk.trace(frame, where, purpose, spp=spp, pixel_filter=PixelFilter.CENTRE)
+    traced = walk.trace(frame, purpose, spp=spp, pixel_filter=PixelFilter.CENTRE, where=where)
     color[where] = traced.color
     origin = Provenance.KEYFRAME if purpose == Purpose.KEYFRAME else Provenance.DISOCCLUDED
     provenance = np.where(where, origin, Provenance.REUSED).astype(np.uint8)

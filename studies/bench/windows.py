@@ -131,16 +131,12 @@ def _edges(geometry: Geometry) -> npt.NDArray[np.bool_]:
 def _shadows(walk: Walkthrough, frame: int, geometry: Geometry) -> Map:
     """Change of irradiance between blocks of the same diffuse shape, by a preview."""
     shape = geometry.shape_index.shape
-    traced = walk.trace(
-        frame, np.ones(shape, np.bool_), Purpose.PREVIEW, spp=PREVIEW_SPP, pixel_filter=PixelFilter.CENTRE
-    )
-    color, albedo = (
-        i.reshape(*shape, 3) @ np.array(REC709_LUMINANCE) for i in (traced.color, geometry.albedo)
-    )
+    traced = walk.trace(frame, Purpose.PREVIEW, spp=PREVIEW_SPP, pixel_filter=PixelFilter.CENTRE)
+    color, albedo = (i @ np.array(REC709_LUMINANCE) for i in (traced.color, geometry.albedo))
     is_lit = geometry.has_diffuse & ~geometry.is_specular
     gain = np.where(is_lit, 1.0 / np.maximum(albedo, 1e-3), 0.0)
     mean, count = _blocks(gain * color), _blocks(is_lit.astype(np.float64))
-    variance = _blocks(gain**2 * traced.variance.reshape(shape)) / BLOCK_PX**2
+    variance = _blocks(gain**2 * traced.variance) / BLOCK_PX**2
     index = geometry.shape_index[BLOCK_PX // 2 :: BLOCK_PX, BLOCK_PX // 2 :: BLOCK_PX].astype(np.int64)
     index = index[: mean.shape[0], : mean.shape[1]]
     change = np.zeros(mean.shape)

@@ -140,7 +140,7 @@ class _Quality:
     def _traced(self, walk: Walkthrough, frame: int, spp: int) -> Shading:
         purpose, pixel_filter = Purpose.REFERENCE, PixelFilter.GAUSSIAN
         where = self._is_in_crop
-        traced = walk.trace(frame, where, purpose, spp=spp, pixel_filter=pixel_filter)
+        traced = walk.trace(frame, purpose, spp=spp, pixel_filter=pixel_filter, where=where)
         image = traced.to_image(where)
         return Shading(self._cropped(image.color), self._cropped(image.variance), image.dropped)
 

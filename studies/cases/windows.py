@@ -202,5 +202,4 @@ def probe_frames(analysis: Analysis, count: int) -> list[int]:
 
 
 def _trace(walk: Walkthrough, frame: int, spp: int, purpose: Purpose, pixel_filter: PixelFilter) -> Shading:
-    everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
-    return walk.trace(frame, everywhere, purpose, spp=spp, pixel_filter=pixel_filter).to_image(everywhere)
+    return walk.trace(frame, purpose, spp=spp, pixel_filter=pixel_filter)

@@ -1,7 +1,5 @@
 """Pictures of imported scenes."""
 
-import numpy as np
-
 from enfilade.camera import load_path
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.renderer import PixelFilter, Purpose
@@ -13,6 +11,4 @@ def traced(folder, spp):
     """The first frame of a scene folder by path tracing, (H, W, 3)."""
     path, settings = load_path(folder / "camera_path.json"), Settings()
     walk = Walkthrough(path, settings, Scene(folder / "scene.xml").open(settings))
-    everywhere = np.ones((path.height, path.width), bool)
-    shading = walk.trace(0, everywhere, Purpose.REFERENCE, spp=spp, pixel_filter=PixelFilter.BOX)
-    return shading.color.reshape(path.height, path.width, 3)
+    return walk.trace(0, Purpose.REFERENCE, spp=spp, pixel_filter=PixelFilter.BOX).color

@@ -69,9 +69,8 @@ class Toy(Method):
         shot = walk.path.shots()[task.shot]
         match task.pass_name:
             case "light":
-                everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
-                color = walk.trace(task.frame, everywhere, Purpose.FILL, spp=1, pixel_filter=0).color
-                light = color[:, 0].reshape(everywhere.shape)
+                color = walk.trace(task.frame, Purpose.FILL, spp=1, pixel_filter=0).color
+                light = np.ascontiguousarray(color[..., 0])
                 return Output({task.frame: Light(light, task.frame)}, {"rays": {"camera": light.size}})
             case "mean":
                 values = [inputs.record("light", frame).value for frame in shot]

@@ -31,14 +31,11 @@ class Reference(Method):
     def run(self, task: Task, inputs: Inputs, walk: Walkthrough) -> Output:
         """Trace a frame."""
         del inputs
-        everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
         shading = walk.trace(
             task.frame,
-            everywhere,
             Purpose.REFERENCE,
             spp=walk.settings[SamplingSettings].spp,
             pixel_filter=PixelFilter[walk.settings[ReferenceSettings].pixel_filter.name],
         )
-        color = shading.color.reshape(*everywhere.shape, 3)
-        frame = Frame(color, np.full(everywhere.shape, Provenance.KEYFRAME, np.uint8))
+        frame = Frame(shading.color, np.full(shading.variance.shape, Provenance.KEYFRAME, np.uint8))
         return Output({task.frame: frame}, {"dropped": shading.dropped})

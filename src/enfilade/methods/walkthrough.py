@@ -67,33 +67,45 @@ class Walkthrough:
         return RandomKey(self.settings[TraceSettings].seed, self.path.numbers[frame], purpose)
 
     def trace(
-        self, frame: int, where: Mask, purpose: Purpose, *, spp: int, pixel_filter: PixelFilter
+        self,
+        frame: int,
+        purpose: Purpose,
+        *,
+        spp: int,
+        pixel_filter: PixelFilter,
+        where: Mask | None = None,
     ) -> Shading:
-        """Path trace some pixels of a frame.
+        """Path trace a frame, or some pixels of it.
 
         Parameters
         ----------
         frame
-        where : (H, W) bool
         purpose
             Of the random numbers.
         spp
             Paths a pixel.
         pixel_filter
+        where : (H, W) bool
+            None: all pixels.
 
         Returns
         -------
         Shading
-            Of shape (N,), in the order of rows.
+            Of shape (H, W); of some pixels (N,), in the order of rows.
         """
+        shape = self.path.height, self.path.width
+        pixels = np.arange(np.prod(shape)) if where is None else np.flatnonzero(where)
         with self._timed("trace"):
-            return self.renderer.trace(
+            traced = self.renderer.trace(
                 self.path.cameras[frame],
-                np.flatnonzero(where).astype(np.uint32),
+                pixels.astype(np.uint32),
                 self.random(frame, purpose),
                 spp=spp,
                 pixel_filter=pixel_filter,
             )
+        if where is not None:
+            return traced
+        return Shading(traced.color.reshape(*shape, 3), traced.variance.reshape(shape), traced.dropped)
 
     def display_luminance(self, color: F32) -> F32:
         """Luminance of linear colours on the display, (H, W) cd/m2."""

@@ -175,11 +175,10 @@ def _cycles(
 
 def _traced(walk: Walkthrough, spp: int, monitor: Monitor) -> list[F32]:
     """Frames by path tracing."""
-    everywhere = np.ones((walk.path.height, walk.path.width), np.bool_)
     images = []
     for frame in range(len(walk.path)):
-        shading = walk.trace(frame, everywhere, Purpose.REFERENCE, spp=spp, pixel_filter=PixelFilter.BOX)
-        images.append(shading.color.reshape(*everywhere.shape, 3))
+        shading = walk.trace(frame, Purpose.REFERENCE, spp=spp, pixel_filter=PixelFilter.BOX)
+        images.append(shading.color)
         monitor.progress("path tracing", frame + 1, len(walk.path))
     return images
 

@@ -58,7 +58,7 @@ def _trace_into(walk: Walkthrough, frame: int, color: F32, where: Mask) -> int:
     if not where.any():
         return 0
     spp = walk.settings[SamplingSettings].spp
-    filled = walk.trace(frame, where, Purpose.FILL, spp=spp, pixel_filter=PixelFilter.BOX)
+    filled = walk.trace(frame, Purpose.FILL, spp=spp, pixel_filter=PixelFilter.BOX, where=where)
     color[where] = filled.color
     color[where] = denoise(color, *find_guides(walk, frame, Purpose.GUIDE, spp=spp))[where]
     return filled.dropped

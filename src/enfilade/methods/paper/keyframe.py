@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import drjit as dr
-import numpy as np
 
 from enfilade.arrays import Array3f, UInt, image, opaque
 from enfilade.kernels.random import samplers
@@ -30,15 +29,14 @@ def trace_keyframe(walk: Walkthrough, frame: int) -> Halves:
     Halves
         Denoised.
     """
-    spp, size = walk.settings[SamplingSettings].spp, (walk.path.height, walk.path.width)
-    everywhere, halves, dropped = np.ones(size, np.bool_), [], 0
+    spp, halves, dropped = walk.settings[SamplingSettings].spp, [], 0
     for purpose, guide, paths in (
         (Purpose.KEYFRAME, Purpose.GUIDE, spp - spp // 2),
         (Purpose.KEYFRAME_SECOND_HALF, Purpose.GUIDE_SECOND_HALF, spp // 2),
     ):
-        traced = walk.trace(frame, everywhere, purpose, spp=paths, pixel_filter=PixelFilter.BOX)
+        traced = walk.trace(frame, purpose, spp=paths, pixel_filter=PixelFilter.BOX)
         guides = find_guides(walk, frame, guide, spp=paths)
-        halves.append(denoise(traced.color.reshape(*size, 3), *guides))
+        halves.append(denoise(traced.color, *guides))
         dropped += traced.dropped
     return Halves(halves[0], halves[1], dropped)
 
