@@ -34,23 +34,30 @@ def test_the_template_is_one_of_open_job_description(begun):
     made = template(begun, 3)
     write_json(begun / "farm.json", made)
     assert [step["name"] for step in made["steps"]] == STEPS
-    lines = farm._lines(made["steps"][1], begun)
-    options = "--openjd --executor processes --workers 1 --pass light --shard 3/3"
-    assert lines[2][1:] == ["work", str(begun), *options.split()]
-    assert [len(farm._lines(step, begun)) for step in made["steps"]] == [2, 3, 3, 3, 1, 1]
-    assert "--pass" not in farm._lines(made["steps"][-1], begun)[0]
-    assert [len(farm._lines(step, begun)) for step in template(begun)["steps"]] == [2, 2, 2, 2, 1, 1]
+    command = made["steps"][1]["script"]["actions"]["onRun"]
+    options = "--openjd --executor processes --workers 1 --pass light --shard {{Task.Param.Shard}}/3"
+    assert command["args"] == ["work", "{{Param.Run}}", *options.split()]
+    assert "--pass" not in made["steps"][-1]["script"]["actions"]["onRun"]["args"]
+    assert [shards(step) for step in made["steps"]] == ["1-2", "1-3", "1-3", "1-3", None, None]
+    assert [shards(step) for step in template(begun)["steps"]] == [*["1-2"] * 4, None, None]
     if OPENJD.exists():
         line = [str(OPENJD), "check", str(begun / "farm.json")]
         done = subprocess.run(line, capture_output=True, text=True, check=False)  # noqa: S603
         assert done.returncode == 0, done.stdout
 
 
+def shards(step):
+    """Range of the shards of a step; None where it has only one."""
+    return (
+        step["parameterSpace"]["taskParameterDefinitions"][0]["range"] if "parameterSpace" in step else None
+    )
+
+
 class Cluster:
     """Stands for submitit: keeps when each task is submitted and when it is waited for."""
 
     def __init__(self, failing=""):
-        self.failing, self.events, self.parameters = failing, [], []
+        self.failing, self.events, self.parameters, self.lines = failing, [], [], []
         self.core = SimpleNamespace(utils=SimpleNamespace(UncompletedJobError=TimeoutError))
         self.AutoExecutor = lambda **_: SimpleNamespace(
             update_parameters=lambda **given: self.parameters.append(given),
@@ -61,6 +68,7 @@ class Cluster:
     def _submit(self, task):
         number = str(sum(what == "given" for what, _ in self.events))
         self.events.append(("given", number))
+        self.lines.append(task.line[1:])
         return SimpleNamespace(job_id=number, exception=lambda: self._ended(number, task.line))
 
     def _ended(self, number, line):
@@ -74,6 +82,8 @@ def test_tasks_on_this_machine_come_one_after_the_other(begun, monkeypatch):
     jobs = submit(begun, "local", 3, {}, told.append)
     assert jobs == [str(n) for n in range(2 + 3 * 3 + 1 + 1)]
     assert cluster.events == [(what, job) for job in jobs for what in ("given", "ended")]
+    options = "--openjd --executor processes --workers 1 --pass light --shard 3/3"
+    assert cluster.lines[4] == ["work", str(begun), *options.split()]
     assert all("cpus_per_task" not in given for given in cluster.parameters)
     assert told[0] == "analysis   job 0, 1 task"
     monkeypatch.setitem(sys.modules, "submitit", Cluster(failing="mean"))

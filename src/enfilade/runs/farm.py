@@ -51,12 +51,17 @@ def template(folder: Path, shards: int | None = None) -> dict[str, Any]:
     RunFolderError
         It holds no run.
     """
-    job = read_job(folder)
-    count = shards or max(math.ceil(len(job.path) / FRAMES_PER_SHARD), 1)
     steps: list[dict[str, Any]] = []
-    tasks = Counter(task.pass_name for task in (*analysis_tasks(len(job.path)), *video_tasks(len(job.path))))
-    for of in passes_of(job):
-        steps.append(_step(of.name, steps, min(count, tasks.get(of.name, count)) if of.is_shared else 1))
+    for name, count in _shards(folder, shards).items():
+        step: dict[str, Any] = {"name": name}
+        if steps:
+            step["dependencies"] = [{"dependsOn": steps[-1]["name"]}]
+        if count > 1:
+            shard = {"name": "Shard", "type": "INT", "range": f"1-{count}"}
+            step["parameterSpace"] = {"taskParameterDefinitions": [shard]}
+        words = _arguments(name, "{{Param.Run}}", "{{Task.Param.Shard}}", count)
+        step["script"] = {"actions": {"onRun": {"command": "{{Param.Enfilade}}", "args": words}}}
+        steps.append(step)
     return {
         "specificationVersion": SPECIFICATION,
         "name": f"enfilade {folder.resolve().name}"[:128],
@@ -180,8 +185,10 @@ def submit(
     made: list[str] = []
     previous: list[str] = []
     most = 1 if cluster == "local" else _most_tasks()  # one by one: each takes all cores, and memory
-    for step in template(folder, shards)["steps"]:
-        tasks = [Command(line) for line in _lines(step, folder)]
+    run = str(folder.resolve())
+    for name, count in _shards(folder, shards).items():
+        numbers = range(1, count + 1)
+        tasks = [Command([_executable(), *_arguments(name, run, number, count)]) for number in numbers]
         groups = [tasks[first : first + most] for first in range(0, len(tasks), most)]
         ids: list[str] = []
         for group in groups:
@@ -191,11 +198,11 @@ def submit(
                     jobs = [executor.submit(task) for task in group]
                 ids.append(jobs[0].job_id.partition("_")[0])
             except RuntimeError as error:  # of sbatch
-                raise EnfiladeError(_refused(step["name"], error, made)) from error
+                raise EnfiladeError(_refused(name, error, made)) from error
             made.append(ids[-1])
-            message(f"{step['name']:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
+            message(f"{name:10} job {ids[-1]}, {len(group)} task{'s' if len(group) > 1 else ''}")
             if cluster == "local":
-                _wait(step["name"], jobs[0], submitit.core.utils.UncompletedJobError)
+                _wait(name, jobs[0], submitit.core.utils.UncompletedJobError)
         previous = ids
     return made
 
@@ -256,31 +263,21 @@ def _wait(step: str, job: Any, uncompleted: type[Exception]) -> None:
         raise EnfiladeError(f"step {step!r} failed: {error}")
 
 
-def _step(name: str, before: list[dict[str, Any]], count: int) -> dict[str, Any]:
-    arguments = ["work", "{{Param.Run}}", "--openjd", *WORKER]
-    step: dict[str, Any] = {"name": name}
-    if before:
-        step["dependencies"] = [{"dependsOn": before[-1]["name"]}]
+def _shards(folder: Path, shards: int | None) -> dict[str, int]:
+    """Number of shards of each pass, in order."""
+    job = read_job(folder)
+    frames = len(job.path)
+    count = shards or max(math.ceil(frames / FRAMES_PER_SHARD), 1)
+    tasks = Counter(task.pass_name for task in (*analysis_tasks(frames), *video_tasks(frames)))
+    return {of.name: min(count, tasks.get(of.name, count)) if of.is_shared else 1 for of in passes_of(job)}
+
+
+def _arguments(name: str, run: str, shard: int | str, count: int) -> list[str]:
+    """Arguments of the command that does a shard of a pass."""
+    words = ["work", run, "--openjd", *WORKER]
     if name != VIDEO.name:  # the last step does everything that is left, and writes the summary
-        arguments += ["--pass", name]
-    if count > 1:
-        shard = {"name": "Shard", "type": "INT", "range": f"1-{count}"}
-        step["parameterSpace"] = {"taskParameterDefinitions": [shard]}
-        arguments += ["--shard", "{{Task.Param.Shard}}/" + str(count)]
-    step["script"] = {"actions": {"onRun": {"command": "{{Param.Enfilade}}", "args": arguments}}}
-    return step
-
-
-def _lines(step: dict[str, Any], folder: Path) -> list[list[str]]:
-    """Command lines of a step's tasks."""
-    space = step.get("parameterSpace", {"taskParameterDefinitions": [{"range": "1-1"}]})
-    last = int(space["taskParameterDefinitions"][0]["range"].partition("-")[2])
-    values = {"{{Param.Run}}": str(folder.resolve())}
-    words = step["script"]["actions"]["onRun"]["args"]
-    return [
-        [_executable(), *(values.get(w, w).replace("{{Task.Param.Shard}}", str(shard)) for w in words)]
-        for shard in range(1, last + 1)
-    ]
+        words += ["--pass", name]
+    return [*words, "--shard", f"{shard}/{count}"] if count > 1 else words
 
 
 def _executable() -> str:
