@@ -12,7 +12,7 @@
     │       └── DamagedFileError  a file of it that is missing, or differs from its checksum
     ├── DeviceError               no usable LLVM or CUDA
     ├── NoSpaceError              the disk is full; finished tasks stay
-    └── UnfinishedError           tasks of a run failed again and again, and were set aside
+    └── UnfinishedError           tasks of a run failed and were set aside, or are not done yet
 
 A message says what is wrong, where, and what to do next.
 """
@@ -73,12 +73,12 @@ class NoSpaceError(EnfiladeError):
 
 
 class UnfinishedError(EnfiladeError):
-    """Tasks of a run that failed again and again, and were set aside.
+    """Tasks of a run are not done: they failed again and again, or an earlier pass or a frame is missing.
 
     Attributes
     ----------
     tasks : tuple of str
-        Their names.
+        Names of those that were set aside, or whose frames are missing.
     """
 
     def __init__(self, message: str, tasks: tuple[str, ...] = ()) -> None:

@@ -299,7 +299,7 @@ class _Bench:
         write_json(file, {"cost": spent, "origin": {**origin(), "machine": machine()}})
 
     def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
-        """CPU and wall seconds of a run, by stage and in total, over all sessions; the start included."""
+        """CPU and wall seconds of a run, by stage and in total, the start included."""
         uncharged = _uncharged(one)
         stages = add_costs(
             line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged

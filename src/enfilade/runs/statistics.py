@@ -23,11 +23,12 @@ def statistics(run: RunFolder) -> dict[str, Any]:
     dict
         ``method``, ``frames`` (of the path), ``size``, ``fps``, ``video``. ``traced_percent``: pixels traced,
         percent of those of the finished frames, by provenance. ``time_s``: wall and CPU seconds, in total, by
-        frame of the path and by stage, over all sessions that worked on the run. ``per_frame``: provenance of
-        the pixels of each finished frame, percent, with the mean velocity (or None). ``rays``: per pixel and
-        frame of the path, by kind; ``rays_per_frame``: of each frame. ``segments``: the metric's result for
-        each segment. ``dropped_samples``: NaN or infinite samples that were left out. ``black_frames``:
-        numbers of the finished frames whose pixels are all black.
+        frame of the path and by stage, of the last execution of each task; failed attempts and the loading of
+        scenes are not counted. ``per_frame``: provenance of the pixels of each finished frame, percent, with
+        the mean velocity (or None). ``rays``: per pixel and frame of the path, by kind; ``rays_per_frame``:
+        of each frame. ``segments``: the metric's result for each segment. ``dropped_samples``: NaN or
+        infinite samples that were left out. ``black_frames``: numbers of the finished frames whose pixels are
+        all black.
     """
     lines, path = list(run.lines()), run.identity["path"]
     count = len(path["frames"])
