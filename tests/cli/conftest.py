@@ -56,7 +56,7 @@ def blender_path(tmp_path, monkeypatch):
 @pytest.fixture
 def line(scene, camera_path, tmp_path):
     """A quick `enfilade render` command."""
-    size = ("--size", "16x12", "--method", "reference", "--spp", "2", "--device", "cpu", "--quiet")
+    size = ("--size", "16x12", "--method", "reference", "--spp", "2", "--device", "auto", "--quiet")
     return ("render", scene, "--path", camera_path, "--out", tmp_path / "run", *size)
 
 

@@ -92,7 +92,7 @@ def test_default_method_and_aovs(run, line, tmp_path):
 def test_refusals_leave_no_folder(run, scene, camera_path, tmp_path, integrator, flags, words):
     scene.write_text(scene.read_text().replace('"path"', f'"{integrator}"'))
     out = tmp_path / "run"
-    refused = run("render", scene, "--path", camera_path, "--out", out, "--device", "cpu", *flags)
+    refused = run("render", scene, "--path", camera_path, "--out", out, "--device", "auto", *flags)
     assert refused.exit_code == 2, refused.output
     assert words in refused.stderr
     assert not out.exists()

@@ -15,7 +15,7 @@ from enfilade.settings import VideoSettings, ViewingSettings
 from support.fake_blender import NOTE, RESULT
 from support.toys import environment, wait_for
 
-QUICK = ("--method", "reference", "--spp", "2", "--device", "cpu", "--quiet")
+QUICK = ("--method", "reference", "--spp", "2", "--device", "auto", "--quiet")
 
 
 @pytest.fixture

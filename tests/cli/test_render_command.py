@@ -12,7 +12,7 @@ from enfilade.cli.render import PATHS_PER_CPU_S
 def test_the_paths_of_a_reference_are_announced(
     run, jobs, scene, camera_path, tmp_path, method, options, is_announced
 ):
-    size = ("--size", "64x48", "--spp", "50000", "--device", "cpu")
+    size = ("--size", "64x48", "--spp", "50000", "--device", "auto")
     result = run(
         "render", scene, "--path", camera_path, "--out", tmp_path / "run", "--method", method, *size, *options
     )

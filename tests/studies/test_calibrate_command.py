@@ -11,7 +11,7 @@ from support.study_runs import room_files
 @pytest.fixture
 def line(tmp_path):
     """A path of ten frames along the front of a room."""
-    flags = ("--probes", 1, "--spp", 4, "--set", "viewing.diagonal_m=0.01875", "--quiet", "--device", "cpu")
+    flags = ("--probes", 1, "--spp", 4, "--set", "viewing.diagonal_m=0.01875", "--quiet", "--device", "auto")
     return ("calibrate", "threshold", *room_files(tmp_path, 10), *flags)
 
 

@@ -54,7 +54,7 @@ def command(
     from enfilade.device import activate
     from enfilade.reports.page import write_report
 
-    activate("cpu")
+    activate("auto")
     with watch(quiet=quiet) as monitor:
         page = write_report(
             run,
