@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -21,7 +21,7 @@ from enfilade.kernels.tone import REC709_LUMINANCE
 
 LEVELS = 3  # sizes in which each estimate is kept: its own, twice and four times that
 MIN_SAMPLES, MAX_ERROR = 4, 0.5  # fewest, and largest relative standard error, of an entry that is used
-RELIABLE_SAMPLES, RELIABLE_ERROR = 16, 0.1  # fewest, and largest relative standard error, of a reliable one
+NO_PARENT = np.uint64(0)
 MAX_ENTRIES = 1 << 22  # that are uploaded; of more, those with the most samples
 SEARCH_STEPS = (16, 8, 4, 2, 1)  # of a binary search in a bucket: up to 31 keys; the mean is at most one
 QUANTUM = 2.0**-30  # of estimates, radiance: sums up to 2^23 are exact in the 53 bits of a float64
@@ -166,68 +166,77 @@ class Entries:
     squares : (N,) float64
         Sums of squared luminance.
     counts : (N,) int64
+    parents : (N,) uint64
+        Keys of the entries of twice the size; 0 where no estimate was kept in it.
     """
 
     keys: npt.NDArray[np.uint64]
     sums: npt.NDArray[np.float64]
     squares: npt.NDArray[np.float64]
     counts: npt.NDArray[np.int64]
+    parents: npt.NDArray[np.uint64]
 
     @staticmethod
-    def of(keys: npt.NDArray[np.uint64], irradiance: npt.NDArray[np.floating[Any]]) -> Entries:
-        """Sum up estimates; those that are not finite are left out.
+    def of(levels: Sequence[npt.NDArray[np.uint64]], irradiance: npt.NDArray[np.floating[Any]]) -> Entries:
+        """Sum up estimates in entries of rising size; those that are not finite are left out.
 
         They are rounded to :data:`QUANTUM`, so that sums are exact and independent of the order.
+
+        Parameters
+        ----------
+        levels : sequence of (N,) uint64
+            Keys of each estimate, one a level.
+        irradiance : (N, 3)
+            Over pi.
         """
         is_finite = np.isfinite(irradiance).all(axis=1)
         light = irradiance[is_finite].astype(np.float64)
         light, squares = (
             np.rint(v / QUANTUM) * QUANTUM for v in (light, np.square(light @ REC709_LUMINANCE))
         )
-        return Entries._summed(keys[is_finite], light, squares, np.ones(len(light), np.int64))
+        ones, keys = np.ones(len(light), np.int64), [level[is_finite] for level in levels]
+        parents = [*keys[1:], np.full(len(light), NO_PARENT)]
+        return Entries.joined(
+            [Entries(key, light, squares, ones, above) for key, above in zip(keys, parents, strict=True)]
+        )
 
     def repeated(self, times: int) -> Entries:
         """The entries as if each estimate had been made several times."""
-        return Entries(self.keys, self.sums * times, self.squares * times, self.counts * times)
+        return replace(self, sums=self.sums * times, squares=self.squares * times, counts=self.counts * times)
 
     @staticmethod
     def joined(parts: Sequence[Entries]) -> Entries:
         """Sum up several lists of entries; of none, the empty list."""
-        parts = [
-            Entries(np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64)),
-            *parts,
-        ]
-        return Entries._summed(
-            np.concatenate([part.keys for part in parts]),
-            np.concatenate([part.sums for part in parts]),
-            np.concatenate([part.squares for part in parts]),
-            np.concatenate([part.counts for part in parts]),
+        empty = np.zeros(0, np.uint64)
+        parts = [Entries(empty, np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64), empty), *parts]
+        keys, place = np.unique(np.concatenate([part.keys for part in parts]), return_inverse=True)
+        sums, squares, counts, above = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("sums", "squares", "counts", "parents")
         )
-
-    @staticmethod
-    def _summed(keys: Any, sums: Any, squares: Any, counts: Any) -> Entries:
-        unique, place = np.unique(keys, return_inverse=True)
-        totals: Any = [np.bincount(place, v, len(unique)) for v in (*sums.T, squares, counts)]
-        return Entries(unique, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(np.int64))
+        totals: Any = [np.bincount(place, v, len(keys)) for v in (*sums.T, squares, counts)]
+        parents, has_parent = np.full(len(keys), NO_PARENT), above != NO_PARENT
+        parents[place[has_parent]] = above[has_parent]
+        return Entries(keys, np.stack(totals[:3], axis=1), totals[3], totals[4].astype(np.int64), parents)
 
     def upload(self) -> HashGrid | None:
         """Upload the entries with enough samples; None if there are none."""
-        # Compute relative standard errors.
+        # Choose the entries that no single path dominates, but for those without light: a few paths miss rare
+        # light by chance, and entries that have found it are often left out.
         count = np.maximum(self.counts, 2)
         irradiance = self.sums / count[:, None]
         mean = irradiance @ REC709_LUMINANCE
-        variance = np.maximum(self.squares / count - np.square(mean), 0.0) / (count - 1)
-        error = np.sqrt(variance) / np.maximum(mean, QUANTUM)
-
-        # Choose the entries that no single path dominates, but for those without light: a few paths miss rare
-        # light by chance, and entries that have found it are often left out.
-        chosen = np.flatnonzero((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))
+        deviation = np.maximum(self.squares - count * np.square(mean), 0.0)  # sum of squared deviations
+        error = np.sqrt(deviation / (count * (count - 1))) / np.maximum(mean, QUANTUM)
+        is_reliable = self._are_reliable(mean, deviation)
+        chosen = np.flatnonzero(
+            is_reliable | ((self.counts >= MIN_SAMPLES) & (error <= MAX_ERROR) & (mean > 0.0))
+        )
         if not len(chosen):
             return None
         if len(chosen) > MAX_ENTRIES:
             chosen = np.sort(chosen[np.argsort(-self.counts[chosen], kind="stable")[:MAX_ENTRIES]])
-        irradiance = irradiance[chosen]
-        is_reliable = ((self.counts >= RELIABLE_SAMPLES) & (error <= RELIABLE_ERROR))[chosen]
+        irradiance, is_reliable = irradiance[chosen], is_reliable[chosen]
         shift = 64 - max(math.ceil(math.log2(len(chosen))), 1)
         buckets = (self.keys[chosen] >> np.uint64(shift)).astype(np.int64)
         sizes = np.bincount(buckets, minlength=1 << (64 - shift))
@@ -241,3 +250,28 @@ class Entries:
         )
         dr.eval(grid)
         return grid
+
+    def _are_reliable(
+        self, mean: npt.NDArray[np.float64], deviation: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.bool_]:
+        """Entries that are preferred to their parents, (N,).
+
+        Their own values decide nothing: if lit entries were preferred and dark ones were not, dark surfaces
+        would have the mean of both, and the scene more light than it has. The variance of an estimate is
+        that of all children of a parent together, each about its own mean, and its error is relative to the
+        light of the parent.
+
+        Parameters
+        ----------
+        mean, deviation : (N,) float64
+            Mean luminance of each entry, and the sum of squared deviations from it.
+        """
+        found = np.minimum(np.searchsorted(self.keys, self.parents), max(len(self.keys) - 1, 0))
+        has_parent = (self.parents != NO_PARENT) & (self.keys[found] == self.parents)
+        child, parent = np.flatnonzero(has_parent), found[has_parent]
+        freedom = np.bincount(parent, self.counts[child] - 1, len(self.keys))
+        pooled = np.bincount(parent, deviation[child], len(self.keys)) / np.maximum(freedom, 1.0)
+        is_reliable = np.zeros(len(self.keys), np.bool_)
+        error, counts = np.sqrt(pooled[parent] / self.counts[child]), self.counts[child]
+        is_reliable[child] = (counts >= MIN_SAMPLES) & (error <= MAX_ERROR * mean[parent])
+        return is_reliable

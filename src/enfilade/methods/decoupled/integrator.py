@@ -347,6 +347,4 @@ class Integrator:
 
 
 def _report(on_miss: OnMiss, keys: tuple[Any, ...], irradiance: Any, count: int) -> None:
-    values = rows(irradiance)[:count]
-    for key in keys:
-        on_miss(Entries.of(np.array(key)[:count], values))
+    on_miss(Entries.of([np.array(key)[:count] for key in keys], rows(irradiance)[:count]))

@@ -29,7 +29,7 @@ MIN_SURVIVAL = 0.05  # least probability of survival
 # it is seen through a lobe; as a part of the distance where it lights a diffuse surface.
 ENTRY_PX = 2.0
 ENTRY_LOBE_WIDTH = 0.25
-ENTRY_GATHER_WIDTH = 0.2
+ENTRY_GATHER_WIDTH = 0.1
 BELOW_TOTAL = 1.0 - 2.0**-16  # probability from which on a reflection is total; GPUs may round one down
 AOV_COSINE = 0.97  # between normals: specular AOVs of surfaces that differ by more are not looked up
 BRANCH_SALT = 0x2545F491  # gives the branches of a path random numbers of their own

@@ -17,7 +17,7 @@ from enfilade.kernels.estimate import RayCount, Samples
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
-from enfilade.methods.decoupled.hash_grid import RELIABLE_SAMPLES, Entries
+from enfilade.methods.decoupled.hash_grid import Entries
 from enfilade.methods.decoupled.integrator import OnMiss
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
@@ -26,6 +26,7 @@ from enfilade.records import Geometry, Shading
 from enfilade.renderer import Purpose, Rays
 
 SPP = 8  # final gather rays of a pixel
+DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
 def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, RayCount]:
@@ -45,14 +46,14 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     """
     images = shot.virtual_images.find(shot.images.light_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
-    entries = Entries.joined([one for found, _ in gathered for one in found])
+    entries = Entries.joined([found for found, _ in gathered])
     return entries, sum((count for _, count in gathered), RayCount())
 
 
 def _gather(
     shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
-) -> tuple[list[Entries], RayCount]:
-    """Entries of a virtual image, one list a level, and the number of rays."""
+) -> tuple[Entries, RayCount]:
+    """Entries of a virtual image, and the number of rays."""
     cache, camera = shot.prepass_cache(frame), virtual.camera
 
     def seen_along(rays: Rays, sampler: Any) -> Path:
@@ -61,14 +62,14 @@ def _gather(
     # Find the surfaces, and their entries.
     pixels = np.flatnonzero(virtual.shape_index > IN_VIRTUAL_IMAGE).astype(np.uint32)
     if not len(pixels):
-        return [], RayCount()
+        return Entries.joined([]), RayCount()
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
-        return [], RayCount()
+        return Entries.joined([]), RayCount()
     keys, irradiance, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
-        return [], RayCount()
+        return Entries.joined([]), RayCount()
     known = np.array(is_known)
     known_pixels, known_irradiance = pixels[lane[known]], rows(irradiance)[known]
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
@@ -97,6 +98,6 @@ def _gather(
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
-        gathered, times = denoised[is_gathered], RELIABLE_SAMPLES
-    found = [Entries.of(np.array(key)[chosen], gathered).repeated(times) for key in keys]
-    return found, estimate.count
+        gathered, times = denoised[is_gathered], DENOISED_SAMPLES
+    entries = Entries.of([np.array(key)[chosen] for key in keys], gathered).repeated(times)
+    return entries, estimate.count
