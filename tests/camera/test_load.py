@@ -35,7 +35,7 @@ def test_sizes(write):
     assert load_path(write(a_path()), size=(320, 240)).height == 240
     assert load_path(write(a_path(size=[1920, 1080])), size=(854, 480)).width == 854  # within a pixel
     assert load_path(write(a_path(size=None)), size=(100, 50)).width == 100
-    with pytest.raises(CameraPathError, match=r"walk.json: the file has no image size; give a size"):
+    with pytest.raises(CameraPathError, match=r"walk.json: the file has no image size; give one by --size"):
         load_path(write(a_path(size=None)))
 
 

@@ -8,11 +8,12 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from enfilade.errors import SceneError
-from enfilade.scene.preflight import preflight
+from enfilade.scene.preflight import Preflight, preflight
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
 HOT = '<spectrum name="intensity" type="blackbody"><float name="temperature" value="4000"/></spectrum>'
@@ -24,16 +25,53 @@ def checked(file, max_depth=0, **limits):
 
 
 def test_it_reports_why_lobes_are_inseparable(scene):
-    assert checked(scene(BALL)) == ""
-    assert checked(scene(BALL), max_depth=4) == "its paths end at depth 4; 5 is the least"
-    assert checked(scene(BALL), max_depth=3) == "its paths end at depth 3; 5 is the least"
+    assert checked(scene(BALL)) == Preflight()
+    for depth in (3, 4):
+        found = checked(scene(BALL), max_depth=depth).why_inseparable
+        assert found == f"its paths end at depth {depth}; 5 is the least"
+
+
+FOG = """<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior">
+<float name="sigma_t" value="1"/></medium></shape><emitter type="constant"/>"""
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (f'<sensor type="perspective"/>{BALL}', []),
+        (f'<sensor type="orthographic"/>{BALL}', ["OrthographicCamera"]),
+        (
+            f"""<sensor type="thinlens"><float name="aperture_radius" value="0.1"/>
+            <float name="focus_distance" value="2"/></sensor>{BALL}""",
+            ["ThinLensCamera"],
+        ),
+        (f'<integrator type="path"/>{FOG}', ["participating media"]),
+        (f'<integrator type="volpath"/>{FOG}', []),
+    ],
+)
+def test_it_reports_what_frames_will_not_show(scene, body, words):
+    notes = checked(scene(body)).ignored
+    assert len(notes) == len(words)
+    assert all(word in note for word, note in zip(words, notes, strict=True))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_images_with_values_that_are_not_finite_are_refused(scene, value):
+    picture = np.ones((4, 8, 3), np.float32)
+    picture[2, 5, :2] = value
+    image = '<texture type="bitmap" name="reflectance"><string name="filename" value="bad.pfm"/></texture>'
+    shape = f'<shape type="sphere"><bsdf type="diffuse">{image}</bsdf></shape>'
+    file = scene(f'{shape}<emitter type="constant"/>')
+    (file.parent / "bad.pfm").write_bytes(b"PF\n8 4\n-1.0\n" + picture[::-1].tobytes())
+    with pytest.raises(SceneError, match=r"has 2 values that are NaN .*, first in row 2, column 5 of 8x4"):
+        checked(file)
 
 
 def test_what_its_process_prints_is_not_its_answer(scene, tmp_path, monkeypatch):
     printing = "import atexit, os\natexit.register(os.write, 1, b'a plugin says')\n"
     (tmp_path / "sitecustomize.py").write_text(printing)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    assert checked(scene(BALL)) == ""
+    assert checked(scene(BALL)) == Preflight()
 
 
 @pytest.mark.parametrize(

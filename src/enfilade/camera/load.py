@@ -73,7 +73,7 @@ def _image_size(document: JsonObject, size: tuple[int, int] | None) -> tuple[int
     elif "render_width" in document or "render_height" in document:
         own = [int(document.number(f"render_{side}", SIDE_PX, whole=True)) for side in ("width", "height")]
     if not size and not own:
-        raise document.error("the file has no image size; give a size")
+        raise document.error("the file has no image size; give one by --size WIDTHxHEIGHT")
     width, height = size or own
     check_size(width, height)
     exact = width * own[1] / own[0] if own else height

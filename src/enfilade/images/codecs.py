@@ -51,7 +51,10 @@ class Codec:
         """Pixel format for an image size; SettingsError if the codec can't encode it."""
         problem = f"{self.encoder} can't encode {width}x{height} pixels"
         if min(width, height) < self.min_side:
-            raise SettingsError(f"{problem}: {self.min_side} is its least; choose another [video] codec")
+            raise SettingsError(
+                f"{problem}: each side must have {self.min_side} at least; choose a larger size"
+                + (", or another [video] codec" if self.min_side > 2 else "")
+            )
         if height > self.max_height:
             raise SettingsError(
                 f"{problem}: {self.max_height} is its greatest height; choose another [video] codec"

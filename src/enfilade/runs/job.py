@@ -122,8 +122,13 @@ class Job:
             exposure_ev=self.settings[ViewingSettings].exposure_ev,
         )
 
-    def preflight(self) -> None:
+    def preflight(self) -> list[str]:
         """Load the scene once in a process of its own, with limits of memory and time.
+
+        Returns
+        -------
+        list of str
+            What the scene has and the frames will not show.
 
         Raises
         ------
@@ -131,7 +136,9 @@ class Job:
         SettingsError
             The method can't render it.
         """
-        self._check_lobes(self.scene.preflight(self.settings))
+        found = self.scene.preflight(self.settings)
+        self._check_lobes(found.why_inseparable)
+        return found.ignored
 
     def open_renderer(self) -> Renderer:
         """Load the scene.

@@ -130,8 +130,8 @@ def plan(job: Job, monitor: Monitor, *, has_preflight: bool = False) -> Plan:
     DeviceError
     """
     job.check()
-    if has_preflight:
-        job.preflight()
+    for note in job.preflight() if has_preflight else ():
+        monitor.message(note)
     method, path, renderer = job.opened_method(), job.path, job.open_renderer()
     analysis = _analyzed(job, renderer, monitor)
     if analysis.warning:

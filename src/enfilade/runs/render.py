@@ -188,9 +188,10 @@ def _created(job: Job, folder: Path, *, has_preflight: bool) -> RunFolder:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         check_place(folder)
-        if has_preflight and not (folder / LEDGER_FILE).exists():
-            job.preflight()
+        is_new = not (folder / LEDGER_FILE).exists()
+        notes = job.preflight() if has_preflight and is_new else []
         run = RunFolder.create(folder, job.identity())
+        run.notes.extend(notes)
     except BaseException:
         for place in made:
             with suppress(OSError):

@@ -18,6 +18,7 @@ from enfilade.device import active
 from enfilade.errors import SceneError, SettingsError
 from enfilade.renderer import Renderer
 from enfilade.scene.blender.source import SUFFIXES
+from enfilade.scene.preflight import Preflight, preflight
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
 ADVICE = {
@@ -84,22 +85,15 @@ class Scene:
         name = f"Mitsuba {importlib.metadata.version('mitsuba')}"
         return {"renderer": name, "variant": active().variant, "fingerprint": fingerprint(self.file)}
 
-    def preflight(self, settings: Settings) -> str:
+    def preflight(self, settings: Settings) -> Preflight:
         """Load the scene once in a process of its own, with limits of memory and time.
-
-        Returns
-        -------
-        str
-            Why the diffuse lobe of its materials can't be separated; empty where it can, or is not known.
 
         Raises
         ------
         SceneError
         """
         if self.renderer:
-            return ""
-        from enfilade.scene.preflight import preflight
-
+            return Preflight()
         return preflight(self.file, settings[TraceSettings], settings[LimitSettings], active().variant)
 
     def open(self, settings: Settings) -> Renderer:

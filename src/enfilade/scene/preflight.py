@@ -7,14 +7,32 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from enfilade.errors import SceneError
 from enfilade.resource_limits import die_with, limit_memory
 from enfilade.settings import LimitSettings, Settings, TraceSettings
 
 
-def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> str:
+@dataclass(frozen=True)
+class Preflight:
+    """What is known of a scene before it is rendered.
+
+    Attributes
+    ----------
+    why_inseparable : str
+        See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`; empty where it is not known.
+    ignored : list of str
+        What the scene has and the frames will not show.
+    """
+
+    why_inseparable: str = ""
+    ignored: list[str] = field(default_factory=list)
+
+
+def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant: str) -> Preflight:
     """Check a Mitsuba scene, and load it, in a child process, which ends with this one.
 
     Parameters
@@ -29,8 +47,7 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
 
     Returns
     -------
-    str
-        See :attr:`enfilade.renderer.LobeRenderer.why_inseparable`.
+    Preflight
 
     Raises
     ------
@@ -61,9 +78,9 @@ def preflight(scene: Path, trace: TraceSettings, limits: LimitSettings, variant:
             f"{last}): it is damaged, or needs more than {bound}"
         )
     answer = json.loads(done.stdout)
-    if answer["error"]:
-        raise SceneError(answer["error"])
-    return str(answer["why_inseparable"])
+    if error := answer.pop("error"):
+        raise SceneError(error)
+    return Preflight(**answer)
 
 
 def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
@@ -82,11 +99,11 @@ def _main(scene: Path, tables: str, variant: str, parent: int) -> None:
 
     if not is_gpu:  # CUDA maps the memory of the GPU into the address space
         limit_memory(settings[LimitSettings].preflight_mb)
-    answer = {"error": "", "why_inseparable": ""}
+    answer: dict[str, Any] = {"error": ""}
     try:
         check_scene(scene, settings[LimitSettings])
         renderer = MitsubaRenderer(scene, max_depth=settings[TraceSettings].max_depth)
-        answer["why_inseparable"] = renderer.why_inseparable
+        answer |= asdict(Preflight(renderer.why_inseparable, renderer.ignored))
     except SceneError as error:
         answer["error"] = str(error)
     except RuntimeError as error:  # of Mitsuba

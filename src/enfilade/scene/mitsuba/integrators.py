@@ -62,11 +62,29 @@ def why_inseparable(scene: Any, integrator: Any) -> str:
     max_depth, _ = _depths(integrator)
     if max_depth <= MAX_PATH_DEPTH:
         return f"its paths end at depth {max_depth}; {MAX_PATH_DEPTH + 1} is the least"
-    if is_volumetric(integrator) and any(
-        isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy
-    ):
+    if is_volumetric(integrator) and has_media(scene):
         return "it has participating media"
     return ""
+
+
+def ignored(scene: Any, integrator: Any) -> list[str]:
+    """What a scene has and its pictures will not show: lenses and projections of its sensors, media."""
+    notes = [
+        f"the scene's sensor is a {sensor.class_name()}: every frame is the perspective image of a pinhole"
+        for sensor in scene.sensors()
+        if sensor.class_name() != "PerspectiveCamera"
+    ]
+    if not is_volumetric(integrator) and has_media(scene):
+        notes.append(
+            "the scene has participating media, which its integrator ignores: "
+            '<integrator type="volpath"/> and --method reference show them'
+        )
+    return notes
+
+
+def has_media(scene: Any) -> bool:
+    """Whether a scene has participating media."""
+    return any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy)
 
 
 def is_volumetric(integrator: Any) -> bool:

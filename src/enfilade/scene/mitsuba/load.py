@@ -8,6 +8,7 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from enfilade.errors import SceneError
 from enfilade.scene.mitsuba.files import fingerprint, reason
@@ -25,7 +26,8 @@ def load_scene(file: Path) -> Any:
     Raises
     ------
     SceneError
-        The file is missing, malformed, or refused by Mitsuba; or a file that it names can't be read.
+        The file is missing, malformed, or refused by Mitsuba; or a file that it names can't be read, or is an
+        image with values that are not finite.
     MemoryError
     """
     gc.collect()
@@ -54,4 +56,20 @@ def load_scene(file: Path) -> Any:
             f"{file} has no light, every frame would be black: add an <emitter>; or, in Blender, a lamp or a "
             "world with light, and import it again"
         )
+    for name, values in mi.traverse(scene):
+        if name.endswith(".data"):  # of bitmaps, environment maps and grids
+            _check_finite(file, name.removesuffix(".data"), np.asarray(values))
     return scene
+
+
+def _check_finite(file: Path, name: str, values: Any) -> None:
+    """Refuse an image with values that are NaN or infinite: paths that meet them would be left out."""
+    is_bad = ~np.isfinite(values)
+    if is_bad.any():
+        row, column = np.argwhere(is_bad)[0][:2]
+        height, width = values.shape[:2]
+        owner = "" if name.startswith("object_") else f" of {name}"  # Mitsuba's names of what has none
+        raise SceneError(
+            f"{file}: an image{owner} has {is_bad.sum()} values that are NaN or infinite, first in row "
+            f"{row}, column {column} of {width}x{height}; mend it"
+        )

@@ -37,6 +37,7 @@ from enfilade.renderer import (
 )
 from enfilade.scene.mitsuba.emitters import find_emitters, trace_photons
 from enfilade.scene.mitsuba.integrators import (
+    ignored,
     is_volumetric,
     scene_integrator,
     shortened,
@@ -126,6 +127,11 @@ class MitsubaRenderer:
             pixel_filter=pixel_filter,
             random=random,
         )
+
+    @property
+    def ignored(self) -> list[str]:
+        """See :attr:`enfilade.scene.preflight.Preflight.ignored`."""
+        return ignored(self._scene, self._integrator)
 
     @property
     def why_inseparable(self) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from enfilade.arrays import Bool, UInt, lanes
 from enfilade.records import SurfaceClass
+from enfilade.scene.mitsuba.integrators import has_media
 from enfilade.scene.mitsuba.merge import MergedScene
 
 NULL_BSDFS = ("MaskBSDF", "Null")  # classes with a null lobe; thin glass has one, too, but is visible
@@ -48,8 +49,8 @@ class Shapes:
         self._bsdfs = mi.BSDFPtr([shape.bsdf() for shape in shapes])
         self._is_null = bsdf_table(scene, lambda bsdf: bsdf.class_name() in NULL_BSDFS)
         lamps = np.zeros(max(registry) + 1, bool)
-        has_media = any(isinstance(node, mi.Medium) for node in mi.traverse(scene).hierarchy)
-        lamps[registry] = [is_lamp(shape) and not has_media for shape in shapes]
+        is_clear = not has_media(scene)
+        lamps[registry] = [is_clear and is_lamp(shape) for shape in shapes]
         self._is_lamp = lanes(lamps)
         self.names = merged.names
         self.may_be_null = bool(dr.any(self._is_null))
