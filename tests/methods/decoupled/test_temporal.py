@@ -121,6 +121,13 @@ def test_the_light_of_uncertain_edges_of_a_lamp_is_kept():
     assert found[WHERE].mean() == pytest.approx(1.05, abs=0.01)
 
 
+def test_dark_pixels_keep_their_weight_beside_brighter_frames():
+    # Their deviation exceeds their mean, as that of fireflies does.
+    made = [np.full((HEIGHT, WIDTH, 3), 0.3, np.float32) for _ in GEOMETRIES]
+    made[0][:] = 1e-4
+    assert changed(made, noise=0.1).max() < 0.15
+
+
 @pytest.mark.parametrize(
     ("noise", "others", "expected"),
     [

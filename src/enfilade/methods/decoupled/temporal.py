@@ -36,7 +36,7 @@ DISPLAYED_NOISE_SHARE = 0.5
 # The squared mean of samples over its variance: as many equal ones, beside black ones, have both. Below two,
 # one sample alone makes a pixel bright.
 MIN_EFFECTIVE_SAMPLES = 2.0
-SINGLE_WEIGHT = np.float32(0.05)  # of such a pixel beside those of other frames
+SINGLE_WEIGHT = 0.05  # of such a pixel beside those of other frames
 FIREFLY = 2.0  # times the average over time: brighter pixels of one sample are fireflies
 
 
@@ -147,7 +147,7 @@ def accumulate_temporally(
     geometry: Geometry,
     here: UploadedImage,
     others: Sequence[tuple[UploadedImage, float]],
-    own_weight: F32 | None = None,
+    is_single: Mask | None = None,
 ) -> F32:
     """Average an AOV with that of neighbouring frames, reprojected along its own motion.
 
@@ -162,8 +162,9 @@ def accumulate_temporally(
         The AOV of the frame.
     others
         The same AOV of other frames, with weights.
-    own_weight : (H, W) float32
-        Weights of the frame's own pixels, above 0; None for one.
+    is_single : (H, W) bool
+        Pixels that one sample makes bright. Those more than twice as bright as the average of the other
+        frames have nearly that average. None: no such pixels.
 
     Returns
     -------
@@ -176,7 +177,8 @@ def accumulate_temporally(
     position = points_at(geometry.camera, here.depths)
     is_real = here.shape_indices < IN_VIRTUAL_IMAGE
     normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
-    weight = dr.ones(Float, dr.width(color)) if own_weight is None else lanes(own_weight)
+    missing = Float(0) if is_single is None else dr.select(lanes(is_single), 1.0 - SINGLE_WEIGHT, 0.0)
+    weight = dr.ones(Float, dr.width(color)) - missing
     total = weight * color
     own = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, own)
@@ -195,7 +197,12 @@ def accumulate_temporally(
         total += frame_weight * value
         weight += frame_weight
         dr.eval(total, weight)  # so that one kernel serves any number of frames
-    return image(total / weight, *geometry.shape_index.shape)
+
+    # Give pixels that are no fireflies their whole weight.
+    average = total / weight
+    is_firefly = (missing > 0.0) & (own > FIREFLY * dr.dot(average, Array3f(*REC709_LUMINANCE)))
+    average = dr.select(is_firefly, average, (total + missing * color) / (weight + missing))
+    return image(average, *geometry.shape_index.shape)
 
 
 def upload_displayed(
@@ -283,8 +290,7 @@ def accumulate_refined(
     """
     scale = np.float32(2.0**exposure_ev)
     is_single = np.square(deviation) * MIN_EFFECTIVE_SAMPLES > np.square(luminance(color))
-    own_weight = np.where(is_single, SINGLE_WEIGHT, np.float32(1))
-    average = accumulate_temporally(geometry, here, others, own_weight)
+    average = accumulate_temporally(geometry, here, others, is_single)
     own = image(here.values[0], *is_single.shape)
     is_firefly = is_single & (luminance(own) > FIREFLY * luminance(average))
     shown: F32 = np.where(is_firefly[..., None], average, color * scale + (average - own))
