@@ -33,11 +33,6 @@ MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another fram
 # counts as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal
 # edges.
 DISPLAYED_NOISE_SHARE = 0.5
-# The squared mean of samples over its variance: as many equal ones, beside black ones, have both. Below two,
-# one sample alone makes a pixel bright.
-MIN_EFFECTIVE_SAMPLES = 2.0
-SINGLE_WEIGHT = 0.05  # of such a pixel beside those of other frames
-FIREFLY = 2.0  # times the average over time: brighter pixels of one sample are fireflies
 
 
 class TemporalAccumulation:
@@ -80,9 +75,7 @@ class TemporalAccumulation:
             deviation = to_float(shaded.deviation)
             here = redisplayed(shown, color, deviation, where, exposure_ev=_exposure_ev(shot))
             neighbours = [(other, weights[f]) for f, other in displayed.items()]
-            color = accumulate_refined(
-                geometry, color, deviation, here, neighbours, exposure_ev=_exposure_ev(shot)
-            )
+            color = accumulate_refined(geometry, color, here, neighbours, exposure_ev=_exposure_ev(shot))
 
         # Specular lobes that are a difference have negative samples: clip the sum.
         return Frame(np.maximum(color, 0.0), shaded.provenance)
@@ -144,10 +137,7 @@ def upload_aov(geometry: Geometry, aov: SpecularAov, where: Mask) -> UploadedIma
 
 
 def accumulate_temporally(
-    geometry: Geometry,
-    here: UploadedImage,
-    others: Sequence[tuple[UploadedImage, float]],
-    is_single: Mask | None = None,
+    geometry: Geometry, here: UploadedImage, others: Sequence[tuple[UploadedImage, float]]
 ) -> F32:
     """Average an AOV with that of neighbouring frames, reprojected along its own motion.
 
@@ -161,10 +151,7 @@ def accumulate_temporally(
     here
         The AOV of the frame.
     others
-        The same AOV of other frames, with weights.
-    is_single : (H, W) bool
-        Pixels that one sample makes bright. Those more than twice as bright as the average of the other
-        frames have nearly that average. None: no such pixels.
+        The same AOV of other frames, with weights relative to the frame's own.
 
     Returns
     -------
@@ -177,9 +164,7 @@ def accumulate_temporally(
     position = points_at(geometry.camera, here.depths)
     is_real = here.shape_indices < IN_VIRTUAL_IMAGE
     normal = dr.select(is_real, lanes(geometry.normal), vector3(geometry.camera.eye) - position)
-    missing = Float(0) if is_single is None else dr.select(lanes(is_single), 1.0 - SINGLE_WEIGHT, 0.0)
-    weight = dr.ones(Float, dr.width(color)) - missing
-    total = weight * color
+    total, weight = Array3f(color), dr.ones(Float, dr.width(color))
     own = dr.dot(color, Array3f(*REC709_LUMINANCE))
     dr.eval(position, normal, total, weight, own)
     for other, given in others:
@@ -197,12 +182,7 @@ def accumulate_temporally(
         total += frame_weight * value
         weight += frame_weight
         dr.eval(total, weight)  # so that one kernel serves any number of frames
-
-    # Give pixels that are no fireflies their whole weight.
-    average = total / weight
-    is_firefly = (missing > 0.0) & (own > FIREFLY * dr.dot(average, Array3f(*REC709_LUMINANCE)))
-    average = dr.select(is_firefly, average, (total + missing * color) / (weight + missing))
-    return image(average, *geometry.shape_index.shape)
+    return image(total / weight, *geometry.shape_index.shape)
 
 
 def upload_displayed(
@@ -258,7 +238,6 @@ def _displayed(color: F32, deviation: F32, exposure_ev: float) -> SpecularAov:
 def accumulate_refined(
     geometry: Geometry,
     color: F32,
-    deviation: F32,
     here: UploadedImage,
     others: Sequence[tuple[UploadedImage, float]],
     *,
@@ -266,8 +245,7 @@ def accumulate_refined(
 ) -> F32:
     """Average the refined pixels of a frame with neighbouring frames.
 
-    Radiance above white stays: the sum of the frames' light is kept. Only a pixel that one sample makes
-    bright, which the other frames do not confirm, has their average.
+    Radiance above white stays: the sum of the frames' light is kept.
 
     Parameters
     ----------
@@ -275,8 +253,6 @@ def accumulate_refined(
         G-buffer of the frame.
     color : (H, W, 3) float32
         Linear radiance of the frame.
-    deviation : (H, W) float32
-        Standard deviation of the luminance; 0 where pixels are not refined.
     here, others
         Of :func:`upload_displayed`: the refined pixels of the frame, and whole frames with weights relative
         to its own.
@@ -288,10 +264,5 @@ def accumulate_refined(
     (H, W, 3) float32
         Linear radiance; pixels that are not refined stay.
     """
-    scale = np.float32(2.0**exposure_ev)
-    is_single = np.square(deviation) * MIN_EFFECTIVE_SAMPLES > np.square(luminance(color))
-    average = accumulate_temporally(geometry, here, others, is_single)
-    own = image(here.values[0], *is_single.shape)
-    is_firefly = is_single & (luminance(own) > FIREFLY * luminance(average))
-    shown: F32 = np.where(is_firefly[..., None], average, color * scale + (average - own))
-    return shown / scale
+    change: F32 = accumulate_temporally(geometry, here, others) - image(here.values[0], *color.shape[:2])
+    return color + change * np.float32(2.0**-exposure_ev)
