@@ -5,7 +5,7 @@ import pytest
 
 from enfilade.camera.pinhole import Camera
 from enfilade.methods.decoupled import Decoupled
-from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
+from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera, virtual_camera
 from enfilade.methods.decoupled.sample_counts import irradiance_spp, specular_spp
 from enfilade.settings import DecoupledSettings, Settings
 
@@ -52,6 +52,8 @@ def test_light_of_large_frames_has_fewer_pixels():
     assert size(4096, 2160) == size(2048, 1080) == (683, 360)  # the outermost columns are in view
     assert size(2, 1_000_000) == (1, 333_333)  # never without pixels
     assert size(320, 180, irradiance_camera) == (640, 360)
+    assert size(320, 180, virtual_camera) == (320, 180)
+    assert size(1280, 720, virtual_camera) == size(3840, 2160, virtual_camera) == (1280, 720)
     assert size(1280, 720, irradiance_camera) == size(3840, 2160, irradiance_camera) == (1280, 720)
     excerpt = {"irradiance": 2}
     ratios = Decoupled().cost_ratios(Settings(), 3840 * 2160, excerpt, excerpt, shots=1)

@@ -9,7 +9,7 @@ from enfilade.gbuffer import find_geometry
 from enfilade.methods.analysis import keyframes_of
 from enfilade.methods.base import Inputs
 from enfilade.methods.decoupled.irradiance_cache import accumulate, upload
-from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera
+from enfilade.methods.decoupled.light_camera import irradiance_camera, light_camera, virtual_camera
 from enfilade.methods.decoupled.records import IrradianceImage
 from enfilade.methods.decoupled.sample_counts import ACCUMULATED
 from enfilade.methods.decoupled.surface_image import UploadedImage
@@ -103,6 +103,10 @@ class ImageStore:
     def light_geometry(self, frame: int) -> Geometry:
         """G-buffer of the light camera."""
         return self._geometry(frame, light_camera(self._walk.path.cameras[frame]))
+
+    def virtual_geometry(self, frame: int) -> Geometry:
+        """G-buffer of the camera of virtual images."""
+        return self._geometry(frame, virtual_camera(self._walk.path.cameras[frame]))
 
     def _geometry(self, frame: int, camera: Camera) -> Geometry:
         """G-buffer of a frame by a camera of another size."""

@@ -12,7 +12,7 @@ IRRADIANCE_SCALE = 2  # width and height of irradiance images over those of the 
 
 
 def light_camera(camera: Camera) -> Camera:
-    """The camera of the hash grid: the same view at a whole fraction of its size, or itself."""
+    """The camera of the prepass: the same view at a whole fraction of its size, or itself."""
     return reduced(camera, light_reduction(camera.width * camera.height))
 
 
@@ -23,6 +23,16 @@ def irradiance_camera(camera: Camera) -> Camera:
     if (width, height) == (camera.width, camera.height):
         return camera
     return replace(camera, width=width, height=height)
+
+
+def virtual_camera(camera: Camera) -> Camera:
+    """The camera of virtual images, whose pixels give the hash grid's entries their width.
+
+    Mirrors show fine details. Where the light camera has the size of the frame it is that one, else that of
+    irradiance images.
+    """
+    light = light_camera(camera)
+    return light if light is camera else irradiance_camera(camera)
 
 
 def light_reduction(pixels: int) -> int:

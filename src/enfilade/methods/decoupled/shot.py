@@ -21,7 +21,7 @@ from enfilade.methods.decoupled.hash_grid import Entries, HashGrid
 from enfilade.methods.decoupled.image_store import DISOCCLUSION_IMAGES, PREPASS_IMAGES, ImageStore, nearest
 from enfilade.methods.decoupled.integrator import Integrator
 from enfilade.methods.decoupled.irradiance_cache import IrradianceCache, is_covered, reproject_to
-from enfilade.methods.decoupled.light_camera import light_camera
+from enfilade.methods.decoupled.light_camera import virtual_camera
 from enfilade.methods.decoupled.path_kernels import ENTRY_PX
 from enfilade.methods.decoupled.paths import Path, spawn
 from enfilade.methods.decoupled.surface_image import UploadedImage, blank_image
@@ -139,7 +139,7 @@ class ShotContext:
 
     def spawn(self, frame: int, rays: Rays, sampler: Any) -> Path:
         """Camera paths of a frame, which grow by the width of the hash grid's entries."""
-        pixel_angle = light_camera(self.walk.path.cameras[frame]).pixel_angle
+        pixel_angle = virtual_camera(self.walk.path.cameras[frame]).pixel_angle
         return spawn(rays, sampler, ENTRY_PX * pixel_angle)
 
     def prepass_cache(self, frame: int) -> IrradianceCache:

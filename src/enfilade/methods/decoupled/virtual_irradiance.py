@@ -44,7 +44,7 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     entries : Entries
     count : RayCount
     """
-    images = shot.virtual_images.find(shot.images.light_geometry(frame))
+    images = shot.virtual_images.find(shot.images.virtual_geometry(frame))
     gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
     entries = Entries.joined([found for found, _ in gathered])
     return entries, sum((count for _, count in gathered), RayCount())
