@@ -33,7 +33,8 @@ from studies.bench.suite import (
 from studies.bench.tables import print_table, ratio_text
 
 HERE = Path(__file__).resolve().parent
-FRAMES, LARGE_FRAMES = 16, 8
+FRAMES = 40  # of a walkthrough
+MEASURED, LARGE_MEASURED = 16, 8  # of them
 REFERENCE_SPP, LARGE_REFERENCE_SPP = "512", "128"  # a window of a large image has 13 times as many pixels
 SEEDS = "3"  # of enfilade's configurations; one of large images and of the quick bench
 
@@ -52,8 +53,12 @@ def main() -> int:
         "--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones"
     )
     parser.add_argument("--sizes", nargs="+", default=None, help="320x180 1280x720 by default")
+    parser.add_argument("--frames", type=int, default=FRAMES, help=f"of a walkthrough; {FRAMES} by default")
     parser.add_argument(
-        "--frames", type=int, default=None, help=f"{FRAMES} by default, {LARGE_FRAMES} of large images"
+        "--measured",
+        type=int,
+        default=None,
+        help=f"frames among them that are measured; {MEASURED} by default, {LARGE_MEASURED} of large images",
     )
     parser.add_argument("--out", type=Path, default=Path("runs/bench"))
     parser.add_argument("--keep", type=Path, default=HERE / "results", help="folder of the results")
@@ -72,14 +77,18 @@ def main() -> int:
             )
         except EnfiladeError as error:
             parser.error(str(error))
-        frames = arguments.frames or (LARGE_FRAMES if is_large else FRAMES)
+        measured = arguments.measured or (LARGE_MEASURED if is_large else MEASURED)
         defaults = ["--reference-spp", LARGE_REFERENCE_SPP if is_large else REFERENCE_SPP]  # a later one wins
         defaults += ["--seeds", "1" if is_large or arguments.quick else SEEDS]
         is_chosen = any(option.startswith("--only") for option in options)
         only = () if is_chosen else only_for(size, is_quick=arguments.quick)
         for case in cases:
             try:
-                benches.append(run_case(case, size, frames, only, arguments.out, [*defaults, *options]))
+                benches.append(
+                    run_case(
+                        case, size, arguments.frames, measured, only, arguments.out, [*defaults, *options]
+                    )
+                )
             except EnfiladeError as error:
                 failed.append(str(error))
     if benches:

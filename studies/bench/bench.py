@@ -16,7 +16,7 @@ import json
 import resource
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -76,6 +76,7 @@ def bench(
     place: Place,
     *,
     reference_spp: int,
+    frames: int | None = None,
     seeds: int = 1,
     measures: Sequence[str] = (),
     reference_device: Choice = "auto",
@@ -89,7 +90,7 @@ def bench(
     Parameters
     ----------
     job
-        Scene, path and settings.
+        Scene, measured frames, and settings.
     configurations
         Rendered on the CPU.
     place
@@ -97,6 +98,9 @@ def bench(
     reference_spp
         Least number of paths a pixel of the references, half of them in each of two independent halves. A
         store that has more is used as it is.
+    frames
+        Of the walkthrough whose cost is stated; the measured frames are some of them. By default these alone.
+        The cost of configurations that render the measured frames only is extrapolated.
     seeds
         How often each configuration of enfilade's methods is rendered: with the seed of the job and the next
         ones. Baselines are rendered once.
@@ -125,7 +129,8 @@ def bench(
     windows = alone(reference_device, _prepare, job, place, reference_spp, quiet=quiet)
     references = References(place.store, job, windows)
     prepared_s = time.monotonic() - started
-    runs = _Bench(job, place.folder, references, windows, names, quiet=quiet)
+    count = frames or len(job.path)
+    runs = _Bench(job, count, place.folder, references, windows, names, quiet=quiet)
     floor = runs.floor()
     rows = [runs.row(one, 1 if one.is_baseline else seeds, floor) for one in configurations]
     found = {
@@ -136,6 +141,7 @@ def bench(
         "size": [job.path.width, job.path.height],
         "fps": job.path.fps,
         "frames": list(job.path.numbers),
+        "walkthrough_frames": count,
         "pixels_per_degree": job.viewing.pixels_per_degree,
         "exposure_ev": job.settings[ViewingSettings].exposure_ev,
         "windows": [asdict(window) for window in windows],
@@ -155,9 +161,9 @@ def bench(
 
 def forecast_s(job: Job, configurations: Sequence[Configuration], seeds: int, cores: int) -> float:
     """Rough duration of the configurations of a bench on CPUs, wall seconds, from the number of paths."""
-    pixels = job.path.width * job.path.height * len(job.path)
-    spp = sum(c.expected_spp * (1 if c.is_baseline else seeds) for c in configurations)
-    return pixels * spp / PATHS_PER_CPU_S / cores
+    pixels = job.path.width * job.path.height
+    paths = sum(len(c.job.path) * c.expected_spp * (1 if c.is_baseline else seeds) for c in configurations)
+    return pixels * paths / PATHS_PER_CPU_S / cores
 
 
 def _prepare(job: Job, place: Place, spp: int, *, quiet: bool) -> list[Window]:
@@ -189,6 +195,7 @@ class _Bench:
     def __init__(
         self,
         job: Job,
+        frames: int,
         folder: Path,
         references: References,
         windows: Sequence[Window],
@@ -196,7 +203,7 @@ class _Bench:
         *,
         quiet: bool,
     ) -> None:
-        self._job, self._folder, self._names, self._quiet = job, folder, names, quiet
+        self._job, self._frames, self._folder, self._names, self._quiet = job, frames, folder, names, quiet
         self._references, self._windows = references, windows
 
     def row(self, one: Configuration, seeds: int, floor: dict[str, list[float]]) -> dict[str, Any]:
@@ -299,16 +306,33 @@ class _Bench:
         write_json(file, {"cost": spent, "origin": {**origin(), "machine": machine()}})
 
     def _cost(self, one: Configuration, folder: Path) -> dict[str, Any]:
-        """CPU and wall seconds of a run, by stage and in total, the start included."""
+        """CPU and wall seconds of all frames, by stage and in total, the start included."""
         uncharged = _uncharged(one)
-        stages = add_costs(
-            line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged
-        )
+        tasks = [line["cost"] for line in RunFolder.read(folder).lines() if line["pass"] not in uncharged]
+        stages = add_costs(extrapolated(tasks, len(one.job.path), self._frames))
         charged = {name: spent for name, spent in stages.items() if name not in uncharged}
         total = {kind: sum(spent[kind] for spent in charged.values()) for kind in ("cpu_s", "wall_s")}
         start = read_json(self._folder / "costs" / f"{one.name}.json")["cost"]
         total["cpu_s"] += start["start_cpu_s"]
         return {**total, **start, "stages": charged}
+
+
+def extrapolated(
+    tasks: Sequence[dict[str, dict[str, float]]], rendered: int, frames: int
+) -> Iterator[dict[str, dict[str, float]]]:
+    """Costs of tasks as if more frames were rendered: all but the first task's, whose cost has a start's.
+
+    Parameters
+    ----------
+    tasks
+        Costs by stage and kind; one of each frame, where not all frames are rendered.
+    rendered, frames
+        Numbers of frames: rendered, and of the walkthrough.
+    """
+    factor = (frames - 1) / (rendered - 1) if 1 < rendered < frames else frames / rendered
+    for place, cost in enumerate(tasks):
+        times = 1.0 if place == 0 and rendered > 1 else factor
+        yield {stage: {kind: times * of for kind, of in spent.items()} for stage, spent in cost.items()}
 
 
 def mean_cost(costs: Sequence[dict[str, Any]]) -> dict[str, Any]:

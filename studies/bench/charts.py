@@ -68,7 +68,8 @@ def plot_page(benches: Sequence[Mapping[str, Any]], file: Path) -> Path:
 def _title(found: Mapping[str, Any]) -> str:
     size = "x".join(map(str, found["size"]))
     paths = found["reference"]["spp"]
-    return f"{found['scene']}, {len(found['frames'])} frames of {size}, reference {paths} paths"
+    frames = f"{len(found['frames'])} of {found['walkthrough_frames']} frames"
+    return f"{found['scene']}, {frames} of {size}, reference {paths} paths"
 
 
 def _legend(figure: Any, ax: Any) -> None:
@@ -77,7 +78,7 @@ def _legend(figure: Any, ax: Any) -> None:
 
 
 def _panel(ax: Any, found: Mapping[str, Any], name: str) -> None:
-    quality, frames = QUALITIES[name], len(found["frames"])
+    quality, frames = QUALITIES[name], found["walkthrough_frames"]
     sign = -1.0 if quality.is_more_better else 1.0
 
     def place(row: Mapping[str, Any]) -> Point:

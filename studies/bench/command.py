@@ -12,6 +12,7 @@ import click
 from enfilade.cli.group import debug_option, mark_resumable
 from enfilade.cli.options import json_option, path_options, quiet_option, settings_of, settings_options
 from enfilade.device import activate
+from enfilade.errors import InputError
 
 if TYPE_CHECKING:
     from enfilade.runs.job import Job
@@ -51,6 +52,12 @@ def _counts(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tupl
     default=2048,
     show_default=True,
     help="Paths a pixel of the references, in two halves.",
+)
+@click.option(
+    "--walkthrough",
+    metavar="FRAMES",
+    help="Frames of the walkthrough, such as 1-40: enfilade renders them all, and costs are theirs; those of "
+    "--frames are measured, and rendered by baselines.  [default: those of --frames]",
 )
 @click.option(
     "--seeds",
@@ -103,6 +110,7 @@ def command(
     only: tuple[str, ...],
     folder: Path,
     store: Path,
+    walkthrough: str | None,
     as_json: bool,
     **inputs: Any,
 ) -> None:
@@ -115,6 +123,7 @@ def command(
     """
     mark_resumable(ctx)
     activate("cpu")
+    from enfilade.camera import ranges
     from studies.bench.bench import Place, bench, forecast_s
     from studies.bench.charts import plot_bench
     from studies.bench.configurations import all_configurations, selected
@@ -124,12 +133,16 @@ def command(
 
     path = {name: inputs.pop(name) for name in ("path_file", "size", "frames", "fps")}
     job = _job(ctx, scene, **path)
-    configurations = selected(all_configurations(job, traced=traced, denoised=denoised), only)
+    whole = job.path if walkthrough is None else _job(ctx, scene, **path | {"frames": walkthrough}).path
+    if missing := sorted(set(job.path.numbers) - set(whole.numbers)):
+        raise InputError(f"measured frames {ranges(missing)} are not among --walkthrough {walkthrough}")
+    known = all_configurations(job, traced=traced, denoised=denoised, walkthrough=whole)
+    configurations = selected(known, only)
     if not inputs["quiet"]:
         minutes = forecast_s(job, configurations, inputs["seeds"], len(os.sched_getaffinity(0))) / 60.0
         count = f"{len(configurations)} configurations"
         click.echo(f"{count}, about {minutes:.0f} minutes once the references are there", err=True)
-    found = bench(job, configurations, Place(folder, store), **inputs)
+    found = bench(job, configurations, Place(folder, store), frames=len(whole), **inputs)
     references = References(store, job, windows_of(found["windows"]))
     plots = [
         plot_bench(found, folder / "bench.png"),

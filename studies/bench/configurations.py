@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from enfilade.camera import CameraPath
 from enfilade.errors import SettingsError
 from enfilade.runs.job import Job
 from enfilade.settings import (
@@ -98,15 +99,30 @@ class Configuration:
         return SampleFilter.BOX if self.family == "denoised" else SampleFilter.GAUSSIAN
 
 
-def all_configurations(job: Job, *, traced: Iterable[int], denoised: Iterable[int]) -> list[Configuration]:
-    """All configurations: baselines at the given spp, and the presets applied to the job's settings."""
+def all_configurations(
+    job: Job, *, traced: Iterable[int], denoised: Iterable[int], walkthrough: CameraPath | None = None
+) -> list[Configuration]:
+    """All configurations: baselines at the given spp, and the presets applied to the job's settings.
+
+    Parameters
+    ----------
+    job
+        Of the measured frames.
+    traced, denoised
+        Paths a pixel.
+    walkthrough
+        Frames of the configurations that share data between frames, the measured ones among them; by default
+        these alone.
+    """
+    whole = replace(job, path=walkthrough or job.path)
     found = [_baseline("traced", f"traced-{n}", job, n) for n in sorted(set(traced))]
     for n in sorted(set(denoised)):
         for variant in VARIANTS:
             name = f"denoised-{n}-{variant}".removesuffix("-")
-            found.append(_baseline("denoised", name, job, n, variant))
+            frames = whole if "accumulated" in variant else job
+            found.append(_baseline("denoised", name, frames, n, variant))
     for name, (method, tables) in PRESETS.items():
-        preset = replace(job, method=method, settings=_overridden(job.settings, tables))
+        preset = replace(whole, method=method, settings=_overridden(job.settings, tables))
         found.append(Configuration(name, method, preset))
     return found
 

@@ -14,6 +14,7 @@ Without an error the score is that of the noise of so many paths.
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,7 @@ def main() -> None:
 
     found = json.loads((arguments.folder / "bench.json").read_text())
     job = read_job(arguments.folder / "configurations" / found["configurations"][0]["name"])
+    job = replace(job, path=job.path.select(found["frames"]))  # the measured ones
     windows = windows_of(found["windows"])
     traced = References(arguments.references, job, windows, seed=SEED)
     traced.grow(arguments.spp, Silence())

@@ -18,13 +18,13 @@ from studies.bench.splits import UNLISTED, split_of
 from studies.scenes import SCENES
 
 PIXEL_M = 0.25 / 800.0  # pitch of the paper's screen, 640x480 on 25 cm: 28 pixels per degree at 0.5 m
-FIRST_FRAME = 11  # where the path is long enough
+FIRST_FRAME = 11  # of the measured ones, where the path is long enough
 LARGE_PX = 500_000  # from this size on, few frames and configurations
 SMALL = (
     *(f"denoised-{name}" for name in ("8", "16", "32", "64", "128", "8-accumulated-after")),
     "paper-16", "decoupled-60", "decoupled-10",
 )  # fmt: skip
-LARGE = ("denoised-8", "denoised-32", "decoupled-60", "decoupled-10")
+LARGE = ("denoised-8", "denoised-8-fast", "denoised-32", "decoupled-60", "decoupled-10")
 QUICK = ("denoised-4", "denoised-16", "denoised-64", "decoupled-60", "decoupled-10")
 DENOISED_SPP = "4,8,16,32,64,128"  # those that any of them names
 
@@ -84,9 +84,31 @@ def found_in(folder: Path) -> list[Case]:
 
 
 def run_case(
-    case: Case, size: str, frames: int, only: Iterable[str], out: Path, options: list[str]
+    case: Case,
+    size: str,
+    frames: int,
+    measured: int,
+    only: Iterable[str],
+    out: Path,
+    options: list[str],
 ) -> dict[str, Any]:
     """Run or continue the bench of a scene in a process of its own; return its results.
+
+    Parameters
+    ----------
+    case
+    size
+        Such as ``320x180``.
+    frames
+        Of the walkthrough, from the first one; all frames where the path has fewer.
+    measured
+        Number of consecutive frames that are measured.
+    only
+        Configurations, see :func:`only_for`.
+    out
+        Folder of the benches.
+    options
+        Further options of the command.
 
     Raises
     ------
@@ -95,12 +117,13 @@ def run_case(
     """
     width, height = map(int, size.split("x"))
     length = len(load_path(case.path, size=None, frames=None, fps=None))
-    last = min(FIRST_FRAME + frames - 1, length)
+    frames = min(frames, length)
+    last = min(FIRST_FRAME + measured - 1, frames)
     folder = out / f"{case.name}-{size}-{frames}"
     command = [
         sys.executable, "-m", "studies", "bench", str(case.scene), "--path", str(case.path),
         "--out", str(folder), "--denoised-spp", DENOISED_SPP,
-        "--size", size, "--frames", f"{max(last - frames + 1, 1)}-{last}",
+        "--size", size, "--walkthrough", f"1-{frames}", "--frames", f"{max(last - measured + 1, 1)}-{last}",
         "--set", f"viewing.diagonal_m={math.hypot(width, height) * PIXEL_M}",
         *(word for pattern in only for word in ("--only", pattern)), *options,
     ]  # fmt: skip

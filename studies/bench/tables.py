@@ -29,10 +29,10 @@ def bench_tables(found: Mapping[str, Any]) -> list[Table]:
 
 def _configurations(found: Mapping[str, Any]) -> Table:
     size, measures = "x".join(map(str, found["size"])), found["measures"]
-    frames = len(found["frames"])
+    frames = found["walkthrough_frames"]
     headings = ("CPU s\na frame", "start\nCPU s", "wall s\na frame", "peak\nMiB")
     table = _table(
-        f"{found['scene']}, {frames} frames of {size}", "configuration", *headings,
+        f"{found['scene']}, {len(found['frames'])} of {frames} frames of {size}", "configuration", *headings,
         *(f"{of['title']}\n{of['unit']}" for of in measures.values()),
     )  # fmt: skip
     family = None

@@ -20,7 +20,7 @@ from enfilade.settings import (
 )
 from studies.__main__ import main
 from studies.bench.baselines import DenoiserSettings
-from studies.bench.bench import mean_cost, undecided
+from studies.bench.bench import extrapolated, mean_cost, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
@@ -40,11 +40,11 @@ def frames_of(run):
 
 @pytest.fixture(scope="module")
 def line(tmp_path_factory):
-    """Arguments of a bench of four frames, 48x36; its folder is the last one."""
+    """Arguments of a bench of three of four frames, 48x36; its folder is the last one."""
     folder = tmp_path_factory.mktemp("bench")
     flags = ("--spp", "1,4", "--denoised-spp", "2", "--reference-spp", 64, "--json", "--quiet")
     flags += ("--set", "masks.slow_deg_s=0.4")  # of a section that some configurations read
-    flags += ("--seeds", 2)
+    flags += ("--seeds", 2, "--frames", "2-4", "--walkthrough", "1-4")
     only = [word for name in (*NAMES, SEEDED) for word in ("--only", name)]
     measures = [word for name in MEASURES for word in ("--measure", name)]
     words = ("bench", *room_files(folder, 4), *flags, *only, *measures, "--references", folder / "references")
@@ -70,7 +70,7 @@ def test_every_configuration_is_rendered_charged_and_measured(held):
         stages = sum(stage["cpu_s"] for stage in cost["stages"].values())
         assert cost["cpu_s"] == pytest.approx(stages + cost["start_cpu_s"])
         assert cost["peak_mib"] > 50.0
-        assert len(frames_of(folder / "configurations" / row["name"])) == 4
+        assert len(frames_of(folder / "configurations" / row["name"])) == 3  # the measured ones
         files = [folder / "scores" / f"{row['name']}{kind}.json" for kind in ("", ", box")]
         held_values = [json.loads(file.read_text())["values"] for file in files if file.is_file()]
         assert len(held_values) == (2 if row["pixel_filter"] == "box" else 1)
@@ -93,6 +93,7 @@ def test_methods_of_enfilade_are_rendered_with_several_seeds(held):
     assert (first["seed"], second["seed"]) == (0, 1)
     images = [frames_of(folder / "configurations" / name) for name in (SEEDED, f"{SEEDED}-seed-1")]
     assert not np.array_equal(*images)
+    assert {len(frames) for frames in images} == {found["walkthrough_frames"]} == {4}
     for name in MEASURES:
         pairs = zip(first["values"][name], second["values"][name], strict=True)
         assert row["values"][name] == pytest.approx([(a + b) / 2.0 for a, b in pairs])
@@ -102,6 +103,14 @@ def test_methods_of_enfilade_are_rendered_with_several_seeds(held):
     assert row["cost"]["cpu_s"] == pytest.approx(
         sum(stage["cpu_s"] for stage in row["cost"]["stages"].values()) + row["cost"]["start_cpu_s"]
     )
+
+
+def test_costs_of_baselines_are_extrapolated_to_all_frames_of_the_walkthrough():
+    """The first task counts once; enfilade's methods render all frames, and single frames are multiples."""
+    tasks = [{"trace": {"cpu_s": cpu_s}} for cpu_s in (5.0, 1.0, 2.0)]
+    assert [one["trace"]["cpu_s"] for one in extrapolated(tasks, 3, 7)] == [5.0, 3.0, 6.0]
+    assert list(extrapolated(tasks, 7, 7)) == tasks
+    assert [one["trace"]["cpu_s"] for one in extrapolated(tasks[:1], 1, 4)] == [20.0]
 
 
 def test_means_of_costs():
@@ -149,6 +158,12 @@ def test_finished_configurations_are_not_rendered_again(held, line, run):
     assert lost.is_file()
     scores = [[row["values"] for row in of["configurations"]] for of in (again, found)]
     assert scores[0] == scores[1]
+
+
+def test_measured_frames_are_some_of_the_walkthrough(run, line):
+    result = run(*line, "--walkthrough", "3-4")
+    assert result.exit_code == 2
+    assert "measured frames 2 are not among --walkthrough 3-4" in result.stderr
 
 
 @pytest.mark.parametrize("counts", ["4,x", "0", "-1", "", "4,,8", "²"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from itertools import pairwise
 from pathlib import Path
 
@@ -93,7 +92,4 @@ def _select(document: JsonObject, path: CameraPath, numbers: tuple[int, ...]) ->
     for number in numbers:
         if not first <= number <= last:
             raise document.error(f"frame {number} is not on the path; it has {first}-{last}")
-    cameras = tuple(path.cameras[number - first] for number in numbers)
-    # a cut moves to the first selected frame at or after it
-    cuts = {bisect_left(numbers, cut + first) for cut in path.cuts} - {0, len(numbers)}
-    return CameraPath(cameras, numbers, path.fps, frozenset(cuts))
+    return path.select(numbers)

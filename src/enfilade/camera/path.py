@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -91,6 +92,13 @@ class CameraPath:
     def height(self) -> int:
         """Pixels."""
         return self.cameras[0].height
+
+    def select(self, numbers: Sequence[int]) -> CameraPath:
+        """A path of some frames, by their rising numbers; a cut moves to the first of them at or after it."""
+        places = [self.numbers.index(number) for number in numbers]
+        cuts = {bisect_left(places, cut) for cut in self.cuts} - {0, len(places)}
+        cameras = tuple(self.cameras[place] for place in places)
+        return CameraPath(cameras, tuple(numbers), self.fps, frozenset(cuts))
 
     def shots(self) -> list[range]:
         """Maximal runs of frames without a cut."""
