@@ -3,8 +3,8 @@
     python -m studies.bench [--quick] [--scene NAME ...] [--scenes FOLDER] [--sizes 320x180 1280x720]
 
 Runs or continues the bench of each scene and size, prints the geometric means of the ratios by split, and
-writes all results with date, machine and code as one JSON file, and one page of figures. Further options go
-to `python -m studies bench`, such as --reference-spp and --references.
+writes all results with date, machine and code as one JSON file, one page of tables and one of figures.
+Further options go to `python -m studies bench`, such as --reference-spp and --references.
 """
 
 import argparse
@@ -19,6 +19,7 @@ from rich.table import Table
 from enfilade.errors import EnfiladeError
 from studies.bench.charts import plot_page
 from studies.bench.measures import QUALITIES
+from studies.bench.page import results_page
 from studies.bench.suite import (
     GENERATED,
     LARGE_SCENES,
@@ -50,7 +51,10 @@ def main() -> int:
         help="generated scenes; all by default, three of large images",
     )
     parser.add_argument(
-        "--scenes", type=Path, metavar="FOLDER", help="scenes of a folder in place of generated ones"
+        "--scenes",
+        type=Path,
+        metavar="FOLDER",
+        help="scenes of a folder; in place of the generated ones, or after those of --scene",
     )
     parser.add_argument("--sizes", nargs="+", default=None, help="320x180 1280x720 by default")
     parser.add_argument("--frames", type=int, default=FRAMES, help=f"of a walkthrough; {FRAMES} by default")
@@ -70,11 +74,9 @@ def main() -> int:
         is_large = is_large_size(size)
         names = QUICK_SCENES if arguments.quick else LARGE_SCENES if is_large else GENERATED
         try:
-            cases = (
-                found_in(arguments.scenes)
-                if arguments.scenes
-                else generated(arguments.scene or names, size, arguments.out / "scenes")
-            )
+            chosen = arguments.scene or ([] if arguments.scenes else names)
+            cases = generated(chosen, size, arguments.out / "scenes")
+            cases += found_in(arguments.scenes) if arguments.scenes else []
         except EnfiladeError as error:
             parser.error(str(error))
         measured = arguments.measured or (LARGE_MEASURED if is_large else MEASURED)
@@ -98,12 +100,14 @@ def main() -> int:
 
 
 def keep(benches: list[dict[str, Any]], folder: Path) -> None:
-    """Write the results and the page of figures, named by their date, and print the summary."""
+    """Write the results and the pages of figures and tables, named by their date; print the summary."""
     folder.mkdir(parents=True, exist_ok=True)
     means = summary(benches)
     file = folder / time.strftime("%Y-%m-%d-%H%M.json")
     file.write_text(json.dumps({"summary": means, "benches": benches}, indent=1) + "\n")
     page = plot_page(benches, file.with_suffix(".png"))
+    tables = file.with_suffix(".md")
+    tables.write_text(results_page(benches, means, time.strftime("%Y-%m-%d")))
     measures = [name for name in QUALITIES if all(name in one["ratios"] for one in means)]
     table = Table(
         title="CPU time of the strongest baseline over ours, at equal quality: geometric means over scenes"
@@ -120,7 +124,7 @@ def keep(benches: list[dict[str, Any]], folder: Path) -> None:
         cells = [ratio_text(one["ratios"][name]) for name in measures]
         table.add_row(one["size"], one["split"], str(len(one["scenes"])), one["configuration"], *cells)
     print_table(table)
-    print(file, page, sep="\n")
+    print(file, page, tables, sep="\n")
 
 
 if __name__ == "__main__":

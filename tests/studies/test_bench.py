@@ -24,6 +24,8 @@ from studies.bench.bench import extrapolated, mean_cost, undecided
 from studies.bench.configurations import all_configurations, selected
 from studies.bench.measures import QUALITIES
 from studies.bench.measuring import FLIP_IS_MISSING, available, gaussian_of_box
+from studies.bench.page import results_page
+from studies.bench.suite import summary
 from studies.bench.tables import bench_tables
 from support.console import as_text
 from support.study_runs import room_files, room_job
@@ -83,6 +85,18 @@ def test_every_configuration_is_rendered_charged_and_measured(held):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     text = "".join(as_text(table) for table in bench_tables(found))
     assert all(name in text for name in (*NAMES, "noise floor"))
+
+
+def test_the_page_of_results_has_a_row_for_each_configuration(held):
+    found, _ = held
+    benches = [found | {"split": "held-out"}]
+    lines = results_page(benches, summary(benches), "2026-11-28").splitlines()
+    tables = "\n".join(line for line in lines if line.startswith("|"))
+    assert {line.count("|") for line in tables.splitlines()} == {5 + len(MEASURES), 4 + len(MEASURES)}
+    assert all(tables.count(f"| `{name}` | ") >= 1 for name in [*NAMES, SEEDED])
+    assert f"| 48x36 | held-out | 1 | `{SEEDED}` | " in tables
+    assert f"| times, `{SEEDED}` |  |  | " in tables
+    assert any(line.startswith("4 frames, 2-4 measured in ") for line in lines)
 
 
 def test_methods_of_enfilade_are_rendered_with_several_seeds(held):
