@@ -15,7 +15,7 @@ from enfilade.kernels.random import PaddedSobolSampler, samplers
 from enfilade.kernels.rays import camera_rays
 from enfilade.kernels.replay import padded, recorded
 from enfilade.records import F32, SurfaceClass
-from enfilade.renderer import LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
+from enfilade.renderer import Branch, LobeRenderer, Purpose, RandomKey, Rays, Renderer, Surfaces
 
 RAYS = 16  # a pixel
 BOUNCES = 6  # reflections and transmissions, before a path ends
@@ -28,10 +28,13 @@ class Guides:
     Parameters
     ----------
     renderer
+    branch
+        That is followed at interfaces, such as those of glass; None: by chance.
     """
 
-    def __init__(self, renderer: Renderer) -> None:
+    def __init__(self, renderer: Renderer, branch: Branch | None = None) -> None:
         self._renderer = renderer
+        self._branch = branch
         if isinstance(renderer, LobeRenderer):
             self._extend = recorded(self._extend_kernel, lambda: renderer.state)
 
@@ -76,21 +79,21 @@ class Guides:
         batches = []
         for first in range(0, len(pixels), step):
             rays, sampler = _stratified_rays(camera, pixels[first : first + step], random)
-            albedo, normal, forms_image = self._first(rays, sampler)
-            if is_followed:
-                self._follow(albedo, normal, forms_image, rays, sampler)
+            albedo, normal = self.along(rays, sampler, is_followed=is_followed)
             sums = [np.array(dr.block_sum(v, RAYS)) for v in (*albedo, *normal)]
             batches.append(np.stack(sums) / np.float32(RAYS))
         found = np.concatenate(batches, axis=1).reshape(6, camera.height, camera.width).transpose(1, 2, 0)
         albedo_image = np.clip(found[..., :3], 0.0, 1.0)
         return np.ascontiguousarray(albedo_image), np.ascontiguousarray(found[..., 3:])
 
-    def _first(self, rays: Rays, sampler: Any) -> tuple[Any, Any, Any]:
-        """Albedo and normal of the first surfaces, and whether they are sharp."""
+    def along(self, rays: Rays, sampler: Any, *, is_followed: bool) -> tuple[Any, Any]:
+        """Albedo and normal along single rays, Array3f; see :meth:`images`."""
         hit = self._renderer.surfaces(rays)
-        found = *_guides_of(hit), _is_sharp(hit)
-        dr.eval(found, rays, sampler)
-        return found
+        albedo, normal, forms_image = *_guides_of(hit), _is_sharp(hit)
+        dr.eval(albedo, normal, forms_image, rays, sampler)
+        if is_followed:
+            self._follow(albedo, normal, forms_image, rays, sampler)
+        return albedo, normal
 
     def _follow(self, albedo: Any, normal: Any, forms_image: Any, rays: Rays, sampler: Any) -> None:
         """Replace the guides of sharp surfaces by those of the surfaces behind."""
@@ -124,7 +127,7 @@ class Guides:
         assert isinstance(self._renderer, LobeRenderer)  # noqa: S101  (`__init__`)
         sampler = sampler.copy()
         point = self._renderer.intersect(rays, opaque_only=True)
-        sample = self._renderer.sample_specular(point, sampler)
+        sample = self._renderer.sample_specular(point, sampler, branch=self._branch)
         hit = self._renderer.intersect(sample.rays, sample.bounce).surfaces
         throughput = Array3f(dr.select(sample.is_alive, sample.throughput, 0))
         return sample.rays, sampler, throughput, *_guides_of(hit), Bool(_is_sharp(hit) & sample.is_alive)

@@ -28,7 +28,6 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
-import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
@@ -37,14 +36,16 @@ from enfilade.camera.pinhole import CENTRE, Camera
 from enfilade.errors import InputError
 from enfilade.files import write_json
 from enfilade.kernels.estimate import GAUSSIAN_RADIUS_PX, GAUSSIAN_SIGMA_PX
+from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.denoise import denoise, denoiser_name
 from enfilade.methods.walkthrough import Walkthrough
 from enfilade.monitor import Monitor
 from enfilade.records import F32, Flow
-from enfilade.renderer import PixelFilter, Purpose, RandomKey
+from enfilade.renderer import Branch, PixelFilter, Purpose, RandomKey
 from enfilade.runs.job import Job
 from enfilade.settings import SampleFilter, TraceSettings
+from studies.bench.guides import Guides
 from studies.bench.windows import Window
 
 SUBPIXELS = 4  # along each axis
@@ -102,6 +103,7 @@ class References:
             "subpixels": SUBPIXELS,
             "batch": self._batch,
             "denoiser": denoiser_name(),
+            "guides": "of what mirrors and clear glass show",
         }
         self._identity |= {} if seed == SEED else {"seed": seed}
         self._job, self._windows, self._seed = job, windows, seed
@@ -196,11 +198,12 @@ class References:
     def _denoised(self, walk: Walkthrough, frame: int, fine: F32) -> F32:
         """The subpixels of both halves and of their mean, denoised, (3, K, F, F, 3)."""
         camera, pixels = self._subpixels(walk.path.cameras[frame])
+        guides = Guides(walk.renderer, Branch.TRANSMITTED)
         found = np.empty((3, *fine.shape[1:]), np.float32)
         for index, window in enumerate(pixels):
-            hit = walk.renderer.surfaces(camera_rays(camera, pixel_centres(camera, lanes(window.ravel()))))
-            guides = [dr.select(hit.is_hit, of, 0) for of in (hit.albedo, hit.normal)]
-            albedo, normal = (image(of, *window.shape) for of in guides)
+            rays = camera_rays(camera, pixel_centres(camera, lanes(window.ravel())))
+            found_guides = guides.along(rays, one_sequence(window.size), is_followed=True)
+            albedo, normal = (image(of, *window.shape) for of in found_guides)
             for half, noisy in enumerate((*fine[:, index], fine[:, index].mean(axis=0))):
                 found[half, index] = denoise(noisy, albedo, normal)
         return found

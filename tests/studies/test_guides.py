@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+from enfilade.arrays import lanes, rows
 from enfilade.camera.pinhole import Camera, look_at
 from enfilade.gbuffer import find_geometry
+from enfilade.kernels.random import one_sequence
+from enfilade.kernels.rays import camera_rays, pixel_centres
+from enfilade.renderer import Branch
 from enfilade.scene.opener import Scene
 from enfilade.settings import Settings
 from studies.bench.guides import Guides
@@ -60,3 +64,25 @@ def test_a_mirror_shows_the_reflected_surface_to_rays_that_continue(
     for pick in (np.min, np.max):
         assert pick(albedo.reshape(-1, 3), axis=0) == pytest.approx(reflectance, abs=1e-3)
     assert np.abs(normal[..., 2] - facing).max() < 1e-4  # the wall's, which faces the mirror, or the mirror's
+
+
+def test_along_single_rays_guides_follow_one_branch_of_glass(tmp_path):
+    """Without noise: by chance some rays would be reflected, into the sky."""
+    file = tmp_path / "pane.xml"
+    glass = '<bsdf type="thindielectric"/>'
+    conductor = '<bsdf type="conductor"><string name="material" value="none"/></bsdf>'
+    behind = MIRROR.replace('<rotate x="1" angle="180"/><translate z="6"/>', '<translate z="-6"/>')
+    file.write_text(behind.replace(f'<bsdf type="twosided">{conductor}</bsdf>', glass))
+    renderer = Scene(file).open(Settings())
+    camera = Camera(look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), 30.0, 32, 24)
+    pixels = np.arange(32 * 24, dtype=np.uint32)
+    rays = camera_rays(camera, pixel_centres(camera, lanes(pixels)))
+    found = {}
+    for branch in (Branch.TRANSMITTED, None):
+        guides = Guides(renderer, branch).along(rays, one_sequence(len(pixels)), is_followed=True)
+        found[branch] = [rows(of)[: len(pixels)] for of in guides]
+    albedo, normal = found[Branch.TRANSMITTED]
+    assert np.ptp(albedo, axis=0).max() < 0.01
+    assert 0.5 < albedo[:, 0].min() < 0.7
+    np.testing.assert_allclose(normal, [[0.0, 0.0, 1.0]] * len(pixels), atol=1e-5)
+    assert np.ptp(found[None][0], axis=0).max() > 0.3
