@@ -106,6 +106,19 @@ def test_noise_above_white_does_not_brighten_dark_bars():
     assert np.abs(change[is_bar]).max() < 0.02
 
 
+def test_uncertain_edges_of_other_frames_do_not_brighten_dark_bars_that_are_certain():
+    """They had the weight of frames that are as certain: the bars became brighter by 0.23."""
+    dark, edge = (np.full((HEIGHT, WIDTH, 3), value, np.float32) for value in (0.01, 0.4))
+    shown = [
+        upload_displayed([g, g], color, np.full((HEIGHT, WIDTH), noise, np.float32), exposure_ev=0.0)
+        for g, color, noise in zip(GEOMETRIES, [dark, *[edge] * 6], [1e-3, *[0.5] * 6], strict=True)
+    ]
+    here = redisplayed(shown[0], dark, np.full((HEIGHT, WIDTH), 1e-3, np.float32), WHERE, exposure_ev=0.0)
+    others = list(zip(shown[1:], WEIGHTS, strict=True))
+    found = accumulate_refined(GEOMETRIES[0], dark, here, others, exposure_ev=0.0)
+    assert found.max() < 0.02
+
+
 def test_frames_that_differ_by_more_than_their_noise_do_not_count():
     first, *others = frames(np.full((HEIGHT, WIDTH, 1), 0.4))
     change = changed([first, *[one + np.float32(0.5) for one in others]])

@@ -12,7 +12,7 @@ from enfilade.methods.decoupled.integrator import SPECULAR_AOVS
 from enfilade.methods.decoupled.light_camera import light_camera
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import IMAGING
-from enfilade.methods.decoupled.virtual_irradiance import gather_virtual_images
+from enfilade.methods.decoupled.virtual_irradiance import trace_virtual_images
 from enfilade.renderer import PixelFilter, Purpose
 
 SPECULAR_SPP = 4  # specular rays of each pixel of the light camera
@@ -26,8 +26,8 @@ def fill_hash_grid(shot: ShotContext, frame: int) -> Output:
     cache, walk = shot.prepass_cache(frame), shot.walk
     camera, geometry = light_camera(walk.path.cameras[frame]), shot.images.light_geometry(frame)
 
-    # Gather at the surfaces that mirrors and panes show.
-    virtual, count = gather_virtual_images(shot, frame, parts.append)
+    # Path trace the surfaces that mirrors and panes show.
+    virtual, count = trace_virtual_images(shot, frame)
 
     # Follow specular lobes from all pixels of the frame; those of mirrors and panes add no noisier estimates.
     random = walk.random(frame, Purpose.HASH_GRID)  # of two lists of pixels that have none in common

@@ -188,36 +188,7 @@ class Integrator:
             Two layers: by light straight from emitters, without next-event estimates of those that cast
             sharp shadows; and by all other.
         """
-        direct, vertex = self.kernels.gather(cache, path, True)
-        return self._gathered(cache, path, direct, vertex, on_miss)
-
-    def final_gather_of(self, cache: IrradianceCache, path: Path, on_miss: OnMiss, count: int) -> Samples:
-        """The same at the next surfaces of paths, with all emitters.
-
-        Parameters
-        ----------
-        cache, on_miss
-            As of :meth:`specular_radiance`.
-        path
-            On their way to the surfaces; at most one a lane.
-        count
-            Number of lanes.
-        """
-        if not dr.width(path.lane):
-            return Samples((dr.zeros(Array3f, count), dr.zeros(Array3f, count)))
-        lane, path = path.lane, replace(path, lane=dr.arange(UInt, dr.width(path.lane)))
-        dr.eval(path)
-        direct, vertex = self.kernels.gather(cache, path, False)
-        found = self._gathered(cache, path, direct, vertex, on_miss)
-        layers = tuple(dr.zeros(Array3f, count) for _ in found.layers)
-        for target, layer in zip(layers, found.layers, strict=True):
-            scatter_add(target, layer, lane)
-        return Samples(layers)
-
-    def _gathered(
-        self, cache: IrradianceCache, path: Path, direct: Any, vertex: Vertex, on_miss: OnMiss | None
-    ) -> Samples:
-        """Both layers of a final gather, whose paths have made a bounce."""
+        direct, vertex = self.kernels.gather(cache, path)
         light, deferred = Contributions(dr.width(path.lane)), _Deferred()
         # An empty cache leaves a literal zero, whose size a recorded kernel does not adapt.
         if cache.view or cache.hash_grid:
@@ -228,6 +199,24 @@ class Integrator:
         self._trace_specular(light, cache, onward, deferred)
         self._finish(light, cache, deferred, on_miss)
         return Samples((direct, light.summed()))
+
+    def path_traced(self, cache: IrradianceCache, path: Path, count: int) -> Any:
+        """Irradiance over pi at the next surfaces of paths, path traced, with all emitters; Array3f.
+
+        Parameters
+        ----------
+        cache
+            For its path guide.
+        path
+            On their way to the surfaces; at most one a lane.
+        count
+            Number of lanes.
+        """
+        found = dr.zeros(Array3f, count)
+        if dr.width(path.lane):
+            _, irradiance, _ = self.kernels.estimate(cache.path_guide, path)
+            scatter_add(found, irradiance, path.lane)
+        return found
 
     def _trace_specular(
         self,

@@ -193,16 +193,16 @@ class PathKernels:
         direct = Array3f(path.throughput * sample.direct)
         return direct, Bool(is_split), Bool(is_end), vertex
 
-    def _gather(self, cache: IrradianceCache, path: Path, is_visible: bool) -> tuple[Any, Vertex]:
-        """Scatter off the diffuse lobe of the next surface, and intersect the one after.
+    def _gather(self, cache: IrradianceCache, path: Path) -> tuple[Any, Vertex]:
+        """Scatter off the diffuse lobe of the surface of the G-buffer, and intersect the one after.
 
-        A visible surface is that of the G-buffer, and emitters with sharp shadows are estimated apart.
+        Emitters with sharp shadows are estimated apart.
         """
         sampler = path.sampler.copy()
 
         # Intersect, and sample the diffuse lobe.
-        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=is_visible)
-        sample = self._renderer.sample_diffuse(point, sampler, soft_only=is_visible, guide=cache.path_guide)
+        point = self._renderer.intersect(path.rays, path.bounce, path.is_active, opaque_only=True)
+        sample = self._renderer.sample_diffuse(point, sampler, soft_only=True, guide=cache.path_guide)
 
         # Extend the path.
         extended = Path(

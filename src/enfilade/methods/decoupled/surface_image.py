@@ -13,7 +13,10 @@ from enfilade.arrays import Array3f, Float, Int, UInt, lanes, matrix3, opaque, v
 from enfilade.kernels.bilinear import taps_around
 from enfilade.records import Geometry
 
-PLANE_TOLERANCE = 0.01  # largest distance from the tangent plane on the same surface, as a part of the depth
+# Largest distance from the tangent plane on the same surface: a part of the depth; in lookups not more than a
+# pixel's width along the surface either, so that the slats of a blind that are one mesh share no light.
+PLANE_TOLERANCE = 0.01
+MIN_PLANE_COSINE = 0.1  # between normal and direction of view: at grazing angles that width is limited
 MIN_FOUND_WEIGHT = 0.02  # of all taps together, above which a surface counts as found
 SCALE = 1022.0  # of an axis of a packed normal; even, so that 0 stays 0
 MIN_TAP_WEIGHT = 1e-3  # of each valid tap: a single one at the border still counts
@@ -186,6 +189,11 @@ def lookup(
     offset = dr.dot(normal, image.eye - position) * scale
     slope = (image.direction_from_pixel.T @ normal) * scale
     tolerance = PLANE_TOLERANCE * seen.z
+    if image.normals is not None:  # the planes of virtual images are not those of their surfaces
+        m = image.direction_from_pixel
+        width = dr.norm(Array3f(m[0, 0], m[1, 0], m[2, 0])) * seen.z
+        cosine = offset * dr.rsqrt(dr.squared_norm(image.eye - position))
+        tolerance = dr.minimum(tolerance, width * dr.rcp(dr.maximum(cosine, MIN_PLANE_COSINE)))
     is_inside &= offset > 0.0  # the camera is in front of the surface
 
     # Interpolate between the four neighbouring pixels.

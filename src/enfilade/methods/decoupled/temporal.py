@@ -29,6 +29,10 @@ from enfilade.settings import ViewingSettings
 
 REACH = 3  # distinct frames to each side over which specular AOVs are accumulated
 MAX_DIFFERENCE = 3.0  # standard deviations, at which the weight of another frame falls to 1/e
+# Times the variance of a value, above which that of another frame lowers its weight: a dark pixel
+# beside a window is certain, and values of its edge in other frames are within their own large noise.
+MORE_NOISE = 50.0
+CERTAIN = 1e-5  # variance that is added to both: a value that is clipped at white has none of its own
 # Of the samples' deviation, which overestimates noise: rays are stratified, and the contrast of textures
 # counts as noise. The whole of it blurs pictures on a wall; half of it keeps nine tenths of the gain at metal
 # edges.
@@ -173,9 +177,10 @@ def accumulate_temporally(
         scale = dr.rcp(dr.maximum(found.weight, 1e-6))
         value, noise = found.totals[0] * scale, found.variances[0] * scale
 
-        # Weight by the difference, in units of the noise.
+        # Weight by the difference, in units of the noise; far noisier values weigh less.
         difference = dr.abs(dr.dot(value, Array3f(*REC709_LUMINANCE)) - own)
         frame_weight = dr.exp(-difference * dr.rcp(MAX_DIFFERENCE * dr.sqrt(noise + variance) + 1e-8))
+        frame_weight *= dr.minimum(MORE_NOISE * (variance + CERTAIN) * dr.rcp(noise + CERTAIN), 1.0)
         frame_weight = dr.select(found.weight > MIN_FOUND_WEIGHT, opaque(given) * frame_weight, 0.0)
 
         # Accumulate.

@@ -1,4 +1,4 @@
-"""Irradiance of the surfaces that mirrors and panes show: gathered, denoised as they are seen.
+"""Irradiance of the surfaces that mirrors and panes show: path traced, denoised as they are seen.
 
 Light on surfaces is smooth as seen in a plane mirror, as it is when seen directly. What paths estimate there
 one by one stays noisy in the hash grid, whose entries are too small for many of them.
@@ -13,31 +13,31 @@ import drjit as dr
 import numpy as np
 
 from enfilade.arrays import lanes, rows
-from enfilade.kernels.estimate import RayCount, Samples
+from enfilade.kernels.estimate import RayCount
 from enfilade.kernels.random import one_sequence
 from enfilade.kernels.rays import camera_rays, pixel_centres
 from enfilade.methods.decoupled.denoising import NOISE_SHARE, OUTLIER, denoise_light
 from enfilade.methods.decoupled.hash_grid import Entries
-from enfilade.methods.decoupled.integrator import OnMiss
 from enfilade.methods.decoupled.paths import Path
 from enfilade.methods.decoupled.shot import ShotContext
 from enfilade.methods.decoupled.virtual_images import CHOICES, IN_VIRTUAL_IMAGE
 from enfilade.records import Geometry, Shading
 from enfilade.renderer import Purpose, Rays
 
-SPP = 8  # final gather rays of a pixel
+SPP = 8  # paths of a pixel
 DENOISED_SAMPLES = 16  # estimates as which a denoised pixel counts
 
 
-def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tuple[Entries, RayCount]:
+def trace_virtual_images(shot: ShotContext, frame: int) -> tuple[Entries, RayCount]:
     """Estimate irradiance where mirrors and panes of a keyframe show surfaces that no prepass image shows.
+
+    It is not gathered from the cache: that has the light of paths that are one edge longer than those by way
+    of a mirror may be.
 
     Parameters
     ----------
     shot
     frame
-    on_miss
-        Receives the irradiance of surfaces that light these, and are not cached.
 
     Returns
     -------
@@ -45,14 +45,12 @@ def gather_virtual_images(shot: ShotContext, frame: int, on_miss: OnMiss) -> tup
     count : RayCount
     """
     images = shot.virtual_images.find(shot.images.virtual_geometry(frame))
-    gathered = [_gather(shot, frame, *image, on_miss) for image in zip(images, CHOICES, strict=True)]
-    entries = Entries.joined([found for found, _ in gathered])
-    return entries, sum((count for _, count in gathered), RayCount())
+    traced = [_trace(shot, frame, *image) for image in zip(images, CHOICES, strict=True)]
+    entries = Entries.joined([found for found, _ in traced])
+    return entries, sum((count for _, count in traced), RayCount())
 
 
-def _gather(
-    shot: ShotContext, frame: int, virtual: Geometry, choice: float, on_miss: OnMiss
-) -> tuple[Entries, RayCount]:
+def _trace(shot: ShotContext, frame: int, virtual: Geometry, choice: float) -> tuple[Entries, RayCount]:
     """Entries of a virtual image, and the number of rays."""
     cache, camera = shot.prepass_cache(frame), virtual.camera
 
@@ -66,38 +64,37 @@ def _gather(
     path = seen_along(camera_rays(camera, pixel_centres(camera, lanes(pixels))), one_sequence(len(pixels)))
     if not dr.width(path.lane):
         return Entries.joined([]), RayCount()
-    keys, irradiance, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
+    keys, cached, is_known, is_missing = shot.integrator.kernels.find_entries(cache, path)
     chosen, lane = np.flatnonzero(np.array(is_missing)), np.array(path.lane)
     if not len(chosen):
         return Entries.joined([]), RayCount()
     known = np.array(is_known)
-    known_pixels, known_irradiance = pixels[lane[known]], rows(irradiance)[known]
+    known_pixels, known_irradiance = pixels[lane[known]], rows(cached)[known]
     chosen = chosen[np.argsort(lane[chosen])]  # in the order of the pixels
     pixels = pixels[lane[chosen]]
 
-    # Gather their irradiance.
-    def radiance(rays: Rays, sampler: Any) -> Samples:
-        path = seen_along(rays, sampler)
-        return shot.integrator.final_gather_of(cache, path, on_miss, dr.width(sampler.seed))
+    # Estimate their irradiance.
+    def radiance(rays: Rays, sampler: Any) -> Any:
+        return shot.integrator.path_traced(cache, seen_along(rays, sampler), dr.width(sampler.seed))
 
-    is_gathered = np.zeros(virtual.shape_index.shape, np.bool_)
-    is_gathered.flat[pixels] = True
-    estimate = shot.estimate(camera, is_gathered, radiance, shot.walk.random(frame, Purpose.VIRTUAL_IMAGES))
+    is_traced = np.zeros(virtual.shape_index.shape, np.bool_)
+    is_traced.flat[pixels] = True
+    random = shot.walk.random(frame, Purpose.VIRTUAL_IMAGES)
+    estimate = shot.estimate(camera, is_traced, radiance, random, layers=1)
     estimate.add(SPP)
 
     # Denoise it together with what the prepass images show, whose pixels would be black among these; a
     # denoised pixel is as reliable as many samples.
-    direct, indirect = estimate.shadings
-    gathered, times = direct.color + indirect.color, 1
+    irradiance, times = estimate.shading.color, 1
     if (denoiser := shot.settings.denoiser) != "none":
-        is_shown = is_gathered.copy()
+        is_shown = is_traced.copy()
         is_shown.flat[known_pixels] = True
-        variance = np.float32(NOISE_SHARE) * (direct.variance + indirect.variance)
-        light = Shading(gathered, variance).to_image(is_gathered)
+        variance = np.float32(NOISE_SHARE) * estimate.shading.variance
+        light = Shading(irradiance, variance).to_image(is_traced)
         light.color.reshape(-1, 3)[known_pixels] = known_irradiance
         # Virtual images do not lie in the planes that their depths and normals describe.
         guide = replace(virtual, depth=np.zeros_like(virtual.depth))
         denoised = denoise_light(guide, light, is_shown, quality=denoiser, outlier=OUTLIER)
-        gathered, times = denoised[is_gathered], DENOISED_SAMPLES
-    entries = Entries.of([np.array(key)[chosen] for key in keys], gathered).repeated(times)
+        irradiance, times = denoised[is_traced], DENOISED_SAMPLES
+    entries = Entries.of([np.array(key)[chosen] for key in keys], irradiance).repeated(times)
     return entries, estimate.count
