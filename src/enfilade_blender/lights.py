@@ -22,6 +22,7 @@ from enfilade_blender.scene_xml import LAMP, Element, Identifiers, plugin, refer
 Colour = tuple[float, float, float]
 FORWARD = np.diag([1.0, -1.0, -1.0, 1.0])  # Blender's lights shine along -z, Mitsuba's shapes along +z
 TINY = 1e-5
+LEAST_AREA = 1e-12  # of a lamp, square scene units
 BLACK = (0.0, 0.0, 0.0)
 SIZES = ("shadow_soft_size", "size", "size_y", "angle", "spot_size", "spot_blend")  # of lamps
 DELTA = ("point", "spot", "directional")  # emitters that shadow rays alone reach
@@ -143,7 +144,7 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
         sun.append(_vector("direction", -_axis(lamp.matrix)))
         return [sun]
     if data.type == "AREA":
-        return [_area(lamp, colour, identifiers)]
+        return _area(lamp, colour, identifiers, notes)
     if data.type == "SPOT":
         return [_spot(lamp, colour, notes)]
     radius = float(data.shadow_soft_size)
@@ -159,13 +160,17 @@ def emitters(lamp: Lamp, identifiers: Identifiers, notes: Notes) -> list[Element
     return [shape]
 
 
-def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
+def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers, notes: Notes) -> list[Element]:
     data = lamp.data
     is_round = data.shape in ("DISK", "ELLIPSE")
     width, height = _area_size(data)
     axes = lamp.matrix @ np.diag([0.5 * width, 0.5 * height, 1.0, 1.0])
     area = float(np.linalg.norm(np.cross(axes[:3, 0], axes[:3, 1]))) * (math.pi if is_round else 4.0)
-    radiance = _scaled(colour, area_radiance(1.0, max(area, 1e-12)))
+    if area < LEAST_AREA:
+        what, effect = "a lamp without area is left out", "it gives no light"
+        notes.add("not-carried", lamp.name, "Size", what, effect)
+        return []
+    radiance = _scaled(colour, area_radiance(1.0, area))
     if not getattr(data, "normalize", True):
         radiance = _scaled(radiance, area)
     matrix = axes @ FORWARD
@@ -173,7 +178,7 @@ def _area(lamp: Lamp, colour: Colour, identifiers: Identifiers) -> Element:
     light = plugin("emitter", "area", radiance=radiance)
     shape = plugin("shape", "disk" if is_round else "rectangle", light, _surface(lamp), to_world=matrix)
     shape.set("id", identifiers.unique(lamp.name))
-    return shape
+    return [shape]
 
 
 def _surface(lamp: Lamp) -> Element:

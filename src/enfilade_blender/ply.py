@@ -103,6 +103,11 @@ class Mesh:
             generated=None if self.generated is None else self.generated[:, ::-1],
         )
 
+    def area(self) -> float:
+        """Surface area, of single precision as Mitsuba's: of tiny triangles it is 0."""
+        edges = np.diff(self.positions[self.triangles], axis=1)
+        return float(0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1).sum())
+
     def mirrored(self, uv: str) -> npt.NDArray[np.bool_]:
         """Triangles (N,) on which a UV map is mirrored, as seen from where the normals point."""
         edges = np.diff(self.positions[self.triangles], axis=1)

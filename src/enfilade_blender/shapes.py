@@ -232,8 +232,11 @@ class Shapes:
         file = f"meshes/{self._files.unique(file_stem(name))}.ply"
         write_ply(self._out / file, mesh, material.uv, material.attribute)
         shape = plugin("shape", "ply", reference(bsdf), filename=file)
-        if radiance is not None:
+        if radiance is not None and mesh.area() > 0.0:
             shape.append(plugin("emitter", "area", radiance=radiance))
+        elif radiance is not None:
+            what, effect = "the emission of a surface without area is left out", "it gives no light"
+            self._notes.add("not-carried", material.part.name, "Emission", what, effect)
         return named(shape, self.identifiers.unique(name))
 
     def _shader(self, material: Any) -> Shader:

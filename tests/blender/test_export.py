@@ -372,9 +372,13 @@ def test_light_that_is_no_number_or_negative_is_left_out_and_noted(exported):
         ("Infinite", "Light"),
         ("Colour", "Light"),
         ("Size", "Light"),
+        ("Line", "Size"),
+        ("Small", "Size"),
+        ("Collapsed", "Emission"),
         ("Scene", "Light"),
     }
-    assert list(shapes(out)) == ["Floor"]
+    assert set(shapes(out)) == {"Floor", "Collapsed"}
+    assert not any(shape.is_emitter() for shape in shapes(out).values())
 
 
 def test_a_file_of_nothing_is_refused(blender):

@@ -452,7 +452,7 @@ def _torn():
 
 
 def without_light(_folder):
-    """A world that takes light away, and lamps and a cube of which a number is NaN or infinite."""
+    """A world that takes light away; lamps and a cube with numbers that are NaN, infinite or an area of 0."""
     new_file()
     tree = world((1.0, 1.0, 1.0)).node_tree
     value = node_of(tree, "Value")
@@ -465,6 +465,9 @@ def without_light(_folder):
     light("SUN", "Infinite", (0.0, 0.0, 2.0), math.inf, angle=0.1)
     light("AREA", "Colour", (0.0, 0.0, 2.0), 1.0, color=(1.0, math.nan, 1.0))
     light("AREA", "Size", (0.0, 0.0, 2.0), 1.0, size=math.nan)
+    light("AREA", "Line", (0.0, 0.0, 2.0), 1.0, shape="RECTANGLE", size_y=0.0)
+    light("AREA", "Small", (0.0, 0.0, 2.0), 1.0).scale = 0.0, 0.0, 0.0
+    cube("Collapsed", (1.0, 0.0, 0.0), 1.0, shader("glow", "Emission")[0]).scale = 0.0, 0.0, 0.0
 
 
 def nothing(_folder):
