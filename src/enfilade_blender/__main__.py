@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
+import traceback
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
@@ -31,7 +32,12 @@ if __name__ == "__main__":
     _load_package()
     from enfilade_blender.run import run_job
 
-    code = run_job(Path(sys.argv[-1]))
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)  # bpy may hang at its end
+    code = 1
+    try:
+        code = run_job(Path(sys.argv[-1]))
+    finally:
+        if sys.exc_info()[1] is not None:
+            traceback.print_exc()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)  # bpy may hang at its end

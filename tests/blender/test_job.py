@@ -1,9 +1,11 @@
 """Job files."""
 
 import json
+from pathlib import Path
 
 import pytest
 
+import enfilade_blender
 from enfilade_blender.failure import ExportError
 from enfilade_blender.job import read_job
 from enfilade_blender.notes import Notes
@@ -31,6 +33,14 @@ def test_a_wrong_job_is_refused(tmp_path, job):
     file.write_text(json.dumps(job))
     with pytest.raises(ExportError, match="unknown or missing"):
         read_job(file)
+
+
+@pytest.mark.blender
+def test_an_error_of_the_importer_ends_its_process(blender, tmp_path):
+    file = tmp_path / "job.json"
+    file.write_text(json.dumps(JOB | {"limits": {"unknown": 1}}))
+    done = blender.run(Path(enfilade_blender.__file__).parent, file)
+    assert (done.returncode, "TypeError" in done.stderr) == (1, True)
 
 
 def test_a_note_is_made_once():
