@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from enfilade_blender.motion import Motion
 from enfilade_blender.notes import Notes
 from enfilade_blender.records import Selection, View
 
@@ -21,21 +22,19 @@ SHEAR = 1e-3  # cosine of the angle of a picture's axes
 KINDS = {"ORTHO": "an orthographic", "PANO": "a panoramic"}
 
 
-def read_views(selection: Selection, notes: Notes) -> list[View]:
-    """The views of all frames; empty without a perspective camera."""
-    views = []
+def read_views(selection: Selection, motion: Motion, notes: Notes) -> list[View]:
+    """The views of all frames, and their motion; empty without a perspective camera."""
+    views: list[View] = []
+    is_usable = True
     for frame in range(selection.frames[0], selection.frames[1] + 1):
         selection.scene.frame_set(frame)
+        motion.look(frame)
         camera = selection.scene.camera
-        if camera is None:
-            return []
-        if camera.type != "CAMERA" or camera.data.type != "PERSP":
-            kind = camera.data.type if camera.type == "CAMERA" else f"{camera.type.lower()} as a"
-            effect = "there is no camera path of the file: give one"
-            what = f"{KINDS.get(kind, kind)} camera can't be exported"
-            notes.add("not-carried", camera.name, "Camera", what, effect)
-            return []
-        views.append(_view(camera, selection, notes))
+        is_usable = is_usable and _is_perspective(camera, notes)
+        if is_usable:
+            views.append(_view(camera, selection, notes))
+    if not is_usable:
+        return []
     _note_lenses(views, selection, notes)
     _note_distance(views, notes)
     return views
@@ -62,6 +61,16 @@ def camera_path(views: list[View], selection: Selection) -> dict[str, Any]:
         **({"shutter": render.motion_blur_shutter} if render.use_motion_blur else {}),
         "camera_path": frames,
     }
+
+
+def _is_perspective(camera: Any, notes: Notes) -> bool:
+    if camera is None or (camera.type == "CAMERA" and camera.data.type == "PERSP"):
+        return camera is not None
+    kind = camera.data.type if camera.type == "CAMERA" else f"{camera.type.lower()} as a"
+    effect = "there is no camera path of the file: give one"
+    what = f"{KINDS.get(kind, kind)} camera can't be exported"
+    notes.add("not-carried", camera.name, "Camera", what, effect)
+    return False
 
 
 def _view(camera: Any, selection: Selection, notes: Notes) -> View:

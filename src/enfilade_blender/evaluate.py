@@ -108,7 +108,7 @@ def _render(selection: Selection) -> None:
 
 
 def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
-    _check_generated(graph, limits)
+    check_generated(graph, limits)
     by_key: dict[Any, Placed | None] = {}
     meshes: dict[int, Mesh] = {}
     names = _attributes_of_materials()
@@ -123,17 +123,19 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
         matrix = np.array(instance.matrix_world, np.float64)
         if not np.isfinite(matrix).all():
             what = "an object whose place, rotation or scale is NaN or infinite is left out"
-            notes.add("not-carried", _name(instance), "Transform", what, "it is missing from the picture")
+            notes.add(
+                "not-carried", instance_name(instance), "Transform", what, "it is missing from the picture"
+            )
         elif obj.type == "LIGHT":
             _note_linking(obj, notes)
             _note_rays(obj, RAYS_OF_LAMPS, "it lights all surfaces", notes)
-            lamp = Lamp(_name(instance), obj.data.original, matrix, is_visible=obj.visible_camera)
+            lamp = Lamp(instance_name(instance), obj.data.original, matrix, is_visible=obj.visible_camera)
             result.lamps.append(lamp)
         elif obj.type in NOT_CARRIED:
             what = f"{NOT_CARRIED[obj.type]} can't be exported"
             notes.add("not-carried", obj.name, "Object", what, "it is missing from the picture")
         elif isinstance(obj.data, bpy.types.Mesh):  # text, curves and metaballs have an instance of one
-            key = (_name(instance), obj.name_full, obj.data.as_pointer())
+            key = (instance_name(instance), obj.name_full, obj.data.as_pointer())
             if key not in by_key:
                 by_key[key] = _place(instance, meshes, notes, names)
             placed = by_key[key]
@@ -149,7 +151,7 @@ def _read(graph: Any, result: Evaluated, limits: Limits, notes: Notes) -> None:
     result.placed = [placed for placed in by_key.values() if placed is not None]
 
 
-def _check_generated(graph: Any, limits: Limits) -> None:
+def check_generated(graph: Any, limits: Limits) -> None:
     """Refuse too many instances of geometry nodes before Blender lists them, which takes 400 bytes each."""
     total = 0
     for obj in graph.objects:
@@ -189,7 +191,7 @@ def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: Attribut
         return None
     slots = tuple(slot.material and slot.material.original for slot in obj.material_slots)
     return Placed(
-        _name(instance),
+        instance_name(instance),
         mesh,
         slots,
         colour=tuple(obj.color),
@@ -197,7 +199,8 @@ def _place(instance: Any, meshes: dict[int, Mesh], notes: Notes, names: Attribut
     )
 
 
-def _name(instance: Any) -> str:
+def instance_name(instance: Any) -> str:
+    """Name of an object; of an instance of another, with that of its instancer."""
     obj, parent = instance.object, instance.parent
     is_part = instance.is_instance and parent is not None and parent.name != obj.name
     return f"{parent.name}: {obj.name}" if is_part else str(obj.name)
@@ -235,7 +238,8 @@ def _note_object(instance: Any, notes: Notes) -> None:
 
 
 def _note_hair(obj: Any, notes: Notes) -> None:
-    for system in getattr(obj, "particle_systems", ()):
+    shown = [m for m in getattr(obj, "modifiers", ()) if m.type == "PARTICLE_SYSTEM" and m.show_render]
+    for system in (modifier.particle_system for modifier in shown):
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             what = "hair can't be exported"
             notes.add(

@@ -16,7 +16,7 @@ from enfilade_blender.lamp_nodes import LampNodes
 from enfilade_blender.left_out import note_falloff, note_inputs, note_light, note_settings
 from enfilade_blender.lights import emitters, is_finite, is_portal, needs_passing, split_suns
 from enfilade_blender.limits import check_size
-from enfilade_blender.motion import note_motion
+from enfilade_blender.motion import Motion
 from enfilade_blender.notes import Notes, report_progress
 from enfilade_blender.open_file import files_used, open_source
 from enfilade_blender.records import Selection
@@ -42,9 +42,10 @@ def export(job: Job) -> dict[str, Any]:
     selection = open_source(job, notes)
     check_size(selection, job.limits)
     report_progress(0.05, "cameras")
-    note_motion(selection, notes)
+    motion = Motion(selection, job.limits)
+    views = read_views(selection, motion, notes)
+    motion.note(notes)
     note_settings(job, selection, notes)
-    views = read_views(selection, notes)
     if views:
         write_json(job.out / "camera_path.json", camera_path(views, selection))
     report_progress(0.1, "meshes")

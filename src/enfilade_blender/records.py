@@ -31,6 +31,20 @@ class Selection:
     frames: tuple[int, int]
     size: tuple[int, int]
 
+    def objects(self) -> list[Any]:
+        """Objects whose collections renders show, those of background scenes included."""
+        layers, scene = [self.view_layer], self.scene.background_set
+        while scene is not None:
+            layers.append(scene.view_layers[0])
+            scene = scene.background_set
+        return list(dict.fromkeys(obj for layer in layers for obj in _shown(layer.layer_collection)))
+
+
+def _shown(layer: Any, *, is_hidden: bool = False) -> list[Any]:
+    is_hidden |= layer.collection.hide_render
+    own = [] if is_hidden or layer.exclude else layer.collection.objects
+    return [*own, *(obj for child in layer.children for obj in _shown(child, is_hidden=is_hidden))]
+
 
 @dataclass(frozen=True, eq=False)
 class View:

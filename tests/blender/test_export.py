@@ -332,7 +332,13 @@ def test_settings_that_are_left_out_are_noted(exported):
 def test_what_changes_is_noted(exported):
     _, result = exported("frozen")
     changes = {note["object"] for note in result["notes"] if note["node"] == "Animation"}
-    assert changes == {"Blinking", "driven", "film", "Growing", "Hooked", "sliding"}
+    assert changes == {
+        *("Blinking", "driven", "film", "Growing", "Hooked", "sliding"),
+        *("Swelling", "Vine", "Door", "Copy: Inner", "Of the set", "Emitter: Drop"),
+    }
+    assert ("Scene", "its animation is left out") in notes(result, "not-carried")
+    assert result["exposure_ev"] == 0.0
+    assert not any("hair" in what for _, what in notes(result, "not-carried"))
     (blocked,) = (note["what"] for note in result["notes"] if note["node"] == "Drivers")
     assert "drivers that need Python don't run" in blocked
 

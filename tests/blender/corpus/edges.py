@@ -13,7 +13,9 @@ from corpus.stage import (
     cube,
     fill,
     finish,
+    group,
     image,
+    instance,
     light,
     new_file,
     node_of,
@@ -479,7 +481,8 @@ def nothing(_folder):
 def frozen(folder):
     """What changes from frame to frame, by other ways than the keyframes of a pose."""
     scene = new_file()
-    scene.frame_start, scene.frame_end = 1, 5
+    scene.frame_start, scene.frame_end = 1, 8
+    _changed_by_others(scene)
     blinking = plane("Blinking", (0.0, 0.0, 0.0), 1.0, principled("grey"))
     for frame in (1, 3):
         blinking.hide_render = frame == 3
@@ -510,6 +513,46 @@ def frozen(folder):
     for frame, radius in ((1, 0.1), (5, 0.5)):
         lamp.shadow_soft_size = radius
         lamp.keyframe_insert("shadow_soft_size", frame=frame)
+
+
+def _changed_by_others(scene):
+    """Shapes that modifiers and data change, copies that move; a brief motion, and none that renders show."""
+    grey = principled("still")
+    swelling = plane("Swelling", (0.0, 4.0, 0.0), 1.0, grey).modifiers.new("Displace", "DISPLACE")
+    vine = bpy.data.curves.new("Vine", "CURVE")
+    vine.splines.new("POLY").points.add(3)
+    for x, point in enumerate(vine.splines[0].points):
+        point.co.x = x
+    add("Vine", vine, (2.0, 4.0, 0.0))
+    for data, name, last in ((swelling, "strength", 1.0), (vine, "bevel_depth", 0.2)):
+        for frame, value in ((1, 0.1), (8, last)):
+            setattr(data, name, value)
+            data.keyframe_insert(name, frame=frame)
+    door, inner, of_set, cutter = (
+        plane(name, (x, 6.0, 0.0), 1.0, grey)
+        for x, name in enumerate(("Door", "Inner", "Of the set", "Cutter"))
+    )
+    cutter.hide_render = True
+    emitter = plane("Emitter", (6.0, 6.0, 0.0), 1.0, grey)
+    emitter.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    bald = plane("Bald", (8.0, 6.0, 0.0), 1.0, grey).modifiers.new("Hair", "PARTICLE_SYSTEM")
+    bald.particle_system.settings.type, bald.show_render = "HAIR", False
+    falling = emitter.particle_systems[0].settings
+    falling.count, falling.frame_end, falling.render_type = 5, 8, "OBJECT"
+    falling.instance_object = cube("Drop", (4.0, 6.0, 0.0), 0.1, grey)
+    for obj in (door, inner, of_set, cutter):
+        for frame, turn in ((2, 0.0), (3, 1.0), (4, 0.0)):
+            obj.rotation_euler.z = turn
+            obj.keyframe_insert("rotation_euler", frame=frame)
+    instance("Copy", group("Inside", [inner]), (0.0, 8.0, 0.0), 0.0)
+    scene.background_set = bpy.data.scenes.new("Set")
+    scene.background_set.collection.objects.link(of_set)
+    scene.collection.objects.unlink(of_set)
+    rig = add("Rig", bpy.data.armatures.new("Rig"))
+    plane("Skin", (2.0, 8.0, 0.0), 1.0, grey).modifiers.new("Armature", "ARMATURE").object = rig
+    for frame, exposure in ((1, 0.0), (8, 1.0)):
+        scene.view_settings.exposure = exposure
+        scene.view_settings.keyframe_insert("exposure", frame=frame)
 
 
 def simplified(_folder):
