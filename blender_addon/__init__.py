@@ -9,9 +9,10 @@ from typing import Any
 
 import bpy
 
-from .command import Order, Process
+from .command import Order, Process, next_run, wrapped
 
 LOOK_S = 0.5
+LETTER_PX = 7.0  # width of a letter of labels
 running: Process | None = None  # of this session; Blender has one panel
 
 
@@ -61,6 +62,10 @@ class EnfiladeRender(bpy.types.Operator):
     bl_idname = "enfilade.render"
     bl_label = "Render walkthrough"
 
+    is_new: bpy.props.BoolProperty(
+        name="New run", description="Render into the next free folder, as after a change of the file"
+    )
+
     @classmethod
     def poll(cls, _context: Any) -> bool:
         """One at a time."""
@@ -73,11 +78,15 @@ class EnfiladeRender(bpy.types.Operator):
         if is_changed or not bpy.data.filepath:
             self.report({"ERROR"}, "Save the file first: it is rendered from the disk")
             return {"CANCELLED"}
+        settings = context.scene.enfilade
+        if self.is_new:
+            new = str(next_run(run_folder(context)))
+            settings.run = bpy.path.relpath(new) if settings.run.startswith("//") else new
         order = Order(
             command=command_of(context),
             source=Path(bpy.data.filepath),
             run=run_folder(context),
-            quality=context.scene.enfilade.quality,
+            quality=settings.quality,
             scene=context.scene.name,
             blender=bpy.app.binary_path,
         )
@@ -142,13 +151,15 @@ class EnfiladePanel(bpy.types.Panel):
         layout.prop(context.scene.enfilade, "run")
         layout.prop(context.scene.enfilade, "quality")
         if running is None:
-            layout.operator("enfilade.render")
+            layout.operator("enfilade.render").is_new = False
+            layout.operator("enfilade.render", text="Begin a new run").is_new = True
             layout.operator("enfilade.report")
         else:
             layout.progress(factor=running.fraction, text=running.stage)
             layout.operator("enfilade.stop")
-        if EnfiladePanel.message:
-            layout.label(text=EnfiladePanel.message)
+        width = context.region.width / (LETTER_PX * context.preferences.system.ui_scale)
+        for line in wrapped(EnfiladePanel.message, int(width)):
+            layout.label(text=line)
 
 
 def watch() -> float | None:

@@ -7,6 +7,7 @@ import json
 import queue
 import re
 import subprocess
+import textwrap
 import threading
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from typing import IO
 
 STEP = re.compile(r"^(.+): (\d+)/(\d+)")  # such as "shading: 3/24, 0:12 passed"
 STAGE = re.compile(r"^(.+): (\d+) to do$")
-KEPT = 12  # lines of output
+KEPT = 40  # lines of output
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,21 @@ class Process:
 
     @property
     def message(self) -> str:
-        """The error of a failed command: the line that says so, or the last one."""
-        errors = [line for line in self.last if line.startswith("Error: ")]
-        return (errors or self.last or ["no output"])[-1].removeprefix("Error: ")
+        """The error of a failed command, with its reason and remedy; without one the last line."""
+        starts = [number for number, line in enumerate(self.last) if line.startswith("Error: ")]
+        lines = self.last[starts[-1] if starts else -1 :] or ["no output"]
+        return "\n".join(lines).removeprefix("Error: ")
+
+
+def wrapped(message: str, width: int) -> list[str]:
+    """Lines of a message of at most a number of letters."""
+    return [part for line in message.splitlines() for part in textwrap.wrap(line, max(width, 20))]
+
+
+def next_run(folder: Path) -> Path:
+    """A run folder that does not exist: the same, or one of the same name with a number."""
+    stem, number, found = re.sub(r" \d+$", "", folder.name), 1, folder
+    while found.exists():
+        number += 1
+        found = folder.with_name(f"{stem} {number}")
+    return found

@@ -72,10 +72,19 @@ def test_progress_is_followed_to_the_end(command, program):
 
 
 def test_a_failure_has_the_message_of_the_command(command, program):
-    process = ended(command.Process([str(program("echo 'Error: no light' >&2; exit 2"))]))
-    assert (process.code, process.message) == (2, "no light")
+    lines = "echo 'Error: retried'; echo 'Error: a run of another file'; echo '  choose another --out' >&2"
+    process = ended(command.Process([str(program(f"{lines}; exit 2"))]))
+    assert (process.code, process.message) == (2, "a run of another file\n  choose another --out")
+    assert command.wrapped(process.message, 20) == ["a run of another", "file", "  choose another", "--out"]
     with pytest.raises(FileNotFoundError):
         command.Process(["/nowhere/enfilade"])
+
+
+def test_a_new_run_has_a_folder_of_its_own(command, tmp_path):
+    assert command.next_run(tmp_path / "run") == tmp_path / "run"
+    for name in ("run", "run 2"):
+        (tmp_path / name).mkdir()
+        assert command.next_run(tmp_path / name) == tmp_path / f"run {int(name[4:] or 1) + 1}"
 
 
 def test_it_is_ended(command, program):
@@ -115,15 +124,16 @@ blender_addon.register()
 blender_addon.command_of = lambda context: program
 said = []
 settings = bpy.context.scene.enfilade
-settings.run, settings.quality = os.path.join(folder, "run"), 5.0
-def call():
+settings.run, settings.quality = "//run/", 5.0
+def call(**settings):
     try:
-        return list(bpy.ops.enfilade.render())
+        return list(bpy.ops.enfilade.render(**settings))
     except RuntimeError as error:
         return str(error)
 said.append(call())
 bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "shot.blend"))
-said.append(call())
+os.mkdir(os.path.join(folder, "run"))
+said.append(call(is_new=True))
 said.append(bpy.ops.enfilade.render.poll())
 bpy.ops.wm.read_homefile()
 said.append(bpy.app.timers.is_registered(blender_addon.watch))
@@ -152,4 +162,11 @@ def test_the_panel_runs_the_command_in_blender(program, tmp_path):
     assert "Save the file first" in said[0]
     assert said[1:] == [["FINISHED"], False, True, "no camera", True, False], done.stderr
     arguments = (tmp_path / "arguments").read_text().splitlines()
-    assert arguments[:6] == ["render", f"{tmp_path}/shot.blend", "--out", f"{tmp_path}/run", "--quality", "5"]
+    assert arguments[:6] == [
+        "render",
+        f"{tmp_path}/shot.blend",
+        "--out",
+        f"{tmp_path}/run 2",
+        "--quality",
+        "5",
+    ]
