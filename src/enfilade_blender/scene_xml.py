@@ -64,16 +64,17 @@ class Identifiers:
     """Ids of a scene: names without the characters that Mitsuba reserves, each used once."""
 
     def __init__(self) -> None:
-        self._used = {LAMP}
+        self._used = {LAMP: 1}  # the last number of each name
 
     def unique(self, name: str) -> str:
         """An id after a name."""
         plain = name.translate(RESERVED).strip() or "unnamed"
-        candidate, number = plain, 1
+        candidate, number = plain, self._used.get(plain, 0)
         while candidate in self._used:
             number += 1
             candidate = f"{plain} {number}"
-        self._used.add(candidate)
+        self._used[plain] = max(number, 1)
+        self._used.setdefault(candidate, 1)
         return candidate
 
 

@@ -1,5 +1,6 @@
 """PLY, PNG, OpenEXR and XML files, read again by other libraries."""
 
+import time
 from dataclasses import replace
 
 import mitsuba as mi
@@ -101,6 +102,12 @@ def test_selected_triangles_keep_only_their_positions():
     one = square().select(np.array([False, True]))
     assert len(one.positions) == 3
     assert np.array_equal(one.positions[one.triangles[0]], CORNERS[[0, 2, 3]])
+
+
+def test_many_equal_names_are_numbered_at_once():
+    identifiers, start = Identifiers(), time.process_time()
+    assert [identifiers.unique("grass") for _ in range(20_000)][-1] == "grass 20000"
+    assert time.process_time() - start < 5.0  # of 0.02; by trying all numbers it is 50
 
 
 def test_ids_are_unique_and_without_reserved_characters():
